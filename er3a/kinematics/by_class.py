@@ -37,7 +37,7 @@ OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
-STARTS = 240
+STARTS, FEW_STARTS = 240, 32
 SEARCHED: tuple[ArmClassCode, ...] = (
     "general_six",
     "six_one_prismatic",
@@ -162,13 +162,13 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
-    if certainty == CONTINUUM and solver.chain.code in SEARCHED:
-        found.append(chain.roots(_starts(robot, STARTS)))
+    if solver.chain.code in SEARCHED and (certainty == CONTINUUM or robot.joints < 6):
+        found.append(chain.roots(_starts(robot, STARTS if certainty == CONTINUUM else FEW_STARTS)))
     candidates = np.concatenate(found)
     curves: list[TracedCurve] = []
     alone: list[Reals] = []
     for x in candidates:
-        if any(chain.holds(curve, x) for curve in curves):
+        if any(chain.holds(curve, x) for curve in curves) or any(_same(robot, x, other, chain) for other in alone):
             continue
         surface = sum(curve.dimension > 1 for curve in curves)
         if len(curves) >= MOST_CURVES or surface >= MOST_ON_SURFACE:
@@ -184,7 +184,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     single = single.reshape(-1, len(solver.sliding))
     motions = [each for curve in curves for each in self_motion_of(robot, T, chain, curve, q_ref)]
     motions.sort(key=lambda motion: (not motion.within_limits, float(np.linalg.norm(motion.q0 - q_ref))))
-    return Settled(_apart(robot, to_joints(robot, single), chain), tuple(motions))
+    return Settled(_apart(robot, to_joints(robot, single)), tuple(motions))
 
 
 def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
@@ -210,23 +210,23 @@ def _starts(robot: Robot, count: int) -> Reals:
     return random.uniform(-1, 1, (count, len(solver.sliding))) * np.where(solver.sliding, 1.5, np.pi)
 
 
-def _apart(robot: Robot, rows: Reals, chain: PoseChain | None = None) -> Reals:
-    """Rows (k, n) without those that stand twice.
-
-    Newton's method leaves a root of higher order spread: with ``chain``, rows that are nearer than what an error of
-    ``SPREAD`` makes of them there are one.
-    """
+def _apart(robot: Robot, rows: Reals) -> Reals:
+    """Rows (k, n) without those that stand twice."""
     kept: list[Reals] = []
     for row in rows:
-        for other in kept:
-            apart = float(np.abs(shortest_way(robot, row - other)).max())
-            if apart < SAME_ROW:
-                break
-            if chain is not None and apart < MAYBE_SAME and apart * chain.smallest(to_rows(robot, row)) < SPREAD:
-                break
-        else:
+        if not any(float(np.abs(shortest_way(robot, row - other)).max()) < SAME_ROW for other in kept):
             kept.append(row)
     return np.array(kept).reshape(-1, robot.joints)
+
+
+def _same(robot: Robot, x: Reals, other: Reals, chain: PoseChain) -> bool:
+    """Whether row values (n,) are the same root as others.
+
+    Newton's method leaves a root of higher order spread: those that are nearer than what an error of ``SPREAD`` makes
+    of them there are one.
+    """
+    apart = float(np.abs(shortest_way(robot, to_joints(robot, x) - to_joints(robot, other))).max())
+    return apart < SAME_ROW or (apart < MAYBE_SAME and apart * chain.smallest(x) < SPREAD)
 
 
 @dataclass(frozen=True, eq=False)

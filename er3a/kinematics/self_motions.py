@@ -18,6 +18,7 @@ from er3a.robots.shown import joint_columns, shown
 LAPS = 6  # a curve that turns a joint is followed over so many of its laps at most
 SPLIT, SPLITS = 16, 11
 NARROWINGS = 10
+SAME_TURN, COVERS = 1e-6, 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,11 +93,14 @@ def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: TracedCurve,
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
     near = nearest_equivalent(robot, unwound(robot, q), q_ref)
     inside = within(robot, near)
-    made = []
-    parts = _parts(inside, curve.closed) if inside.any() else [np.arange(len(q))]
+    made: list[SelfMotionCurve] = []
+    parts = _parts(inside, near - q, curve.closed) if inside.any() else [np.arange(len(q))]
+    parts.sort(key=lambda part: float(np.linalg.norm(near[part] - q_ref, axis=1).min()))
     if curve.dimension > 1:  # one curve of a surface: the part nearest to the reference stands for it
-        parts = [min(parts, key=lambda part: float(np.linalg.norm(near[part] - q_ref, axis=1).min()))]
+        parts = parts[:1]
     for part in parts:
+        if any(_reaches(motion, lengths[part]) for motion in made):
+            continue
         best = int(part[np.linalg.norm(near[part] - q_ref, axis=1).argmin()])
         roomiest = int(part[limit_margin(robot, near[part]).argmax()])
         made.append(
@@ -108,23 +112,33 @@ def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: TracedCurve,
                 lengths,
                 q_ref=q_ref,
                 any_inside=bool(inside.any()),
-                best=best,
-                roomiest=roomiest,
+                best=(best, near[best] - q[best]),
+                roomiest=(roomiest, near[roomiest] - q[roomiest]),
             )
         )
     return made
 
 
-def _parts(inside: Flags, closed: bool) -> list[np.ndarray]:
-    """Runs of points within the limits; the last point of a closed curve is its first."""
+def _parts(inside: Flags, turns: Reals, closed: bool) -> list[np.ndarray]:
+    """Runs of points within the limits without a change of ``turns`` (k, n), what they are shifted by; the last point
+    of a closed curve is its first."""
     count = len(inside) - int(closed)
-    flags = inside[:count]
-    if flags.all():
-        return [np.arange(count)]
-    first = int(np.argmin(flags)) if closed else 0
-    order = (np.arange(count) + first) % count
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags[order], [False]]).astype(int)))
-    return [order[a:b] for a, b in zip(edges[::2], edges[1::2])]
+    flags, new_run = inside[:count], np.zeros(count, dtype=bool)
+    new_run[1:] = np.abs(np.diff(turns[:count], axis=0)).max(axis=1) > SAME_TURN
+    new_run[0] = not closed or np.abs(turns[count] - turns[count - 1]).max() > SAME_TURN
+    breaks = np.flatnonzero(new_run | ~flags)
+    order = np.roll(np.arange(count), -int(breaks[0]) if breaks.size else 0)
+    runs = np.split(order, np.flatnonzero((new_run | ~flags)[order])[1:] if breaks.size else [])
+    return [own for run in runs if len(own := run[flags[run]])]
+
+
+def _reaches(motion: SelfMotionCurve, places: Reals) -> bool:
+    """Whether a part covers places (k,), lengths along its curve, turns of joints aside."""
+    low, high = motion.range
+    away = places - motion.start - low
+    if motion.curve.closed:
+        away = np.mod(away + COVERS, motion.lengths[-1]) - COVERS
+    return bool(((away >= -COVERS) & (away <= high - low + COVERS)).all())
 
 
 def _part(
@@ -136,33 +150,30 @@ def _part(
     *,
     q_ref: Reals,
     any_inside: bool,
-    best: int,
-    roomiest: int,
+    best: tuple[int, Reals],
+    roomiest: tuple[int, Reals],
 ) -> SelfMotionCurve:
     def at(t: Reals) -> Reals:
         return _joints(robot, chain.members(curve, _place_of(lengths, np.atleast_1d(t), curve.closed)))
 
-    def near(t: Reals) -> Reals:
-        return nearest_equivalent(robot, unwound(robot, at(t)), q_ref)
-
     def distance(t: Reals) -> Reals:
-        q = near(t)
+        q = at(t) + best[1]
         cost = np.linalg.norm(q - q_ref, axis=1)
         return np.where(within(robot, q) | ~np.bool_(any_inside), cost, np.inf)
 
     def narrowness(t: Reals) -> Reals:
-        return -limit_margin(robot, near(t))
+        return -limit_margin(robot, at(t) + roomiest[1])
 
-    start = _least(distance, lengths, best, curve.closed)
-    q0 = near(np.array([start]))[0]
+    start = _least(distance, lengths, best[0], curve.closed)
+    q0 = (at(np.array([start])) + best[1])[0]
     own = q_ref
     if np.abs(own - q0).max() < 1e-5 and chain.error(_rows(robot, own)) < 1e-11:
         q0 = np.array(own)
     shift = q0 - at(np.array([start]))[0]
     step = 1e-4
     direction = (at(np.array([start + step])) - at(np.array([start - step])))[0] / (2 * step)
-    widest = _least(narrowness, lengths, roomiest, curve.closed)
-    room = near(np.array([widest]))[0]
+    widest = _least(narrowness, lengths, roomiest[0], curve.closed)
+    room = (at(np.array([widest])) + roomiest[1])[0]
     span = np.array([-0.5, 0.5]) * lengths[-1] if curve.closed else np.array([0.0, lengths[-1]]) - start
     motion = SelfMotionCurve(
         "curve", q0, direction, span, any_inside, room, float(limit_margin(robot, room)), curve.dimension, (), robot, T,
@@ -202,8 +213,7 @@ def _range(motion: SelfMotionCurve) -> Reals:
     for side in (-1.0, 1.0):
         if closed and not turns:
             reach = np.concatenate([lengths - motion.start, lengths - motion.start + lap, lengths - motion.start - lap])
-            reach = np.abs(reach[(reach * side > 0) & (np.abs(reach) <= 0.5 * lap)])
-            reach = np.append(reach, 0.5 * lap)
+            reach = np.abs(reach[(reach * side > 0) & (np.abs(reach) <= lap)])
         elif closed:
             laps = np.arange(-LAPS, LAPS + 1)[:, None] * lap
             reach = (laps + lengths[None, :-1] - motion.start).reshape(-1)
@@ -213,7 +223,8 @@ def _range(motion: SelfMotionCurve) -> Reals:
         reach = np.sort(reach)
         ok = within(robot, motion.members(side * reach)) if len(reach) else np.zeros(0, dtype=bool)
         if ok.all():
-            ends.append(side * (reach[-1] if len(reach) else 0.0))
+            whole = 0.5 * lap if closed and not turns else reach[-1] if len(reach) else 0.0
+            ends.append(side * whole)
             continue
         first = int(ok.argmin())
         good, bad = (reach[first - 1] if first else 0.0), reach[first]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.optimize
+from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
 from er3a.geometry.angles import wrap_to_pi
@@ -268,7 +269,11 @@ def test_two_of_three_joints_in_line_are_a_self_motion(q):
     T = forward(robot, q)
     np.testing.assert_allclose(forward(robot, q + np.array([0.4, 0.0, 0.4])), T, atol=1e-12)
     found = inverse(robot, T, np.array([1.5, 0.3, 0.2]))
-    assert len(found.families) == 1
+    first = np.linspace(-np.pi, np.pi, 200)
+    line = np.stack([first, 0 * first, first - (q[0] - q[2])], axis=1)
+    told = np.concatenate([motion.members(np.linspace(*motion.range, 800)) for motion in found.families])
+    assert np.abs(wrap_to_pi(line[:, None] - told)).max(axis=2).min(axis=1).max() < 0.01  # nothing is left out
+    assert (np.abs(told) <= 3.2 + 1e-9).all()
     assert not found.method.certain
     np.testing.assert_allclose(wrap_to_pi(found.q[:, 0] - found.q[:, 2] - (q[0] - q[2])), 0, atol=1e-9)
     batch = inverse_batch(robot, T[None], q[None])
@@ -448,6 +453,80 @@ def test_where_orientation_is_open_joints_that_can_move_on_the_target_are_a_fami
     assert np.abs(inverse(robot, T, own).q - own).max(axis=1).min() < 1e-6
     batch = inverse_batch(robot, T[None], own[None])
     assert np.nanmin(np.abs(batch.q[0] - own).max(axis=1)) < 1e-6
+
+
+def newton_on_the_point(rows, q, p):
+    """Joint values (k, 3) at which the tool point is p, from starts (k, 3), by plain D-H matrices; NaN where none."""
+    for _ in range(60):
+        off = plain_poses(rows, q)[:, :3, 3] - p
+        steps = 1e-6 * np.eye(3)
+        J = (
+            np.stack([plain_poses(rows, q + s)[:, :3, 3] - plain_poses(rows, q - s)[:, :3, 3] for s in steps], -1)
+            / 2e-6
+        )
+        move = np.einsum("kij,kj->ki", np.linalg.pinv(J, rcond=1e-8), off)
+        q = q - move * np.minimum(1, 0.5 / np.maximum(np.abs(move).max(axis=1, keepdims=True), 1e-300))
+    off = np.abs(plain_poses(rows, q)[:, :3, 3] - p).max(axis=1)
+    return np.where(off[:, None] < 1e-10, q, np.nan)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ([0, 0.3373, 0.105], [-H, np.pi, H], [0.2571, 0.3653, 0.105]),
+        ([-0.3654, 0, 0.183], [H, H, -H], [-0.3892, 0.183, 0.2201]),
+        ([0.1, 0.3, 0.25], [H, 0, 0.4], [0.3, 0.05, 0]),
+    ],
+)
+def test_three_joints_bring_the_point_there_in_every_way_whatever_its_orientation(rows, random):
+    robot = arm(rows, most=np.pi)
+    for own in random.uniform(-3, 3, (2, 3)):
+        T = plain_poses(rows, own)
+        found = newton_on_the_point(rows, random.uniform(-np.pi, np.pi, (24, 3)), T[:3, 3])
+        found = found[np.isfinite(found[:, 0])]
+        T[:3, :3] = Rotation.random(random_state=random.integers(99)).as_matrix()
+        given = inverse(robot, T, np.zeros(3)).q
+        batch = inverse_batch(robot, T[None], np.zeros(3)).q[0]
+        for rows_given in (given, batch[np.isfinite(batch[:, 0])]):
+            assert np.abs(wrap_to_pi(found[:, None] - rows_given)).max(axis=2).min(axis=1).max() < 1e-6
+
+
+def test_a_part_of_a_closed_curve_runs_to_the_limit_on_either_side():
+    """A limit takes a little of the curve, next to the reference: the rest is more than half of it, to one side."""
+    rows, _, own, _ = OPEN_TASKS["roll of a UR's flange"]
+    robot = arm(rows, most=9.0)
+    T, cut = forward(robot, np.array(own)), 0
+    for whole in inverse(robot, T, np.array(own)).families:
+        members = whole.members(np.linspace(*whole.range, 800))
+        if np.abs(members[0] - members[-1]).max() > 1e-6:
+            continue
+        top = int(members[:, 1].argmax())
+        upper = np.array([9.0, members[top, 1] - 0.01, 9.0, 9.0, 9.0])
+        reference = members[(top + 60) % 800]
+        nearest = inverse(robot.replace(upper=upper), T, reference).families[0]
+        assert np.abs(nearest.q0 - reference).max() < 0.05
+        left = members[members[:, 1] <= upper[1] - 0.001]
+        told = nearest.members(np.linspace(*nearest.range, 2000))
+        assert np.abs(left[:, None] - told).max(axis=2).min(axis=1).max() < 0.02
+        cut += 1
+    assert cut
+
+
+def test_a_root_of_high_order_is_no_self_motion():
+    robot = arm(([-0.1721, 0.199, 0], [-H, 0, -H], [0, 0, 0]), [0, 0, 1], most=6.3)
+    own = np.array([1.761594185, H, 0.0])
+    for reference in (np.zeros(3), own):
+        found = inverse(robot, forward(robot, own), reference)
+        assert not found.families
+    assert np.abs(found.q - own).max(axis=1).min() < 1e-6
+
+
+def test_a_double_root_stands_once():
+    robot = arm(([0.1963, 0.338, 0.338], [H, -1.143, H], [0.1018, 0.338, 0]), [1, 1, 0], most=3.0)
+    own = np.array([-0.4663420339, -0.5994817784, 0.0])
+    for reference in (own, np.zeros(3)):
+        assert len(inverse(robot, forward(robot, own), reference).q) == 1
+    assert np.isfinite(inverse_batch(robot, forward(robot, own)[None]).q[0, :, 0]).sum() == 1
 
 
 def test_a_tilt_that_no_joint_takes_away_leaves_the_folded_scara_its_family():

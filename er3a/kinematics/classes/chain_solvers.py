@@ -256,12 +256,13 @@ def _completions(links: Reals, n: int) -> list[tuple[ArmClassCode, tuple[int, ..
         more = [links[-1] @ first, inverse_rigid(first) @ second, inverse_rigid(second)]
         found.append(("planar_wrist", (4, 5), np.concatenate([links[:-1], more])))
     if n == 3:
-        # a wrist about the tool point, askew, so that the tool's own orientation is none of its singular ones
-        askew = eye.copy()
-        askew[:3, :3] = about_x(0.9)
+        # a wrist about the tool point; at right angles, so that it takes every orientation (one askew would lose arms
+        # whose tool is tilted further than it can), and with the tool's own none of its singular ones
+        across = eye.copy()
+        across[:3, :3] = about_x(np.pi / 2)
         last = eye.copy()
         last[:3, :3] = about_z(0.7) @ about_x(1.1)
-        found.append(("position", (3, 4, 5), np.concatenate([links, [askew], [inverse_rigid(askew)], [last]])))
+        found.append(("position", (3, 4, 5), np.concatenate([links, [across], [inverse_rigid(across)], [last]])))
     found.append(("planar_wrist", tuple(range(n, 6)), _with_any_joints(links, n)))
     return found
 

@@ -68,6 +68,7 @@ SlotName = Literal[
 SLOT_NAMES: tuple[SlotName, ...] = get_args(SlotName)
 LEFT_OVER = 1e-6  # rad by which a pose may miss those that fewer than six joints can take
 RANK_LOST = 1e-6  # smallest singular value below which a joint may be free
+DOUBLE_ROOT = 1e-6  # rad or m: rows so near are one, taken apart by rounding
 NEAR_SINGULAR = 1e-7  # rad or parts of the reach: a closed form's row so near to its singular sets is looked at again
 
 
@@ -260,7 +261,7 @@ class PlanarFour(WithoutParameters):
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         q, second = solve_scara(self.arm, T)[0], self.arm.turning[1]
-        meet = np.abs(_turned(q[:, 0, second] - q[:, 1, second])) < NEAR_SINGULAR
+        meet = np.abs(_turned(q[:, 0, second] - q[:, 1, second])) < DOUBLE_ROOT
         return q, np.where(meet, CONTINUUM, CERTAIN)
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
@@ -290,6 +291,8 @@ class Completed(WithoutParameters):
         for first in range(x.shape[1]):  # rows that differ in the joints that are not there
             same = np.abs(_turned(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
             x[:, first + 1 :][same] = np.nan
+            meet = np.abs(_turned(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
+            certainty = np.where(meet.any(axis=1), CONTINUUM, certainty)
         return x, certainty
 
     def seeds(self, T: Reals, values: Reals) -> Reals:

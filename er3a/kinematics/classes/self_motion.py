@@ -31,6 +31,7 @@ ON_CURVE = 1e-9
 SOLVES_AS_ROOT = 1e-12
 ABOVE_ROUNDING = 1e-15  # of the trace
 FEW_HALVINGS = 6
+SHORTEST = np.radians(6.0)  # what ends on both sides nearer than so is a root of high order
 PROBE = 2e-3
 LOST, CLOSED, OPEN = 0, 1, 2
 POSE, OPEN_ROLL, POSITION = 0, 1, 2  # tasks
@@ -425,11 +426,11 @@ class PoseChain:
             return None
         points = np.empty((MOST_POINTS, len(x)))
         count, end = trace(self.posed, start, v, points)
-        path = points[:count].copy()
+        path, lost = points[:count].copy(), end == LOST
         if end != CLOSED:
-            count, _ = trace(self.posed, start, -v, points)
-            path = np.concatenate([points[:count][::-1], path[1:]])
-        if len(path) < 3:
+            count, other_end = trace(self.posed, start, -v, points)
+            path, lost = np.concatenate([points[:count][::-1], path[1:]]), lost and other_end == LOST
+        if lost and np.abs(path - start).max() < SHORTEST:
             return None
         return TracedCurve(self._in_m(path), end == CLOSED, self._dimension(path))
 
