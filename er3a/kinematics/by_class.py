@@ -162,7 +162,8 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
-    if certainty == CONTINUUM and solver.chain.code in SEARCHED:
+    in_doubt = certainty == CONTINUUM or (certainty == UNCERTAIN and solver.sliding.any())
+    if in_doubt and solver.chain.code in SEARCHED:
         found.append(chain.roots(_starts(robot, STARTS)))
     candidates = np.concatenate(found)
     curves: list[TracedCurve] = []
