@@ -84,8 +84,10 @@ def new_scratch() -> Scratch:
 
 
 def readings_of(links: Reals, sliding: Flags) -> list[Reading]:
-    """All readings of the loop (twelve, or those with the prismatic joints at places 1, 4 and 5); ``links`` (7, 4, 4) with
-    L_0 = 1 (base in the pose), ``sliding`` (6,)."""
+    """All readings of the loop: twelve, or those with the prismatic joints at places 1, 4 and 5.
+
+    ``links`` (7, 4, 4) with L_0 = 1 (base in the pose), ``sliding`` (6,).
+    """
     found = []
     for backwards in (False, True):
         for shift in range(6):
