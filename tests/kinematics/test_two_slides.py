@@ -150,7 +150,7 @@ def test_slides_that_are_parallel_at_one_pose_have_a_self_motion(random):
 
 H = np.pi / 2
 ONE_SLIDE = {  # readings of the loop with the slide among the joints that are eliminated last tell nothing of them
-    "quill behind meeting axes": ([0.3, 0, 0, 0.1, 0, 0], [0, 1.32 * H, -H, 0, -H, -1.9], [0, -0.75, 0, 0.05, 0.3, 0], 5),
+    "quill": ([0.3, 0, 0, 0.1, 0, 0], [0, 1.32 * H, -H, 0, -H, -1.9], [0, -0.75, 0, 0.05, 0.3, 0], 5),
     "rail": ([0.1, 0, 0.1, 0, 0.19, 0], [H, H, 0, H, -H, H], [0, 0, -0.47, 0.1, 0, 0], 0),
     "zeros that all stand twice": (
         [0, 0.092, 0.3, 0.3, -0.869, 0], [H, np.pi, 0.13, -H, -1.48, -H], [-0.78, 0.1, -0.719, -0.806, 0, 0], 4
