@@ -162,8 +162,10 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
-    if solver.chain.code in SEARCHED and (certainty == CONTINUUM or robot.joints < 6):
-        found.append(chain.roots(_starts(robot, STARTS if certainty == CONTINUUM else FEW_STARTS)))
+    in_doubt = certainty == CONTINUUM or (certainty == UNCERTAIN and solver.sliding.any())
+    if in_doubt and solver.chain.code in SEARCHED:
+        few = certainty == UNCERTAIN and robot.joints < 6
+        found.append(chain.roots(_starts(robot, FEW_STARTS if few else STARTS)))
     candidates = np.concatenate(found)
     curves: list[TracedCurve] = []
     alone: list[Reals] = []

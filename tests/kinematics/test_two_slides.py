@@ -1,4 +1,4 @@
-"""Six joints of which two slide, against D-H matrices written out and Newton's method from many starts."""
+"""Six joints of which one or two slide, against D-H matrices written out and Newton's method from many starts."""
 
 from __future__ import annotations
 
@@ -146,3 +146,29 @@ def test_slides_that_are_parallel_at_one_pose_have_a_self_motion(random):
     members = motion.members(np.linspace(*motion.range, 9))
     assert np.ptp(members[:, 0]) > 1.0
     assert np.abs(poses(rows, sliding, members) - T[0]).max() < 1e-8
+
+
+H = np.pi / 2
+ONE_SLIDE = {  # readings of the loop with the slide among the joints that are eliminated last tell nothing of them
+    "quill": ([0.3, 0, 0, 0.1, 0, 0], [0, 1.32 * H, -H, 0, -H, -1.9], [0, -0.75, 0, 0.05, 0.3, 0], 5),
+    "rail": ([0.1, 0, 0.1, 0, 0.19, 0], [H, H, 0, H, -H, H], [0, 0, -0.47, 0.1, 0, 0], 0),
+    "zeros that all stand twice": (
+        [0, 0.092, 0.3, 0.3, -0.869, 0], [H, np.pi, 0.13, -H, -1.48, -H], [-0.78, 0.1, -0.719, -0.806, 0, 0], 4
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ONE_SLIDE)
+def test_one_slide_that_only_a_reading_from_it_on_can_solve(name, random):
+    a, alpha, d, place = ONE_SLIDE[name]
+    sliding = flags([place])
+    rows = np.array(a), np.array(alpha), np.array(d), np.zeros(6)
+    arm = robot(rows, sliding).replace(lower=-np.full(6, 9.0), upper=np.full(6, 9.0))
+    q = random.uniform(-1, 1, (4, 6)) * np.where(sliding, 1.0, np.pi)
+    for own, T in zip(q, poses(rows, sliding, q)):
+        found = inverse(arm, T)
+        assert found.method.arm_class == "six_one_prismatic"
+        assert np.abs(poses(rows, sliding, found.q) - T).max() < 1e-9
+        for row in [own, *multistart(rows, sliding, T, random)]:
+            on_family = any(motion.chain.holds(motion.curve, row) for motion in found.families)
+            assert on_family or away(found.q, row, sliding).min(initial=9.0) < 1e-4

@@ -45,7 +45,7 @@ class Reading(NamedTuple):
     ``joint`` (6,) is the arm's joint at each place, ``sense`` +1 or -1 the sign of its angle there, ``links`` (6, 4, 4)
     the links behind them with the pose's left out, which stands at ``place`` and is inverted if ``sense`` is -1.
     ``left`` (14, 27) are the left side's coefficients if the pose is not in it. ``slides`` (6,) tells the prismatic
-    joints, which may stand at places 4 and 5 only.
+    joints, which may stand at places 1, 4 and 5 only.
     """
 
     joint: Integers
@@ -84,8 +84,10 @@ def new_scratch() -> Scratch:
 
 
 def readings_of(links: Reals, sliding: Flags) -> list[Reading]:
-    """All readings of the loop (twelve, or those with the prismatic joints at places 4 and 5); ``links`` (7, 4, 4) with
-    L_0 = 1 (base in the pose), ``sliding`` (6,)."""
+    """All readings of the loop: twelve, or those with the prismatic joints at places 1, 4 and 5.
+
+    ``links`` (7, 4, 4) with L_0 = 1 (base in the pose), ``sliding`` (6,).
+    """
     found = []
     for backwards in (False, True):
         for shift in range(6):
@@ -100,7 +102,7 @@ def readings_of(links: Reals, sliding: Flags) -> list[Reading]:
                 if k == 5:
                     place = i
             slides = sliding[joint]
-            if slides[[0, 1, 2, 5]].any():
+            if slides[[1, 2, 5]].any():
                 continue
             reading = Reading(joint, -1.0 if backwards else 1.0, arranged, place, np.zeros((14, 27)), slides)
             if place in (0, 5):
@@ -176,7 +178,7 @@ def equations_of_pose(reading: Reading, pose_link: Reals, m: Scratch) -> None:
     if reading.place != 0 and reading.place != 5:
         left = m.left
         left_side(m.links, reading.slides, left)
-    _right_side(m)
+    _right_side(reading.slides[0], m)
     _without_first_joint(left, reading.slides, m)
     _without_second_joint(left, m)
     for r in range(EQUATIONS):
@@ -191,14 +193,20 @@ def equations_of_pose(reading: Reading, pose_link: Reals, m: Scratch) -> None:
 
 
 @kernel
-def _right_side(m: Scratch) -> None:
-    """``m.right`` (3, 15): K_1^-1 Rz(-x_1) K_6^-1 axis = cos right[0] + sin right[1] + right[2]."""
+def _right_side(slides: bool, m: Scratch) -> None:
+    """``m.right`` (3, 15): K_1^-1 Rz(-x_1) K_6^-1 axis = cos right[0] + sin right[1] + right[2]; of a prismatic joint 1
+    x^2 and x stand for cos and sin."""
     axis, seen = np.zeros(NUMBERS), np.empty(NUMBERS)
     axis[5], axis[14] = 1.0, 1.0
     K, parts = np.empty((4, 4)), np.empty((3, NUMBERS))
     invert_rigid(m.links[5], K)
     carry(K, axis, seen)
-    turned_parts(seen, parts)
+    if slides:
+        slid_parts(seen, parts)
+        for j in range(NUMBERS):
+            parts[0, j], parts[2, j] = parts[2, j], parts[0, j]
+    else:
+        turned_parts(seen, parts)
     for j in range(NUMBERS):
         parts[1, j] = -parts[1, j]
     invert_rigid(m.links[0], K)

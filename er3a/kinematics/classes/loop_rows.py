@@ -291,7 +291,9 @@ def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:
         b0 += A[0, 3 + j] * monomials[j]
         b1 += A[1, 3 + j] * monomials[j]
     count = 1
-    if abs(A[1, 1]) > 1e-5 * (abs(A[0, 0]) + abs(A[0, 1])):
+    if reading.slides[0]:
+        count = _first_shift(A[0, 0], A[0, 1], A[1, 1], b0, b1, m.x)
+    elif abs(A[1, 1]) > 1e-5 * (abs(A[0, 0]) + abs(A[0, 1])):
         s = b1 / A[1, 1]
         if abs(A[0, 0]) > 1e-5 * abs(A[0, 1]):
             x[0] = np.arctan2(s, (b0 - A[0, 1] * s) / A[0, 0])
@@ -320,8 +322,21 @@ def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:
 
 
 @kernel
+def _first_shift(square: float, linear: float, alone: float, b0: float, b1: float, x: Reals) -> int:
+    """Joint 1 that slides, from ``square x^2 + linear x = b0`` and ``alone x = b1``, into ``x`` (2, 6); how many."""
+    if abs(alone) > 1e-5 * (abs(square) + abs(linear)):
+        x[0, 0] = b1 / alone
+        return 1
+    x[1, 2:5] = x[0, 2:5]
+    h = -0.5 * (linear + np.copysign(np.sqrt(max(linear * linear + 4.0 * square * b0, 0.0)), linear))
+    x[0, 0] = h / square if square != 0.0 else 0.0
+    x[1, 0] = -b0 / h if h != 0.0 else 0.0
+    return 2
+
+
+@kernel
 def _second_and_last(e: Scratch, across: Reals, slides: Flags, x: Reals) -> None:
-    c, s = np.cos(x[0]), np.sin(x[0])
+    c, s = (x[0] * x[0], x[0]) if slides[0] else (np.cos(x[0]), np.sin(x[0]))
     re, im = 0.0, 0.0
     for b in range(4):
         u = c * e.right[0, 3 * b] + s * e.right[1, 3 * b] + e.right[2, 3 * b]
