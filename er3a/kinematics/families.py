@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from er3a.display import Displayed, Sheet, shortly
-from er3a.geometry.angles import TURN, greatest_move, wrap_to_pi
+from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.kinematics.aligned_wrist import (
     SOLVES_M,
     SOLVES_RAD,
@@ -33,7 +33,7 @@ from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import nearest_equivalent, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import LIMIT_TOLERANCE
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, whole_turns
 
 GRID = np.radians(2.0)
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
@@ -83,14 +83,14 @@ class Family(Displayed):
         return int(np.median((values < FREE_MOTION).sum(axis=1)))
 
     def holds(self, q: Reals) -> bool:
-        """Whether joint values (6,) are a member of a curve, turns aside: near q0, or within the range.
+        """Whether joint values (6,) are a member of a curve within its range, turns of other joints aside.
 
         False for the lines of a wrist.
         """
         if self.kind == "wrist":
             return False
         t = q[FREE_JOINT[self.kind]] - self.q0[FREE_JOINT[self.kind]]
-        if greatest_move(self.q0, q) >= TURN / 2 and not self.range[0] <= t <= self.range[1]:
+        if not self.range[0] - SAME_FAMILY <= t <= self.range[1] + SAME_FAMILY:
             return False
         return bool(np.abs(wrap_to_pi(self.members(t) - q)).max() < SAME_FAMILY)
 
@@ -131,7 +131,7 @@ def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ..
         for slot in slots[(slots // step % 2 == 0) & solved]:
             moved = wrist_centre_on_axis(robot, T, q[slot], joint)
             if np.linalg.norm(moved[:3, 3] - T[:3, 3]) < SOLVES_M and (joint == 0 or arm_folds_fully(robot)):
-                _add(found, [_curve_family(robot, moved, kind, q_ref, (int(slot), int(slot) + step))])
+                _add(found, _curve_families(robot, moved, kind, q_ref, (int(slot), int(slot) + step)))
     return tuple(found)
 
 
@@ -152,29 +152,36 @@ def _add(found: list[Family], new: list[Family]) -> None:
 
 
 def _wrist_families(robot: Robot, T: Reals, q: Reals, q_ref: Reals, branches: tuple[int, ...]) -> list[Family]:
-    """One family for each sum (or difference) of joints 4 and 6 that the limits admit."""
+    """One family for each sum (or difference) of joints 4 and 6 that the limits admit; one where either of them turns
+    without end."""
     q, direction = wrist_line(robot, q)
     rest = nearest_equivalent(robot, q, q_ref)
     rest[[3, 5]] = q[[3, 5]] + TURN * np.round((q_ref - q) / TURN)[[3, 5]]
-    families = []
-    fits = within(robot, np.where(direction != 0, np.clip(rest, robot.lower, robot.upper), rest))
+    limits, families = whole_turns(robot), []
+    rates, endless = limits.lines @ direction, bool(robot.continuous[[3, 5]].any())
+    moved = rates != 0
     most = int(np.ceil((robot.upper - robot.lower)[[3, 5]].sum() / TURN)) + 2
-    for k in range(-most, most + 1) if fits else ():
+    for k in range(-most, most + 1):
         start = rest + TURN * k * np.eye(6)[5]
-        low, high = -np.inf, np.inf
-        for j in (3, 5):
-            ends = np.sort(np.array([robot.lower[j] - start[j], robot.upper[j] - start[j]]) * direction[j])
-            low, high = max(low, ends[0]), min(high, ends[1])
+        least, greatest = limits.lower - limits.lines @ start, limits.upper - limits.lines @ start
+        if (least > LIMIT_TOLERANCE)[~moved].any() or (greatest < -LIMIT_TOLERANCE)[~moved].any():
+            continue
+        ends = np.sort(np.stack([least[moved], greatest[moved]]) / rates[moved], axis=0)
+        nearest = _nearest_on_line(start, direction, q_ref)
+        low, high = float(ends[0].max()), float(ends[1].min())
+        if np.isinf(high - low):  # nothing ends it: one lap
+            low, high = nearest - TURN / 2, nearest + TURN / 2
         if low <= high + LIMIT_TOLERANCE:
             high = max(low, high)
-            t = float(np.clip(_nearest_on_line(start, direction, q_ref), low, high))
+            t = float(np.clip(nearest, low, high))
             span = np.array([low - t, high - t])
             families.append(Family("wrist", start + t * direction, direction, span, True, branches, robot, T))
     if not families:
         t = _nearest_on_line(rest, direction, q_ref)
         span = np.array([-np.pi, np.pi])
         families = [Family("wrist", rest + t * direction, direction, span, False, branches, robot, T)]
-    return sorted(families, key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
+    families.sort(key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
+    return families[:1] if endless else families
 
 
 def _nearest_on_line(q: Reals, direction: Reals, q_ref: Reals) -> float:
@@ -188,10 +195,17 @@ def _on_curve(robot: Robot, T: Reals, joint: int, values: Reals, q_ref: Reals, s
     return solve_slots(robot, np.broadcast_to(T, (len(values), 4, 4)), reference, keep_folds=True)[0][:, slot]
 
 
-def _curve_family(robot: Robot, T: Reals, kind: SingularityType, q_ref: Reals, branches: tuple[int, ...]) -> Family:
+def _curve_families(
+    robot: Robot, T: Reals, kind: SingularityType, q_ref: Reals, branches: tuple[int, ...]
+) -> list[Family]:
+    """One for each part of the free joint's range in which the limits are kept, nearest to the reference first; one for
+    the whole of it if they are kept nowhere."""
     joint, slot = FREE_JOINT[kind], branches[0]
-    grid = np.arange(robot.lower[joint], robot.upper[joint] + GRID, GRID)
-    grid = np.unique(np.append(np.minimum(grid, robot.upper[joint]), np.clip(q_ref, robot.lower, robot.upper)[joint]))
+    low, high = robot.lower[joint], robot.upper[joint]
+    if robot.continuous[joint]:
+        low, high = q_ref[joint] - TURN / 2, q_ref[joint] + TURN / 2
+    grid = np.arange(low, high + GRID, GRID)
+    grid = np.unique(np.append(np.minimum(grid, high), np.clip(q_ref[joint], low, high)))
 
     def members(values: Reals) -> Reals:
         q = _nearest_wrists(robot, _on_curve(robot, T, joint, values, q_ref, slot), q_ref)
@@ -200,20 +214,27 @@ def _curve_family(robot: Robot, T: Reals, kind: SingularityType, q_ref: Reals, b
         return q
 
     def costs(q: Reals) -> Reals:
-        return np.where(within(robot, q) | ~any_inside, np.sum((q - q_ref) ** 2, axis=1), np.inf)
+        return np.where(within(robot, q) | (not any_inside), np.sum((q - q_ref) ** 2, axis=1), np.inf)
 
     q = members(grid)
-    any_inside = within(robot, q).any()
-    values, best = grid, int(costs(q).argmin())
-    for _ in range(ROUNDS):
-        between = np.linspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], SPLIT + 1)
-        values = np.unique(np.append(between, values[best]))
-        q = members(values)
-        best = int(costs(q).argmin())
-    q0 = q[best]
-    family = Family(kind, q0, _tangent(robot, q0, joint), np.zeros(2), bool(any_inside), branches, robot, T)
-    span = _range(family, grid) if family.within_limits else np.array([-np.pi, np.pi])
-    return replace(family, range=span)
+    inside = within(robot, q)
+    any_inside = bool(inside.any())
+    parts = [np.arange(len(grid))]
+    if any_inside:
+        parts = np.split(np.arange(len(grid)), np.flatnonzero(np.diff(inside)) + 1)
+        parts = [part for part in parts if inside[part[0]]]
+    found: list[Family] = []
+    for part in parts:
+        values, best = grid, int(part[costs(q[part]).argmin()])
+        for _ in range(ROUNDS):
+            between = np.linspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], SPLIT + 1)
+            values = np.unique(np.append(between, values[best]))
+            nearer = members(values)
+            best = int(costs(nearer).argmin())
+        q0 = nearer[best]
+        family = Family(kind, q0, _tangent(robot, q0, joint), np.zeros(2), any_inside, branches, robot, T)
+        found.append(replace(family, range=_range(family, grid) if any_inside else np.array([-np.pi, np.pi])))
+    return sorted(found, key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
 
 
 def _nearest_wrists(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
