@@ -46,6 +46,7 @@ from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_mis
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.joint_limits import equivalents_within, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import shortest_way
 
 SAME_JOINTS = 1e-9
 SAME_MEMBER = 1e-6
@@ -143,7 +144,9 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     slots, motions = found.q, found.settled[0].motions if found.settled else ()
     if len(solver.parameters) == 1:
         motions = all_motions(robot, T, q_ref, values).motions
-    branches: list[int] = np.flatnonzero(np.isfinite(slots[0, :, 0])).tolist()
+    filled = np.flatnonzero(np.isfinite(slots[0, :, 0]))
+    apart = np.abs(shortest_way(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
+    branches: list[int] = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)].tolist()  # where two meet one stands
     rows = [_rows_of_branch(robot, slots[0, slot], q_ref) for slot in branches]
     for motion in motions:
         for member in (motion.q0, motion.roomiest) if solver.parameters else (motion.q0,):

@@ -529,6 +529,14 @@ def test_a_double_root_stands_once():
     assert np.isfinite(inverse_batch(robot, forward(robot, own)[None]).q[0, :, 0]).sum() == 1
 
 
+def test_branches_that_meet_at_an_aligned_shoulder_stand_once():
+    robot = ARMS["arm_angle"][0]
+    q = np.array([0.7, 0.0, 1.1, -0.9, 0.5, 0.6, -0.8])
+    found = inverse(robot, forward(robot, q), q).q
+    assert (np.abs(found[:, None] - found).max(axis=2) + np.eye(len(found))).min() > 1e-6
+    assert np.abs(found - q).max(axis=1).min() < 1e-9
+
+
 def test_a_tilt_that_no_joint_takes_away_leaves_the_folded_scara_its_family():
     rows, sliding, own, _ = OPEN_TASKS["folded SCARA"]
     robot, T = arm(rows, sliding, most=3.2), forward(arm(rows, sliding), np.array(own))
