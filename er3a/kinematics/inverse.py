@@ -145,8 +145,10 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     if len(solver.parameters) == 1:
         motions = all_motions(robot, T, q_ref, values).motions
     filled = np.flatnonzero(np.isfinite(slots[0, :, 0]))
-    apart = np.abs(shortest_way(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
-    branches: list[int] = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)].tolist()  # where two meet one stands
+    if solver.parameters:  # where two branches meet one stands; other arms' poses of that kind are settled
+        apart = np.abs(shortest_way(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
+        filled = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)]
+    branches: list[int] = filled.tolist()
     rows = [_rows_of_branch(robot, slots[0, slot], q_ref) for slot in branches]
     for motion in motions:
         for member in (motion.q0, motion.roomiest) if solver.parameters else (motion.q0,):
