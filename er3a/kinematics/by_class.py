@@ -341,24 +341,30 @@ def to_pendant(pendant: Pendant, x: Reals, q_ref: Reals, q: Reals, inside: Flags
     :func:`er3a.robots.joint_limits.nearest_equivalent` takes, and ``inside`` (N, S)."""
     direction, start, sliding, lower, upper = pendant
     slots, n, per_turn = x.shape[1], x.shape[2], 1.0 / TURN
+    # all slots in one row and no branches, so that the processor takes several joints at once
+    sign, zero, turn, least, most, ref = np.empty((6, slots * n))
+    for m in range(slots * n):
+        j = m % n
+        sign[m], zero[m], turn[m] = direction[j], start[j], 0.0 if sliding[j] else TURN
+        least[m], most[m], ref[m] = lower[j] - LIMIT_TOLERANCE, upper[j] + LIMIT_TOLERANCE, q_ref[0, j]
+    rows, found = x.reshape(x.shape[0], slots * n), q.reshape(x.shape[0], slots * n)
     for i in range(x.shape[0]):
-        ref = q_ref[i if q_ref.shape[0] > 1 else 0]
+        if q_ref.shape[0] > 1:
+            for m in range(slots * n):
+                ref[m] = q_ref[i, m % n]
+        for m in range(slots * n):
+            value = sign[m] * (rows[i, m] - zero[m])
+            value += turn[m] * np.rint((ref[m] - value) * per_turn)
+            low, high = np.ceil((least[m] - value) * per_turn), np.floor((most[m] - value) * per_turn)
+            below, above = value + turn[m] * (low - 1.0), value + turn[m] * low
+            outside = below if least[m] - below < above - most[m] else above
+            found[i, m] = value + turn[m] * min(max(0.0, low), high) if low <= high else outside
         for slot in range(slots):
-            inside[i, slot] = not np.isnan(x[i, slot, 0])
-        for j in range(n):
-            least, most = lower[j] - LIMIT_TOLERANCE, upper[j] + LIMIT_TOLERANCE
-            for slot in range(slots):
-                value = direction[j] * (x[i, slot, j] - start[j])
-                if not sliding[j]:
-                    value += TURN * np.rint((ref[j] - value) * per_turn)
-                    low, high = np.ceil((least - value) * per_turn), np.floor((most - value) * per_turn)
-                    if low <= high:
-                        value += TURN * min(max(0.0, low), high)
-                    else:
-                        below, above = value + TURN * (low - 1.0), value + TURN * low
-                        value = below if lower[j] - below < above - upper[j] else above
-                q[i, slot, j] = value
-                inside[i, slot] &= (value <= most) & (value >= least)
+            fits = True
+            for j in range(n):
+                value = found[i, slot * n + j]
+                fits &= (value <= most[j]) & (value >= least[j])
+            inside[i, slot] = fits
 
 
 def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:

@@ -82,6 +82,9 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         sections=[_section(robot, target, results, rules) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
+        units=_units(robot),
+        chosen_heading=tr("Chosen J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
+        optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
         rule_columns=[tr("Branch"), *map(_rule_heading, rules)],
         trips=trips,
         histogram=histogram(trips) if trips else None,
@@ -288,6 +291,12 @@ def _short(label: str, branch: int) -> str:
 
 def _on_one_line(label: str, branch: int) -> str:
     return _short(label, branch).replace(" ", NO_BREAK_SPACE)
+
+
+def _units(robot: Robot) -> str:
+    """The unit of joint values, or of most of them and of those that slide."""
+    sliding = [f"J{j + 1}" for j in np.flatnonzero(robot.slides)]
+    return tr("deg, {joints} in mm", joints=", ".join(sliding)) if sliding else "deg"
 
 
 def _joints(q_deg: Iterable[float]) -> str:

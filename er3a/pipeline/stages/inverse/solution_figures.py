@@ -227,7 +227,7 @@ def _draw_joints(axes: Axes, robot: Robot, target: TargetResult, branches: Solut
     axes.set_xlim(-widest, widest)
     what = tr("joint angle (deg); grey: allowed range, line: reference")
     if robot.sliding.any():
-        what = tr("joint angle (deg), or mm where a joint slides; grey: allowed range, line: reference")
+        what = tr("joint angle (deg), or mm where a joint slides;\ngrey: allowed range, line: reference")
     axes.set_xlabel(what)
     axes.set_title(tr("Joint angles, one mark per branch"), **TITLE)
     handles = []
