@@ -161,7 +161,7 @@ def test_slices_show_the_cells_they_cut(done):
 
 def test_an_arm_without_a_known_inverse_is_told_so():
     coupling = np.array(palletiser().coupling)
-    coupling[3, 1] *= 0.5  # half a turn of a row that nothing else tells
+    coupling[3, 2] = -0.5  # a turn of joint 3 is half a turn of a row
     robot = palletiser().replace(coupling=coupling)
     done = tool_capability(robot, settings(), 0.08)
     assert isinstance(done.capability.lacks, InverseUnknown)
