@@ -17,7 +17,7 @@ from er3a.geometry.angles import TURN
 from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
-from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, Redundancy
+from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, LinkedRows, Redundancy
 from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
@@ -29,7 +29,7 @@ from er3a.numerics.threads import parallel_for
 from er3a.robots.derived import derived
 from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_way, uncoupling
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_way, uncoupling, uncoupling_of_linkage
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
@@ -55,7 +55,8 @@ SCANNED = 16  # values of a redundancy parameter from which self-motions are col
 
 @dataclass(frozen=True, eq=False)
 class ArmSolver:
-    """An arm's chain as its solver takes it; ``uncouple`` (n, n) undoes the coupling, None where there is none."""
+    """An arm's chain of m rows as its solver takes it; ``uncouple`` (n, m) undoes the coupling, None where there is
+    none."""
 
     chain: ChainSolver
     links: Reals
@@ -96,9 +97,19 @@ def arm_solver(robot: Robot) -> ArmSolver:
     links = constant_links(robot)
     sliding = np.ascontiguousarray(robot.sliding)
     uncouple = uncoupling(robot)
-    if robot.coupling is not None and uncouple is None:  # more rows than joints
-        return ArmSolver(Unsolved(robot.joints), links, sliding, size_of(links))
+    if robot.coupling is not None and uncouple is None:
+        uncouple = uncoupling_of_linkage(robot)
+        chain = Unsolved(robot.joints) if uncouple is None else _linked(robot, chain_solver(links, sliding), uncouple)
+        return ArmSolver(chain, links, sliding, size_of(links), uncouple)
     return ArmSolver(chain_solver(links, sliding), links, sliding, size_of(links), uncouple)
+
+
+def _linked(robot: Robot, chain: ChainSolver, uncouple: Reals) -> ChainSolver:
+    """The solver of a chain with more rows than joints, of those rows alone that the joints can make."""
+    if chain.parameters or isinstance(chain, Unsolved) or chain.code in TASKS:
+        return Unsolved(robot.joints)
+    apart = np.eye(robot.rows) - np.asarray(robot.coupling) @ uncouple
+    return LinkedRows(chain, apart * robot.direction, joint_starts(robot), robot.sliding, chain.code, chain.slots)
 
 
 def to_rows(robot: Robot, q: Reals) -> Reals:
@@ -154,7 +165,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     values : (1, k), of the redundancy parameters; certainty : of the class at this pose
     """
     solver = arm_solver(robot)
-    if isinstance(solver.chain, Unsolved) or (solver.chain.code == "scara" and not len(rows)):
+    if isinstance(solver.chain, Unsolved | LinkedRows) or (solver.chain.code == "scara" and not len(rows)):
         return Settled(_apart(robot, rows))
     if solver.chain.code == "scara":  # without the tilt that no joint can take away
         T = forward(robot, rows[0])

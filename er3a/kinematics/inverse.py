@@ -18,7 +18,7 @@ from er3a.kinematics.by_class import (
     task_mask,
 )
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
-from er3a.kinematics.classes.class_solvers import ArmClassCode
+from er3a.kinematics.classes.class_solvers import ArmClassCode, LinkedRows
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.configuration import side_of, slot_labels
@@ -43,7 +43,7 @@ from er3a.kinematics.solutions import (
     WristTooNearAxis1,
 )
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing, solve_slots, wrist_partitioned_arm
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import equivalents_within, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_way
@@ -156,7 +156,12 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
             if motion.within_limits and greatest_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
                 branches.append(slot_of(robot, T, member))
                 rows.append(member[None])
-    certain = found.certainty[0] == CERTAIN or solver.code not in BY_ELIMINATION
+    certain = bool(all_told(robot, found.certainty)[0])
+    if not certain and isinstance(solver, LinkedRows):  # the rows found may be members that the linkage can't make
+        for row in all_found(robot, T, STARTS):
+            if greatest_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
+                branches.append(slot_of(robot, T, row))
+                rows.append(_rows_of_branch(robot, row, q_ref))
     if redundancy is None and within(robot, q_ref) and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
         listed = np.concatenate([np.empty((0, robot.joints)), *rows])
         if greatest_move(listed, q_ref).min(initial=np.inf) > MISSED:  # a double root that rounding takes off the axis
@@ -180,6 +185,13 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     inside = within(robot, q)
     method = ByClass(solver.code, bool(certain), bool(slot_labels(robot)))
     return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, motions)
+
+
+def all_told(robot: Robot, certainty: Integers) -> Flags:
+    """Whether the class has told all solutions of poses (N,) in so far as it is certain of them (N,)."""
+    solver = arm_solver(robot).chain
+    closed = solver.code not in BY_ELIMINATION and not isinstance(solver, LinkedRows)
+    return np.asarray((certainty == CERTAIN) | closed)
 
 
 def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:

@@ -29,8 +29,9 @@ from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
 from er3a.formats.text_file import read_text
 from er3a.kinematics.by_class import arm_solver
-from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
+from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.study import Study, load_study
+from er3a.planning.class_follow import follows_tool_paths
 from er3a.programs.read_program import SUFFIXES, read_program
 from er3a.robots.robot import Robot
 
@@ -70,7 +71,7 @@ SIX = 6
 
 def stage_forms(robot: Robot) -> dict[str, str]:
     """Which stages a robot will have, and in what form, in words."""
-    spherical, branches = closed_form_missing(robot) is None, has_branches(robot)
+    spherical = closed_form_missing(robot) is None
     plain = robot.coupling is None and not robot.combined
     solver = arm_solver(robot).chain.code.replace("_", " ")
     six = robot.rows == robot.joints == SIX and not robot.sliding.any() and robot.coupling is None
@@ -80,7 +81,9 @@ def stage_forms(robot: Robot) -> dict[str, str]:
         "validation": "references, diagnosis and evidence" if six else "references and self-checks, no diagnosis",
         "workspace": f"samples, {proven or 'volume bounded by lengths alone'}",
         "inverse": "by iteration, which may miss solutions" if iterated else f"all solutions, class {solver}",
-        "trajectory": "moves of the joints and of the tool" if branches else "moves of the joints alone",
+        "trajectory": "moves of the joints and of the tool"
+        if follows_tool_paths(robot)
+        else "moves of the joints alone",
         "teach panel": "all solutions" if spherical and robot.coupling is None else "solutions found by iteration",
     }
 

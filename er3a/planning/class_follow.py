@@ -53,6 +53,13 @@ class PathEndsError(Er3aError):
         super().__init__(f"{robot}: the path can't be followed beyond {t:.6g} s ({kind.replace('_', ' ')})")
 
 
+def follows_tool_paths(robot: Robot) -> bool:
+    """Whether paths of the tool are followed: by arms with all solutions at a pose, or with an arm angle to choose."""
+    solver = arm_solver(robot).chain
+    by_class = not (isinstance(solver, Unsolved) or solver.parameters)
+    return by_class or solver.code == "arm_angle" or closed_form_missing(robot) is None
+
+
 def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) -> PiecewiseMotion:
     """The joints' motion (n) along a path.
 
@@ -68,10 +75,10 @@ def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) 
     PathEndsError
         where no arm follows to the end
     """
-    missing, solver = closed_form_missing(robot), arm_solver(robot).chain
-    if solver.code == "arm_angle":
+    missing = closed_form_missing(robot)
+    if arm_solver(robot).chain.code == "arm_angle":
         return _at_arm_angles(robot, path, q_start)
-    if (isinstance(solver, Unsolved) or solver.parameters) and missing is not None:
+    if missing is not None and not follows_tool_paths(robot):
         raise NotWristPartitionedError(robot.name, missing)
 
     def rows_at(t: Reals) -> Reals:

@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -80,6 +81,25 @@ def uncoupling(robot: Robot) -> Reals | None:
     if robot.coupling is None or robot.rows != robot.joints or abs(np.linalg.det(robot.coupling)) < INVERTIBLE:
         return None
     return np.asarray(np.linalg.inv(robot.coupling), dtype=float)
+
+
+@derived
+def uncoupling_of_linkage(robot: Robot) -> Reals | None:
+    """(n, m), joints for what m > n rows move by, from n of the rows: such that a whole turn of a row is whole turns of
+    joints. None where no n rows are so."""
+    coupling = robot.coupling
+    if coupling is None or robot.rows <= robot.joints or not (whole_turns(robot).alone | robot.slides).all():
+        return None
+    for chosen in map(list, combinations(range(robot.rows), robot.joints)):
+        if abs(np.linalg.det(coupling[chosen])) < INVERTIBLE:
+            continue
+        found = np.zeros((robot.joints, robot.rows))
+        found[:, chosen] = np.linalg.inv(coupling[chosen])
+        turns = found[:, ~robot.sliding]
+        parts = np.where(robot.slides[:, None], turns, turns - np.round(turns))
+        if np.abs(parts).max(initial=0.0) <= WHOLE:
+            return found
+    return None
 
 
 def turns_in(robot: Robot, move: Reals) -> Reals:

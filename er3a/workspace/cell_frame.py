@@ -114,10 +114,10 @@ def is_quick(robot: Robot) -> bool:
 def joint_1_alone(robot: Robot) -> bool:
     """Whether joint 1 moves the first row alone and as far as itself, is the only one that does, and has limits of its
     own."""
-    uncouple = arm_solver(robot).uncouple
+    coupling = robot.coupling
     if any(limit.factors[0] for limit in robot.combined):
         return False
-    return uncouple is None or not (uncouple[1:, 0].any() or uncouple[0, 1:].any() or abs(uncouple[0, 0]) != 1)
+    return coupling is None or not (coupling[1:, 0].any() or coupling[0, 1:].any() or abs(coupling[0, 0]) != 1)
 
 
 @derived

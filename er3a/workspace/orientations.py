@@ -157,6 +157,8 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
         return AskedOrientations("turns", none, tool, axes[int(np.flatnonzero(~robot.sliding)[0])])
     if code == "free_roll":
         return AskedOrientations("directions", none, tool, axis)
+    if robot.rows != robot.joints:  # a linkage decides how the tool stands
+        return None
     if code == "planar_wrist":
         roll = roll_of(robot, rolls)
         plane = _tilt_plane(robot, robot.joints - int(roll.free))

@@ -219,7 +219,7 @@ def test_a_scara_that_points_down_serves_no_box_from_the_side():
 
 
 def test_what_no_maps_are_made_of_is_told():
-    assert lacking_for_maps(palletiser()) == InverseUnknown()
+    assert lacking_for_maps(palletiser()) == OrientationsUnknown(4)
     shared = make_arm(combined=(CombinedLimit((1.0, 1.0, 0, 0, 0, 0), -1.0, 1.0),))
     assert lacking_for_maps(shared) == JointOneShared()
     rows = [("R", 0, 90, 300, -170, 170), ("R", 350, 0, 0, -10, 170), ("R", 0, 90, 0, -150, 150)]

@@ -306,6 +306,34 @@ class Completed(WithoutParameters):
         return self.rest.names(full)
 
 
+@dataclass(frozen=True, eq=False)
+class LinkedRows(WithoutParameters):
+    """A chain whose rows a linkage moves together (a levelling one, say): those of its solutions that keep to it.
+
+    ``apart`` (m, m) takes rows, less ``start`` (m,), to how far they are from what the linkage makes.
+    """
+
+    chain: ChainSolver
+    apart: Reals
+    start: Reals
+    sliding: Flags
+    code: ArmClassCode
+    slots: int
+
+    def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
+        x, certainty = self.chain.rows(T, values)
+        off = (x - self.start) @ self.apart.T
+        off = np.abs(np.where(self.sliding, off, _turned(off))).max(axis=2)
+        x[off > LEFT_OVER] = np.nan
+        return x, certainty
+
+    def seeds(self, T: Reals, values: Reals) -> Reals:
+        return np.empty((0, len(self.start)))
+
+    def names(self, x: Reals) -> tuple[SlotName, ...]:
+        return self.chain.names(x)
+
+
 def _turned_back(v: Reals, axis: Reals, angle: float) -> Reals:
     """A vector as seen with joint 1 at 0."""
     c, s = np.cos(angle), np.sin(angle)
