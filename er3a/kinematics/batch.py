@@ -140,11 +140,14 @@ def _by_class(
 
 
 def _found_by_starts(robot: Robot, T: Reals, q_ref: Reals) -> Reals:
-    """Slots (N, S, n) with what random starts find, for chains of no class."""
+    """Slots (N, S, n) with what random starts find, for chains of no class, and references (N, n) that solve."""
     q = np.full((len(T), SLOTS_BY_STARTS, robot.joints), np.nan)
+    own = np.abs(forward(robot, q_ref) - T).max(axis=(1, 2), initial=0.0) <= SOLVES
     for n, pose in enumerate(T):
-        rows = all_found(robot, pose, starts_of(robot))[:SLOTS_BY_STARTS]
-        q[n, : len(rows)] = nearest_equivalent(robot, rows, q_ref[n])
+        rows = nearest_equivalent(robot, all_found(robot, pose, starts_of(robot))[:SLOTS_BY_STARTS], q_ref[n])
+        if own[n] and not (np.abs(rows - q_ref[n]).max(axis=1) < SAME_MEMBER).any():
+            rows = np.concatenate([rows[: SLOTS_BY_STARTS - 1], q_ref[n : n + 1]])
+        q[n, : len(rows)] = rows
     return q
 
 

@@ -250,6 +250,8 @@ def test_joints_that_depend_on_each_other_are_named_and_soon_done():
     assert found.method.lacking.code == "dependent_joints"
     assert len(found.q) <= found.method.starts + 1
     assert np.abs(found.q - 0.4).max(axis=1).min() < 1e-6
+    batch = inverse_batch(planar, forward(planar, np.full((1, 4), 0.4)), np.full(4, 0.4))
+    assert np.nanmin(np.abs(batch.q[0] - 0.4).max(axis=1)) < 1e-6
 
 
 def test_four_joints_behind_a_slide_are_completed_where_the_arm_can_be(random):

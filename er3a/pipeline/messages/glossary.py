@@ -6,7 +6,7 @@ from er3a.pipeline.messages.language import N_, tr
 
 GLOSSARY = {
     N_("branch"): N_("one choice of shoulder, elbow and wrist among the joint angles that bring the tool to a pose"),
-    N_("self-motion"): N_("a continuum of solutions: joints that turn with the tool at rest"),
+    N_("self-motion"): N_("a continuum of solutions: joints that move while the tool stays on its target"),
     N_("arm angle"): N_("where the elbow of an arm with spherical shoulder and wrist is on its circle"),
     N_("cuspidal"): N_("of an arm that can change between solutions of a pose without passing a singularity"),
     N_("manipulability"): N_(
