@@ -59,7 +59,10 @@ def found_from(name: str, T: np.ndarray, random: np.random.Generator) -> list[np
     return found
 
 
-@pytest.mark.parametrize("name", LEVELLED)
+@pytest.mark.parametrize(
+    "name",
+    ["parallelogram", *(pytest.param(name, marks=pytest.mark.long) for name in LEVELLED if name != "parallelogram")],
+)
 def test_a_levelled_arm_has_all_solutions_by_the_class_of_its_chain(name, random):
     robot, peers = levelled(name), 0
     for own in random.uniform(robot.lower, robot.upper, (6, robot.joints)):

@@ -42,6 +42,7 @@ def results(folder):
     return read_results(folder, RESULTS).results
 
 
+@pytest.mark.long
 def test_clear_places_are_proven_by_arms_that_are_free_with_the_tool_there(results):
     rows, robot = results.places, load_robot(NAME)
     q = np.radians(rows.witness_deg[rows.clear])

@@ -454,6 +454,7 @@ def test_extreme_paths_give_results(study, tmp_path):
         assert (tmp_path / verb).stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_paths_that_are_nowhere_reached_have_a_page_too(study, tmp_path):
     far = {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}
     changed = with_paths(study, tmp_path, LINE | {"start": far, "end": far})
