@@ -37,6 +37,7 @@ OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
+STUCK = 3e-8  # smallest singular value above which rows of three parallel axes, known to rounding, can't move
 STARTS, FEW_STARTS = 240, 32
 SEARCHED: tuple[ArmClassCode, ...] = (
     "general_six",
@@ -181,14 +182,15 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     curves: list[TracedCurve] = []
     alone: list[Reals] = []
     for x in candidates:
-        if any(chain.holds(curve, x) for curve in curves) or any(_same(robot, x, other, chain) for other in alone):
+        if any(chain.holds(curve, x) for curve in curves) or _stands(robot, x, alone, chain):
             continue
         surface = sum(curve.dimension > 1 for curve in curves)
         if len(curves) >= MOST_CURVES or surface >= MOST_ON_SURFACE:
             if not chain.moves(x) and chain.error(x) < SOLVES:
                 alone.append(x)
             continue
-        curve = chain.curve(x)
+        stuck = solver.chain.code == "three_parallel" and chain.smallest(x) > STUCK
+        curve = None if stuck else chain.curve(x)
         if curve is not None:
             curves.append(curve)
         elif chain.error(x) < SOLVES:
@@ -232,13 +234,16 @@ def _apart(robot: Robot, rows: Reals) -> Reals:
     return np.array(kept).reshape(-1, robot.joints)
 
 
-def _same(robot: Robot, x: Reals, other: Reals, chain: PoseChain) -> bool:
-    """Whether row values (n,) are the same root as others.
+def _stands(robot: Robot, x: Reals, others: list[Reals], chain: PoseChain) -> bool:
+    """Whether row values (n,) are the same root as some others.
 
     Newton's method leaves a root of higher order spread: those that are nearer than what an error of ``SPREAD`` makes
     of them there are one.
     """
-    apart = float(np.abs(shortest_way(robot, to_joints(robot, x) - to_joints(robot, other))).max())
+    if not others:
+        return False
+    away = to_joints(robot, np.array([x])) - to_joints(robot, np.array(others))
+    apart = float(np.abs(shortest_way(robot, away)).max(axis=1).min())
     return apart < SAME_ROW or (apart < MAYBE_SAME and apart * chain.smallest(x) < SPREAD)
 
 
