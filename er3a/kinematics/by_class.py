@@ -37,7 +37,7 @@ OWN_SOLVES, MISSED = 1e-12, 1e-4  # m and parts of 1; rad or m from all rows
 MAYBE_SAME = 1e-2  # rad
 SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
-STUCK = 3e-8  # smallest singular value above which rows of three parallel axes, known to rounding, can't move
+MOVES_BELOW = 3e-8  # smallest singular value above which rows of three parallel axes, known to rounding, can't move
 STARTS, FEW_STARTS = 240, 32
 SEARCHED: tuple[ArmClassCode, ...] = (
     "general_six",
@@ -189,7 +189,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
             if not chain.moves(x) and chain.error(x) < SOLVES:
                 alone.append(x)
             continue
-        stuck = solver.chain.code == "three_parallel" and chain.smallest(x) > STUCK
+        stuck = solver.chain.code == "three_parallel" and chain.smallest(x) > MOVES_BELOW
         curve = None if stuck else chain.curve(x)
         if curve is not None:
             curves.append(curve)
@@ -199,7 +199,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     single = single.reshape(-1, len(solver.sliding))
     motions = [each for curve in curves for each in self_motion_of(robot, T, chain, curve, q_ref)]
     motions.sort(key=lambda motion: (not motion.within_limits, float(np.linalg.norm(motion.q0 - q_ref))))
-    return Settled(_apart(robot, to_joints(robot, single)), tuple(motions))
+    return Settled(to_joints(robot, single), tuple(motions))
 
 
 def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:

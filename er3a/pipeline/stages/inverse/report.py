@@ -182,7 +182,7 @@ def _curve(robot: Robot, family: SelfMotion) -> str:
     low, high = family.range_deg
     parts = {
         "where": word("self_motion", FREE_AT, family.kind),
-        "joints": _joint_values(robot, family.q0_deg),
+        "joints": f"({_listed(family.q0_deg)}){NO_BREAK_SPACE}{_units(robot)}",
         "rates": ", ".join(moving),
     }
     if not family.within_limits:
@@ -198,15 +198,6 @@ def _curve(robot: Robot, family: SelfMotion) -> str:
         high=fixed(high, 1),
         **parts,
     )
-
-
-def _joint_values(robot: Robot, values: tuple[float, ...]) -> str:
-    """Joint values with their units: one for all where no joint slides."""
-    if not robot.slides.any():
-        return f"({_listed(values)}){NO_BREAK_SPACE}deg"
-    units = ("mm" if slides else "deg" for slides in robot.slides)
-    each = (f"{_listed([value])}{NO_BREAK_SPACE}{unit}" for value, unit in zip(values, units))
-    return f"({', '.join(each)})"
 
 
 def _move_rule(sequence: Visits | None) -> tuple[str, str]:
