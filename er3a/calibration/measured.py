@@ -35,7 +35,7 @@ class Measurement:
     ----------
     row : line of the file
     pose : joint angles, deg
-    point : flange (frame 6 of the table) or tool (the origin of the robot's tool frame)
+    point : flange or tool (the origin of the robot's tool frame)
     xyz_mm : base frame; None for coordinates that weren't measured
     deviation_mm : standard deviation of each coordinate
     """

@@ -41,7 +41,7 @@ def what_decides(tables: Tables, robot: Robot) -> NextMeasurement | None:
         return None
     tables = tables[:MOST_COMPARED]
     poses = _candidates(robot)
-    flanges = frames_of(tables, robot.base, np.radians(poses))[:, :, -1]
+    flanges = frames_of(tables, robot, np.radians(poses))[:, :, -1]
     points = flanges[..., :3, 3] * MM
     apart = np.linalg.norm(points[:, None] - points[None, :], axis=-1)
     pairs = np.triu_indices(len(tables), 1)

@@ -294,6 +294,7 @@ class RobotFile(StrictModel):
     speeds: Speeds | None = None
     coupling: Coupling | None = None
     base: SourcedPlacement | None = None
+    flange: SourcedPlacement | None = None
     tool: SourcedPlacement | None = None
     envelopes: Envelopes | None = None
     collision: CollisionPairs | None = None
@@ -406,11 +407,11 @@ class RobotFile(StrictModel):
         if look_like_radians(angles):
             small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
             suspect(f"dh.rows, zero.rows: {small} deg may be radians")
-        check_placement("base", self.base)
-        check_placement("tool", self.tool)
+        for key in ("base", "flange", "tool"):
+            check_placement(key, getattr(self, key))
         longest, least = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows), LEAST_LONGEST_MM
         if self.dh.calibrated:  # lengths that were derived may all be short
-            placed = [abs(value) for each in (self.base, self.tool) if each for value in each.xyz_mm]
+            placed = [abs(value) for each in (self.base, self.flange, self.tool) if each for value in each.xyz_mm]
             longest, least = max(longest, *placed, 0.0), SHORTEST_PLAIN_LENGTH_MM
         if 0 < longest < least and not any(row.type == "prismatic" for row in self.dh.rows):
             raise ValueError(

@@ -65,7 +65,7 @@ def robot_path(name_or_path: str | Path) -> Path:
 
 def robot_of(content: RobotFile) -> Robot:
     """The model behind a checked file: metres and radians."""
-    groups = ("dh", "zero", "limits", "speeds", "coupling", "base", "tool", "envelopes", *MASS_GROUPS)
+    groups = ("dh", "zero", "limits", "speeds", "coupling", "base", "flange", "tool", "envelopes", *MASS_GROUPS)
     present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
     rows, joints = content.dh.rows, len(content.limits.rows)
     sliding = [row.type == "prismatic" for row in rows]
@@ -91,6 +91,7 @@ def robot_of(content: RobotFile) -> Robot:
         continuous=np.array([row.continuous for row in content.limits.rows]),
         combined=tuple(_combined(row, joints) for row in content.limits.combined),
         base=placement_transform(content.base),
+        flange=placement_transform(content.flange),
         tool=placement_transform(content.tool),
         zero_pose=content.zero_pose,
         references=tuple(content.references),

@@ -86,7 +86,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
     for group, fields in mass_groups(robot).items():
         content[group] = sourced(group) | fields
-    for key in ("base", "tool"):
+    for key in ("base", "flange", "tool"):
         T = getattr(robot, key)
         if not np.array_equal(T, np.eye(4)):
             placement = {"xyz_mm": map(_tidy, T[:3, 3] * 1000), "rpy_deg": map(_tidy, np.degrees(rpy_of(T)))}

@@ -36,7 +36,7 @@ class AxisTable:
     Attributes
     ----------
     a, alpha, beta, d, direction, offset : (n,), m and rad
-    base : (4, 4), base frame to frame 0; tool : (4, 4), frame n to flange
+    base : (4, 4), base frame to frame 0; flange : (4, 4), frame n to flange
     """
 
     a: Reals
@@ -46,7 +46,7 @@ class AxisTable:
     direction: Reals
     offset: Reals
     base: Reals
-    tool: Reals
+    flange: Reals
 
 
 def table_from_axes(directions: Reals, points: Reals, T_base_flange: Reals) -> AxisTable:
@@ -87,7 +87,7 @@ def table_from_axes(directions: Reals, points: Reals, T_base_flange: Reals) -> A
         direction=np.sign(np.einsum("ij,ij->i", z, directions)),
         offset=np.arctan2(steps[:, 1, 0], steps[:, 0, 0]),
         base=frames[0],
-        tool=np.linalg.inv(frames[joints]) @ T_base_flange,
+        flange=np.linalg.inv(frames[joints]) @ T_base_flange,
     )
 
 

@@ -19,8 +19,8 @@ from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import Er3aError, InputError
 from er3a.formats.from_axes import table_from_axes
 from er3a.formats.text_file import read_text
-from er3a.formats.urdf_masses import LinkPlaces, masses_from_urdf, write_masses
-from er3a.formats.urdf_shapes import collision_shapes
+from er3a.formats.urdf_masses import LinkPlaces, masses_from_urdf, peak_torque, write_friction, write_masses
+from er3a.formats.urdf_shapes import collision_shapes, write_shapes
 from er3a.formats.urdf_tree import MOST_BYTES, UrdfChain, UrdfJoint, read_chain
 from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
@@ -65,7 +65,10 @@ def import_urdf(
 ) -> UrdfImport:
     """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over its shapes and masses.
 
-    The flange is the end of the fixed joints behind the last joint, or that joint's own link frame if they branch.
+    The flange is the tip: the link that ``tip`` names, else the end of the fixed joints behind the last joint, or that
+    joint's own link if they branch. Loads, cameras and tools are mounted there.
+    What a file gets wrong of limits, speeds, shapes and inertias is mended or left out with a note that names the joint
+    or link, and the value.
     Joints in the chain that follow others (mimic) become a coupling; grippers, and linkages that only follow, are left
     out with a note.
 
@@ -95,7 +98,7 @@ def import_urdf(
     plain = np.array_equal(coupling, np.eye(*coupling.shape))
     limits, notes = _limits(path, sources)
     source = Source(f"Derived from the joint axes of {path.name}", "export")
-    groups = ("dh", "zero", "limits", "speeds", "base", "tool", *(() if plain else ("coupling",)))
+    groups = ("dh", "zero", "limits", "speeds", "base", "flange", *(() if plain else ("coupling",)))
     named = sources[0].name, path.stem[:200]
     robot = Robot(
         name=robot_name(path),
@@ -115,19 +118,23 @@ def import_urdf(
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = ElementTree.fromstring(read_text(path, MOST_BYTES)), link_places(found, shift)
-    envelopes, hulls, told = link_shapes(path, root, robot, placed, split)
+    envelopes, hulls, shaped = link_shapes(path, root, robot, placed, split)
     names = tuple(joint.name for joint in sources)
-    masses, weighed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
+    masses, weighed, changed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     stated = {
         "envelopes": bool(envelopes or hulls),
         "inertia": bool(masses.links),
         "drives": masses.drives is not None,
     }
     more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
+    if changed:
+        which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
+        text = f"As {path.name} states it, but for the inertia of {which}, for which the nearest possible one was taken"
+        more["inertia"] = Source(text, "export")
     robot = robot.replace(envelopes=envelopes, hulls=hulls, masses=masses, sources={**robot.sources, **more})
     first, last = found.joints[0].parent, found.joints[-1].child
     beyond = _followers_beyond(moving, coupling, shift, limits)
-    return UrdfImport(robot, (*found.notes, *notes, *beyond, *told, *weighed), float(misfit), names, first, last)
+    return UrdfImport(robot, (*found.notes, *notes, *beyond, *shaped, *weighed), float(misfit), names, first, last)
 
 
 def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
@@ -178,7 +185,12 @@ def link_shapes(
             continue
         T, number = place
         for collision in shapes:
-            made = collision_shapes(path, collision, (np.linalg.inv(zero[number]) @ T, number), notes, split)
+            frame = np.linalg.inv(zero[number]) @ T
+            try:
+                made = collision_shapes(path, link.get("name", "?"), collision, (frame, number), notes, split)
+            except InputError as error:
+                notes.append(f"link {link.get('name')} has a shape that is left out ({error})")
+                continue
             envelopes += [shape for shape in made if isinstance(shape, Envelope)]
             hulls += [shape for shape in made if isinstance(shape, ConvexPiece)]
     return tuple(envelopes), tuple(hulls), tuple(notes)
@@ -268,23 +280,32 @@ def _followers_beyond(moving: Sequence[UrdfJoint], coupling: Reals, shift: Reals
     return notes
 
 
-def export_urdf(robot: Robot) -> str:
-    """The arm as URDF text, masses included; the link ``tool`` is the tool frame. Unknown speeds are written as 0.
+def export_urdf(robot: Robot, meshes: str | Path | None = None) -> str:
+    """The arm as URDF text: joints with limits, speeds, peak torques and friction, links with masses and shapes.
+
+    Behind the last joint's link stand those named ``flange`` and ``tool``, whose frames are the robot's. Unknown speeds
+    and peak torques are written as 0, as URDFs usually do. A URDF has no place for rotors, gear ratios, torques that a
+    drive gives on and on, limits of sums of joints and what the wrist may carry.
+
+    Parameters
+    ----------
+    meshes : folder for the convex pieces of the links, one OBJ file each, which the text names by the folder's name as
+        if it were beside the URDF; None leaves the pieces out
 
     Raises
     ------
     Er3aError
         for an arm with a row that is moved by a sum of joints, which URDF can't say
     """
-    links, rows = constant_links(robot), robot.rows
+    links, rows = constant_links(robot.without_tool()), robot.rows
     moved_by = _moved_by(robot)
     root = ElementTree.Element("robot", name=robot.name)
-    names = ["base", *(f"link_{k + 1}" for k in range(rows)), "tool"]
+    names = ["base", *(f"link_{k + 1}" for k in range(rows)), "flange", "tool"]
     for name in names:
         ElementTree.SubElement(root, "link", name=name)
-    for k in range(rows + 1):
-        T = links[k] @ rot_z(0.0 if k == rows or robot.sliding[k] else robot.offset[k])
-        joint = ElementTree.SubElement(root, "joint", name=f"joint_{k + 1}" if k < rows else "flange")
+    steps = [links[k] @ rot_z(0.0 if robot.sliding[k] else robot.offset[k]) for k in range(rows)]
+    for k, T in enumerate([*steps, links[rows], robot.tool]):
+        joint = ElementTree.SubElement(root, "joint", name=f"joint_{k + 1}" if k < rows else f"{names[k + 1]}_joint")
         ElementTree.SubElement(joint, "parent", link=names[k])
         ElementTree.SubElement(joint, "child", link=names[k + 1])
         ElementTree.SubElement(joint, "origin", xyz=_words(T[:3, 3]), rpy=_words(rpy_of(T)))
@@ -292,6 +313,7 @@ def export_urdf(robot: Robot) -> str:
         if k < rows:
             _describe(robot, k, moved_by, joint)
     write_masses(robot, names, root)
+    write_shapes(robot, names, root, None if meshes is None else Path(meshes))
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -320,10 +342,12 @@ def _describe(robot: Robot, k: int, moved_by: list[tuple[int, float]], joint: El
     ElementTree.SubElement(joint, "axis", xyz=f"0 0 {robot.direction[k]:g}")
     speed = 0.0 if math.isnan(robot.speed[j]) else robot.speed[j]
     limits = {} if endless else {"lower": robot.lower[j], "upper": robot.upper[j]}
-    limits |= {"velocity": speed, "effort": 0.0}
-    ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in limits.items()})
     driver = moved_by.index((j, 1.0))
-    if driver != k:
+    limits |= {"velocity": speed, "effort": peak_torque(robot, j) if driver == k else 0.0}
+    ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in limits.items()})
+    if driver == k:
+        write_friction(robot, j, joint)
+    else:
         ElementTree.SubElement(joint, "mimic", joint=f"joint_{driver + 1}", multiplier=repr(factor), offset="0.0")
 
 

@@ -305,16 +305,14 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
             missing = "lower" if math.isnan(lower) else "upper"
             notes.append(f"{where} has no {missing} limit: 0 was taken")
             lower, upper = np.nan_to_num([lower, upper]).tolist()
-            if lower > upper:
-                raise InputError(
-                    path, where, f"has no {missing} limit, and 0 does not fit the other", f"Add {missing}="
-                )
         if lower > upper:
-            raise InputError(path, where, f"lower limit {lower:g} above upper {upper:g}", "Swap them")
+            notes.append(f"{where} has its lower limit {lower:g} above the upper {upper:g}: they were swapped")
+            lower, upper = upper, lower
     if kind in MOVING and limit is not None and (limit.get("velocity") or "inf") != "inf":
         speed = _numbers(path, where, limit, "velocity", (0.0,))[0] or math.nan
         if speed < 0:
-            raise InputError(path, where, f"velocity {speed:g} is below 0", "Write the greatest speed, or 0 if unknown")
+            notes.append(f"{where} has the velocity {speed:g}, which is below 0: its speed counts as unknown")
+            speed = math.nan
     follows = None
     if mimic is not None:
         if not mimic.get("joint"):

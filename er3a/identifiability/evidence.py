@@ -305,7 +305,7 @@ class _Judge:
 
     def _given(self) -> list[EntryEvidence]:
         found = []
-        for name in ("base", "tool"):
+        for name in ("base", *(() if self.robot.flange_is_last_frame else ("flange",)), "tool"):
             source = self.robot.sources.get(name)
             document = (source.origin or source.source) if source else ""
             found.append(EntryEvidence(name, None, "", "given", None, (), (), document))

@@ -14,14 +14,18 @@ from er3a.kinematics.table_batch import Tables, fill_frames, kernel_columns
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import kernel
 from er3a.references.quantities import FRAME_OF_POINT, AxisDistance, Extreme, SectionExtent
+from er3a.robots.robot import Robot
 
 STEP = 1e-4
 STEPS = 40
 LONGEST_STEP = 0.5
 ENOUGH_M = 1e-9
 DISTANCE, SECTION_X, SECTION_Z = 0, 1, 2
+FLANGE = FRAME_OF_POINT["flange"]
 
 Columns = tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]
+Ends = tuple[Reals, Reals]
+"""The base (4, 4), and the flange (3,), m, in the last frame of the table."""
 What = tuple[int, int, int, float]
 """Measure, axis, frame and sign."""
 
@@ -39,11 +43,12 @@ def measure_code(quantity: Extreme) -> tuple[int, int, int] | None:
 Climber = Callable[[Reals], tuple[Reals, float]]
 
 
-def climber(table: Tables, base: Reals, code: tuple[int, int, int], sign: float, joints: Integers) -> Climber:
+def climber(table: Tables, robot: Robot, code: tuple[int, int, int], sign: float, joints: Integers) -> Climber:
     """What climbs to where a measure of a table (a batch of one) is extreme.
 
     Parameters
     ----------
+    robot : whose base and flange the table has
     sign : 1 for the greatest, -1 for the least value
     joints : (d,), those that are turned
 
@@ -52,52 +57,54 @@ def climber(table: Tables, base: Reals, code: tuple[int, int, int], sign: float,
     climber : takes joint vectors (P, n) and climbs from the first and, if another is higher than where that leads, from
         the best of them; gives the joint vector (n,) where that ends, and ``sign`` times the measure there in m
     """
-    columns, base = kernel_columns(table), for_kernel(base)
+    columns, ends = kernel_columns(table), (for_kernel(robot.base), for_kernel(robot.flange[:3, 3]))
     bounds = np.minimum(table.lower[0], table.upper[0]), np.maximum(table.lower[0], table.upper[0])
 
     def climb(starts: Reals) -> tuple[Reals, float]:
         q = np.ascontiguousarray(starts)
-        value = _climb(base, columns, bounds, q, joints, (*code, sign))
+        value = _climb(ends, columns, bounds, q, joints, (*code, sign))
         return q[0], float(value)
 
     return climb
 
 
 @kernel
-def _measure(base: Reals, columns: Columns, q: Reals, what: What, out: tuple[Reals, Reals]) -> None:
+def _measure(ends: Ends, columns: Columns, q: Reals, what: What, out: tuple[Reals, Reals]) -> None:
     """Fill frames and ``sign`` times the measure (P,) at joint vectors (P, n)."""
     frames, values = out
+    base, flange = ends
     a, alpha, beta, d, direction, offset, sliding = columns
     fill_frames(base, a, alpha, beta, d, direction, offset, sliding, q, frames)
     kind, axis, frame, sign = what
     for p in range(q.shape[0]):
         T = frames[0, p]
+        x, y, z = T[frame, 0, 3], T[frame, 1, 3], T[frame, 2, 3]
+        if frame == FLANGE:
+            x += T[frame, 0, 0] * flange[0] + T[frame, 0, 1] * flange[1] + T[frame, 0, 2] * flange[2]
+            y += T[frame, 1, 0] * flange[0] + T[frame, 1, 1] * flange[1] + T[frame, 1, 2] * flange[2]
+            z += T[frame, 2, 0] * flange[0] + T[frame, 2, 1] * flange[1] + T[frame, 2, 2] * flange[2]
         if kind == SECTION_X:
-            values[p] = sign * (T[frame, 0, 3] - T[0, 0, 3])
+            values[p] = sign * (x - T[0, 0, 3])
         elif kind == SECTION_Z:
-            values[p] = sign * (T[frame, 2, 3] - T[1, 2, 3])
+            values[p] = sign * (z - T[1, 2, 3])
         else:
-            x, y, z = (
-                T[frame, 0, 3] - T[axis, 0, 3],
-                T[frame, 1, 3] - T[axis, 1, 3],
-                T[frame, 2, 3] - T[axis, 2, 3],
-            )
+            x, y, z = x - T[axis, 0, 3], y - T[axis, 1, 3], z - T[axis, 2, 3]
             u, v, w = T[axis, 0, 2], T[axis, 1, 2], T[axis, 2, 2]
             values[p] = sign * np.sqrt((v * z - w * y) ** 2 + (w * x - u * z) ** 2 + (u * y - v * x) ** 2)
 
 
 @kernel
 def _climb(
-    base: Reals, columns: Columns, bounds: tuple[Reals, Reals], starts: Reals, joints: Integers, what: What
+    ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], starts: Reals, joints: Integers, what: What
 ) -> float:
     count = starts.shape[0]
     frames, values = np.empty((1, count, starts.shape[1] + 1, 4, 4)), np.empty(count)
-    best = _from(base, columns, bounds, starts[0], joints, what)
+    best = _from(ends, columns, bounds, starts[0], joints, what)
     if count > 1:
-        _measure(base, columns, starts, what, (frames, values))
+        _measure(ends, columns, starts, what, (frames, values))
         other = 1 + np.argmax(values[1:])
         if values[other] > best + ENOUGH_M:
-            second = _from(base, columns, bounds, starts[other], joints, what)
+            second = _from(ends, columns, bounds, starts[other], joints, what)
             if second > best:
                 starts[0] = starts[other]
                 best = second
@@ -105,7 +112,7 @@ def _climb(
 
 
 @kernel
-def _from(base: Reals, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, joints: Integers, what: What) -> float:
+def _from(ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, joints: Integers, what: What) -> float:
     """Climb from q (n,), which is changed to where that leads; the value there."""
     lower, upper = bounds
     n, k = q.shape[0], joints.shape[0]
@@ -117,7 +124,7 @@ def _from(base: Reals, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, 
     damping, here = 0.0, -np.inf
     for _ in range(STEPS):
         _fill_stencil(q, joints, stencil)
-        _measure(base, columns, stencil, what, (frames, values))
+        _measure(ends, columns, stencil, what, (frames, values))
         here = values[0]
         _slope_and_curvature(values, slope, curvature)
         free = np.ones(k, np.bool_)
@@ -135,7 +142,7 @@ def _from(base: Reals, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, 
                 for i in range(k):
                     j = joints[i]
                     trial[0, j] = min(max(q[j] + share * step[i], lower[j]), upper[j])
-                _measure(base, columns, trial, what, (trial_frames, trial_value))
+                _measure(ends, columns, trial, what, (trial_frames, trial_value))
                 gained = trial_value[0] - here
                 if gained > 0:
                     break

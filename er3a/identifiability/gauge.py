@@ -44,7 +44,7 @@ def gauge_of(robot: Robot, entries: Sequence[TableNumber]) -> Gauge:
     scale = np.array([entry.scale for entry in entries])
     q = quasi_random_points(np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper), POSES)
     steps = STEP * np.concatenate([np.eye(k), -np.eye(k)])
-    T = frames_of(shifted(tables_of(robot), entries, steps * scale), robot.base, q)[:, :, -1] @ robot.tool
+    T = frames_of(shifted(tables_of(robot), entries, steps * scale), robot, q)[:, :, -1] @ robot.tool
     rows = T[:, :, :3].reshape(2 * k, -1)
     J = ((rows[:k] - rows[k:]) / (2 * STEP)).T
     values, basis = np.linalg.svd(J, full_matrices=True)[1:]

@@ -113,7 +113,7 @@ class FollowedExtreme:
     """An extreme over the joint limits, and where it was attained last."""
 
     def __init__(self, quantity: Extreme, robot: Robot):
-        self.quantity, self.base = quantity, robot.base
+        self.quantity, self.robot = quantity, robot
         self.count = len(robot.a)
         moving = FRAME_OF_POINT[quantity.point] % (self.count + 1)
         self.joints = list(range(1, min(moving, self.count)))  # none of the measures changes with joint 1
@@ -129,7 +129,7 @@ class FollowedExtreme:
         """The extreme in mm of a table (a batch of one)."""
         if self.code is not None:
             spread = self._spread_of(table)
-            climb_from = climber(table, self.base, self.code, self.sign, np.array(self.joints))
+            climb_from = climber(table, self.robot, self.code, self.sign, np.array(self.joints))
             if not self.known:
                 self.q = self._scanned(table, spread, climb_from)
             q = np.clip(self.q, spread.lower, spread.upper)
@@ -186,7 +186,7 @@ class FollowedExtreme:
         return measured
 
     def _measure(self, tables: Tables, q: Reals) -> Reals:
-        measured: Reals = self.quantity.measure(frames_of(tables, self.base, q))
+        measured: Reals = self.quantity.measure(frames_of(tables, self.robot, q))
         return measured
 
     def _whole(self, q: Reals) -> Reals:

@@ -77,7 +77,7 @@ class ToolRange:
         )
 
     def _tool(self, tables: Tables, q: Reals) -> Reals:
-        T: Reals = frames_of(tables, self.robot.base, q)[:, :, -1] @ self.robot.tool
+        T: Reals = frames_of(tables, self.robot, q)[:, :, -1] @ self.robot.tool
         return T
 
 

@@ -54,7 +54,7 @@ def constant_links(robot: Robot, frame: int | None = None) -> Reals:
         if robot.convention == "standard":
             links[count] = links[count] @ parts[count, TO_NEXT_AXIS]
     if frame is None:
-        links[count] = links[count] @ robot.tool
+        links[count] = links[count] @ robot.last_to_tool
     links.setflags(write=False)
     return links
 

@@ -83,7 +83,7 @@ def _least_turn(robot: Robot, T: Reals) -> float | None:
 
 def _nearest_position(robot: Robot, T: Reals) -> Reals | None:
     """Position (3,) nearest to that of T which has a solution with its orientation, on a grid refined step by step."""
-    half = np.abs(robot.a).sum() + np.abs(robot.d).sum() + np.linalg.norm(robot.tool[:3, 3])
+    half = np.abs(robot.a).sum() + np.abs(robot.d).sum() + np.linalg.norm(robot.last_to_tool[:3, 3])
     centre, count = robot.base[:3, 3], COARSE_GRID
     for _ in range(1 + REFINEMENTS):
         ticks = np.linspace(-half, half, count)

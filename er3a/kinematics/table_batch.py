@@ -15,7 +15,7 @@ from er3a.robots.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """A batch of H tables of arms with the same base.
+    """A batch of H tables of arms with the same base and flange.
 
     Attributes
     ----------
@@ -67,11 +67,14 @@ def join(batches: Sequence[Tables]) -> Tables:
     return Tables(*(np.concatenate([getattr(batch, field.name) for batch in batches]) for field in fields(Tables)))
 
 
-def frames_of(tables: Tables, base: Reals, q: Reals) -> Reals:
+def frames_of(tables: Tables, robot: Robot, q: Reals) -> Reals:
     """Frames (H, P, m + 1, 4, 4) of each table at row values (P, m) in rad or m, as
-    :func:`er3a.kinematics.forward.frames` has them for one robot without tool; the last is the flange."""
+    :func:`er3a.kinematics.forward.frames` has them for one robot without tool; the last is the flange. Base and flange
+    are those of ``robot``."""
     out = np.empty((len(tables), len(q), tables.d.shape[1] + 1, 4, 4))
-    fill_frames(for_kernel(base), *kernel_columns(tables), np.require(q, requirements=["C", "W"]), out)
+    fill_frames(for_kernel(robot.base), *kernel_columns(tables), np.require(q, requirements=["C", "W"]), out)
+    if not robot.flange_is_last_frame:
+        out[:, :, -1] = out[:, :, -1] @ robot.flange
     return out
 
 

@@ -105,7 +105,7 @@ class TablesState:
     def of(self, tables: Tables) -> ModelState:
         """The state of many tables."""
         return ModelState(
-            frames=frames_of(tables, self.robot.base, self._rows),
+            frames=frames_of(tables, self.robot, self._rows),
             index=self.index,
             direction=tables.direction,
             lower=tables.lower,

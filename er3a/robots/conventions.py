@@ -2,7 +2,7 @@
 
 The two conventions cut the same product of elementary transforms at other places, so the rows shift by one and nothing
 is approximated: a standard row's ``Tx(a) Rx(alpha)`` is the next modified row's ``Rx(alpha) Tx(a)`` (they commute).
-What has no row left goes to the ends: behind the last joint to the tool, before joint 1 to the base.
+What has no row left goes to the ends: behind the last joint to the flange, before joint 1 to the base.
 
 Reference: J. J. Craig, *Introduction to Robotics*, 3rd ed., section 3.4 and its notes on the two conventions.
 """
@@ -17,18 +17,18 @@ from er3a.robots.robot import Robot
 
 
 def to_modified(robot: Robot) -> Robot:
-    """The arm with a modified (Craig) table; itself if it has one. Tool poses are the same for all joint angles."""
+    """The arm with a modified (Craig) table; itself if it has one. Flange and tool are the same at all angles."""
     if robot.convention == "modified":
         return robot
     return robot.replace(
         convention="modified",
         **{column: np.roll(getattr(robot, column), 1) * _not_first(robot) for column in _SHIFTED},
-        tool=translation(robot.a[-1], 0, 0) @ rot_x(robot.alpha[-1]) @ rot_y(robot.beta[-1]) @ robot.tool,
+        flange=translation(robot.a[-1], 0, 0) @ rot_x(robot.alpha[-1]) @ rot_y(robot.beta[-1]) @ robot.flange,
     )
 
 
 def to_standard(robot: Robot) -> Robot:
-    """The arm with a standard table; itself if it has one. Tool poses are the same for all joint angles."""
+    """The arm with a standard table; itself if it has one. Flange and tool are the same at all angles."""
     if robot.convention == "standard":
         return robot
     return robot.replace(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -156,6 +156,22 @@ def no_body(body: MassBody) -> NoBody | None:
     if moments[0] < -TRIANGLE_TOLERANCE * moments[2] or moments[2] < 0:
         return "negative_moment"
     return "triangle" if moments[2] > (moments[0] + moments[1]) * (1 + TRIANGLE_TOLERANCE) else None
+
+
+def nearest_body(body: MassBody) -> MassBody:
+    """The body with the same mass and centre whose inertia is the nearest that a rigid body can have.
+
+    The second moments of its mass, ``trace(I) / 2 - I``, lose their negative principal values, which is the nearest
+    positive semidefinite matrix by Frobenius' norm [1]_; principal axes stay.
+
+    References
+    ----------
+    .. [1] P. M. Wensing, S. Kim, J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial
+       parameter identification", IEEE Robotics and Automation Letters 3 (2018), section III.
+    """
+    moments, axes = np.linalg.eigh(body.inertia_matrix)
+    second = np.maximum(moments.sum() / 2 - moments, 0.0)
+    return replace(body, inertia=six_moments((axes * (second.sum() - second)) @ axes.T))
 
 
 def moved(body: MassBody, T: Reals) -> MassBody:

@@ -112,14 +112,16 @@ class Robot(Displayed):
     continuous : (n,) bool, joints that turn without end
     combined : limits of sums of joints, beside those of each
     base : (4, 4), T_world_base; tool : (4, 4), T_flange_tool
+    flange : (4, 4), from the table's last frame to the flange: what tools, loads and cameras are mounted on, and what
+        references and joint values without a tool speak of. The identity for tables that end at it
     zero_pose : what the arm looks like at q = 0, in words
     references : names of the reference sets (folders of data/manual_refs) that it is checked against
     envelopes, hulls : capsules around the links, and convex pieces of them; both empty where the file gives none
     pair_rules : which pairs of links a person decided on
     masses : of links and what drives and wrist can do, as far as known
     derived : what :func:`er3a.robots.derived.derived` keeps of this robot
-    sources : per group of values ("dh", "zero", "limits", "speeds", "base", "tool", "envelopes", "inertia",
-        "drives", "wrist_load", "weight") its source and grade
+    sources : per group of values ("dh", "zero", "limits", "speeds", "base", "flange", "tool", "envelopes",
+        "inertia", "drives", "wrist_load", "weight") its source and grade
     origins : documents of single entries ("d4", "direction2", "lower6") that have another one than their group
 
     Raises
@@ -144,6 +146,7 @@ class Robot(Displayed):
     beta: Reals = field(default_factory=lambda: np.empty(0))
     base: Reals = field(default_factory=lambda: np.eye(4))
     tool: Reals = field(default_factory=lambda: np.eye(4))
+    flange: Reals = field(default_factory=lambda: np.eye(4))
     zero_pose: str = ""
     references: tuple[str, ...] = ()
     envelopes: tuple[Envelope, ...] = ()
@@ -161,10 +164,10 @@ class Robot(Displayed):
     def __post_init__(self) -> None:
         rows, joints = np.size(self.direction), np.size(self.speed) or np.size(self.lower)
         unset = {"speed": np.full(joints, np.nan), "beta": np.zeros(rows)}
-        for key in (*_OF_ROWS, *_OF_JOINTS, "base", "tool"):
+        for key in (*_OF_ROWS, *_OF_JOINTS, *_PLACED):
             given = getattr(self, key)
             array = np.array(unset[key] if key in unset and np.size(given) == 0 else as_floats(given, key))
-            self._keep(key, array, (4, 4) if key in ("base", "tool") else ((rows if key in _OF_ROWS else joints),))
+            self._keep(key, array, (4, 4) if key in _PLACED else ((rows if key in _OF_ROWS else joints),))
         for key, count in (("sliding", rows), ("continuous", joints)):
             given = getattr(self, key)
             self._keep(key, np.array(given, dtype=bool) if np.size(given) else np.zeros(count, dtype=bool), (count,))
@@ -214,8 +217,18 @@ class Robot(Displayed):
         return np.where(own, self.sliding[: self.joints], moved)
 
     def without_tool(self) -> Robot:
-        """The robot with its flange as tool: references speak of the flange, which is the last frame of the table."""
+        """The robot with its flange as tool, which is what references speak of."""
         return self.replace(tool=np.eye(4))
+
+    @property
+    def flange_is_last_frame(self) -> bool:
+        """Whether the table ends at the flange."""
+        return np.array_equal(self.flange, np.eye(4))
+
+    @property
+    def last_to_tool(self) -> Reals:
+        """(4, 4), from the table's last frame by way of the flange to the tool."""
+        return self.tool if self.flange_is_last_frame else self.flange @ self.tool
 
     def replace(self, **changes: Any) -> Robot:
         """A copy with other values for some attributes."""
@@ -238,7 +251,7 @@ class Robot(Displayed):
         if self.rows == self.joints:
             limits = {"lower": self.lower, "upper": self.upper, "speed": self.speed}
             columns |= {f"{key}_{unit}{'_s' * (key == 'speed')}": scale * value for key, value in limits.items()}
-        placed = [("base", self.base), ("tool", self.tool)]
+        placed = [(name, getattr(self, name)) for name in _PLACED]
         return Sheet(
             f"Robot {self.name}: {shortly(self.title)} ({self.convention} D-H)",
             tuple(columns),
@@ -252,6 +265,7 @@ class Robot(Displayed):
 
 _OF_ROWS = "a", "alpha", "d", "beta", "direction", "offset"
 _OF_JOINTS = "lower", "upper", "speed"
+_PLACED = "base", "flange", "tool"
 
 
 def _placement(T: Reals) -> str:

@@ -65,7 +65,7 @@ def no_arm(robot: Robot) -> str:
         return "the coupling holds NaN or infinity"
     if robot.coupling is not None and np.linalg.matrix_rank(robot.coupling) < robot.joints:
         return "the coupling leaves joints that move nothing by themselves; each joint must move the arm in its own way"
-    for name in ("base", "tool"):
+    for name in ("base", "flange", "tool"):
         try:
             check_poses(getattr(robot, name), name)
         except PoseError as error:

@@ -52,7 +52,7 @@ def joint_weights(robot: Robot) -> Reals:
     the tool by as much as itself.
     """
     lengths = np.abs(robot.a) + np.abs(robot.d)
-    outward = np.array([lengths[k:].sum() for k in range(robot.joints)]) + np.linalg.norm(robot.tool[:3, 3])
+    outward = np.array([lengths[k:].sum() for k in range(robot.joints)]) + np.linalg.norm(robot.last_to_tool[:3, 3])
     if robot.sliding.any():
         outward = np.where(robot.slides, 1.0, outward)
     weights: Reals = np.maximum(outward / outward.max(), 0.1)

@@ -98,7 +98,7 @@ class _Problem:
 
     def flange(self, tables: Tables) -> Reals:
         """T_base_flange (H, N, 4, 4) by each table."""
-        found: Reals = frames_of(tables, self.robot.base, self.rows)[:, :, -1]
+        found: Reals = frames_of(tables, self.robot, self.rows)[:, :, -1]
         return found
 
     def hand(self, flange: Reals) -> Reals:

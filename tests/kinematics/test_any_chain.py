@@ -62,7 +62,7 @@ def test_any_chain_agrees_with_pinocchio(data, robot):
 @given(data=st.data(), robot=chains(coupled=False))
 def test_many_tables_have_the_frames_of_one(data, robot):
     q = np.stack([data.draw(joints_within(robot)) for _ in range(2)])
-    T = frames_of(tables_of(robot), robot.base, q)
+    T = frames_of(tables_of(robot), robot, q)
     np.testing.assert_allclose(T[0], frames(robot.without_tool(), q), rtol=0, atol=1e-12)
 
 

@@ -202,7 +202,7 @@ def test_a_batch_of_tables_has_the_frames_of_each(random):
         for convention in ("standard", "modified")
     ]
     q = random.uniform(-3, 3, (20, 6))
-    found = frames_of(join([tables_of(arm) for arm in arms]), arms[0].base, q)
+    found = frames_of(join([tables_of(arm) for arm in arms]), arms[0], q)
     for row, arm in zip(found, arms):
         np.testing.assert_allclose(row, frames(arm, q), atol=1e-14)
     np.testing.assert_allclose(forward(to_modified(arms[0]), q), forward(arms[0], q), atol=1e-14)

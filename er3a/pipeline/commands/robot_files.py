@@ -54,7 +54,7 @@ def export_urdf(
     from er3a.files.robot_library import load_robot
     from er3a.formats.urdf import export_urdf as urdf_text
 
-    text = urdf_text(load_robot(robot))
+    text = urdf_text(load_robot(robot), output.with_name(f"{output.stem}_meshes"))
     write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))
     print(f"{output}: written")
 

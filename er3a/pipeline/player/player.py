@@ -35,7 +35,7 @@ COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
     *("a", "alpha", "d", "beta", "direction", "offset", "sliding"),
-    *("lower", "upper", "continuous", "base", "tool"),
+    *("lower", "upper", "continuous", "base"),
 )
 DRAWING = ("algebra", "kinematics", "orbit", "scene", "solids")
 LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
@@ -171,6 +171,7 @@ def table_data(robot: Robot) -> dict[str, Any]:
     return {
         "convention": robot.convention,
         **{key: getattr(robot, key).tolist() for key in TABLE},
+        "tool": robot.last_to_tool.tolist(),
         "slides": robot.slides.tolist(),
         "coupling": None if robot.coupling is None else robot.coupling.tolist(),
         "combined": [asdict(limit) for limit in robot.combined],
@@ -180,7 +181,7 @@ def table_data(robot: Robot) -> dict[str, Any]:
 def drawn_size(robot: Robot) -> float:
     """A length (m) to scale drawings with: of all links, of the tool, and of how far joints slide."""
     ways = np.ptp(theta_limits(robot), axis=1)[robot.sliding].sum()
-    return size_of(robot) + float(np.linalg.norm(robot.tool[:3, 3]) + ways) or 1.0
+    return size_of(robot) + float(np.linalg.norm(robot.last_to_tool[:3, 3]) + ways) or 1.0
 
 
 def drawn_pieces(robot: Robot) -> list[dict[str, Any]]:

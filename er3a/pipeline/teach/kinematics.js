@@ -3,7 +3,8 @@
  *
  * The table is the JSON form of er3a's Robot: `convention` ("standard" or "modified"), per row `a`, `d` (m), `alpha`,
  * `beta`, `offset` (rad), `direction` (+1 or -1) and `sliding`, per joint `lower`, `upper` (rad, m) and `slides`, the
- * `coupling` (rows by joints; null where each joint moves its own row), `base` and `tool` (4x4). Joint values `q` are the
+ * `coupling` (rows by joints; null where each joint moves its own row), `base`, and `tool` from the last frame of the table
+ * (4x4 each; what stands between that frame and the flange is part of it). Joint values `q` are the
  * manufacturer's (rad; m of joints that slide). Row k moves by `x = direction * u`, `u = coupling q`: it turns by
  * `x + offset` about z, or shifts by x along z. Both conventions are the product
  * `links[0] J(x_1) links[1] ... J(x_m) links[m]` with constant links, the base in the first and the tool in the last.
