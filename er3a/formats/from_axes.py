@@ -25,6 +25,8 @@ from er3a.numerics.arrays import Reals
 PARALLEL = 1e-12
 NEARLY_PARALLEL = 1e-3  # rad
 SAME_POINT_M = 1e-12
+TIE = 1e-9
+"""Directions that differ by less are equally near: rounding must not choose between two tables."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +136,8 @@ def _senses(directions: Reals, incoming: Reals, outgoing: Reals) -> Reals:
         elif abs(along) > SAME_POINT_M:
             flip = along < 0
         else:
-            flip = z[i][np.argmax(np.abs(z[i]))] < 0
+            size = np.abs(z[i])
+            flip = z[i][np.argmax(size > size.max() - TIE)] < 0
         z[i] = -z[i] if flip else z[i]
     return z
 
@@ -148,7 +151,7 @@ def _next_x(x: Reals, z_before: Reals, z: Reals, start: Reals, end: Reals) -> Re
     normal: Reals = across / np.linalg.norm(across)
     gap = normal @ (end - start)
     turned = normal @ x
-    sense = gap if abs(gap) > SAME_POINT_M else turned
+    sense = gap if abs(gap) > SAME_POINT_M else turned if abs(turned) > TIE else 0.0
     return -normal if sense < 0 else normal
 
 

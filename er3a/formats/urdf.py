@@ -193,6 +193,7 @@ def link_shapes(
                 continue
             envelopes += [shape for shape in made if isinstance(shape, Envelope)]
             hulls += [shape for shape in made if isinstance(shape, ConvexPiece)]
+    envelopes, hulls = (sorted(shapes, key=lambda shape: shape.link) for shapes in (envelopes, hulls))
     return tuple(envelopes), tuple(hulls), tuple(notes)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, moved, nearest_body, no_body, together
+from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, NoBody, moved, nearest_body, no_body, together
 from er3a.robots.robot import Robot
 
 
@@ -68,7 +68,7 @@ def masses_from_urdf(
             continue
         if problem:
             given, body = body, nearest_body(body)
-            notes.append(_changed(name, given, body))
+            notes.append(_changed(name, problem, given, body))
             changed.append(name)
         if body.mass > 0 or any(body.inertia):
             placed, number = place
@@ -128,11 +128,11 @@ def _unusable(inertial: ElementTree.Element) -> str:
     return f"a mass of {_number(inertial.find('mass'), 'value'):g} kg, which is below 0"
 
 
-def _changed(name: str, given: MassBody, taken: MassBody) -> str:
+def _changed(name: str, problem: NoBody, given: MassBody, taken: MassBody) -> str:
     """That a link has another inertia than the file says."""
     least, middle, greatest = np.linalg.eigvalsh(given.inertia_matrix).tolist()
     what = f"of {greatest:g} kg m2, above the sum of the other two ({least + middle:g} kg m2)"
-    what = f"of {least:g} kg m2, below 0" if least < 0 else what
+    what = f"of {least:g} kg m2, below 0" if problem == "negative_moment" else what
     shown = ", ".join(f"{value:g}" for value in np.linalg.eigvalsh(taken.inertia_matrix))
     instead = f"the nearest that a body can have was taken, with principal moments of {shown} kg m2"
     return f"link {name} has a principal moment of inertia {what}; its mass and centre stay, and {instead}"
