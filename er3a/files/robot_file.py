@@ -107,6 +107,8 @@ class JointLimitRow(OfOneJoint):
 
 
 class JointSpeedRow(OfOneJoint):
+    """Neither number: the speed is unknown."""
+
     speed_deg_s: Annotated[float, Field(gt=0, le=FASTEST_DEG_S)] | None = None
     speed_mm_s: Annotated[float, Field(gt=0, le=FASTEST_MM_S)] | None = None
 
@@ -327,7 +329,7 @@ class RobotFile(StrictModel):
         for i, (limit, sliding) in enumerate(zip(self.limits.rows, slides)):
             _check_limit(f"limits.rows[{i}]", limit, sliding)
         for i, (speed, sliding) in enumerate(zip(self.speeds.rows if self.speeds else [], slides)):
-            if (speed.speed_mm_s is not None) != sliding or (speed.speed_deg_s is not None) == sliding:
+            if (speed.speed_deg_s if sliding else speed.speed_mm_s) is not None:
                 key = "speed_mm_s" if sliding else "speed_deg_s"
                 raise ValueError(f"speeds.rows[{i}]: joint {speed.joint} is {_kind(sliding)} | Write {key} alone")
         for i, combined in enumerate(self.limits.combined):

@@ -13,6 +13,7 @@ from er3a.files.robot_file import (
     CombinedLimitRow,
     Envelopes,
     JointLimitRow,
+    JointSpeedRow,
     LinkPieces,
     Placement,
     RobotFile,
@@ -85,7 +86,7 @@ def robot_of(content: RobotFile) -> Robot:
         offset=np.radians([offset or 0.0 for offset in offsets]),
         lower=limits[:, 0],
         upper=limits[:, 1],
-        speed=np.array([_si(row.speed_deg_s, row.speed_mm_s) for row in content.speeds.rows] if content.speeds else []),
+        speed=np.array([_speed(row) for row in content.speeds.rows] if content.speeds else []),
         sliding=np.array(sliding),
         coupling=coupling_matrix(content.coupling, len(rows), joints) if content.coupling else None,
         continuous=np.array([row.continuous for row in content.limits.rows]),
@@ -108,6 +109,12 @@ def robot_of(content: RobotFile) -> Robot:
 def _si(degrees: float | None, millimetres: float | None) -> float:
     """The one that is given, in rad or m."""
     return float(np.radians(degrees)) if degrees is not None else (millimetres or 0.0) / 1000
+
+
+def _speed(row: JointSpeedRow) -> float:
+    """rad/s or m/s; NaN where it is unknown."""
+    unknown = row.speed_deg_s is None and row.speed_mm_s is None
+    return np.nan if unknown else _si(row.speed_deg_s, row.speed_mm_s)
 
 
 def _limits(row: JointLimitRow | CombinedLimitRow) -> tuple[float, float]:

@@ -71,10 +71,14 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         "limits": sourced("limits")
         | {"rows": _limit_rows(robot), "combined": [_combined_row(robot, limit) for limit in robot.combined]},
     }
-    if np.isfinite(robot.speed).all():
+    if np.isfinite(robot.speed).any():
         keys = np.where(robot.slides, "speed_mm_s", "speed_deg_s").tolist()
         speeds = [
-            {"joint": k + 1, keys[k]: _tidy(value), **_origins(robot, "speeds", k + 1)}
+            {
+                "joint": k + 1,
+                **({keys[k]: _tidy(value)} if np.isfinite(value) else {}),
+                **_origins(robot, "speeds", k + 1),
+            }
             for k, value in enumerate(_shown(robot, robot.speed))
         ]
         content["speeds"] = sourced("speeds") | {"rows": speeds}

@@ -18,10 +18,9 @@ import scipy
 from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import Er3aError, InputError
 from er3a.formats.from_axes import table_from_axes
-from er3a.formats.text_file import read_text
 from er3a.formats.urdf_masses import LinkPlaces, masses_from_urdf, peak_torque, write_friction, write_masses
 from er3a.formats.urdf_shapes import collision_shapes, write_shapes
-from er3a.formats.urdf_tree import MOST_BYTES, UrdfChain, UrdfJoint, read_chain
+from er3a.formats.urdf_tree import UrdfChain, UrdfJoint, read_chain, urdf_root
 from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
@@ -117,7 +116,7 @@ def import_urdf(
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
-    root, placed = ElementTree.fromstring(read_text(path, MOST_BYTES)), link_places(found, shift)
+    root, placed = urdf_root(path), link_places(found, shift)
     envelopes, hulls, shaped = link_shapes(path, root, robot, placed, split)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)

@@ -27,6 +27,9 @@ ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rat
 FINGER_JOINTS = 4
 GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
 SHOWN = 12
+EXPAND = "Expand it first: xacro FILE > arm.urdf"
+DEFINITIONS = ("property", "arg")  # of xacro
+PREFIXED = re.compile(r"(</?[\w.-]+):([\w.-]+)")
 WHOLE_TURN = 2 * math.pi + SNAP_RAD
 FAR_APART_M, MOST_APART_M = 5.0, 100.0
 
@@ -171,7 +174,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         if the file is no URDF, or names several arms (the candidates are named)
     """
     notes: list[str] = []
-    tree = Tree(path, [_joint(path, element, snap) for element in _joint_elements(path)])
+    tree = Tree(path, [_joint(path, element, snap) for element in urdf_root(path).findall("joint")])
     for named, link in (("--base", base), ("--tip", tip)):
         if link is not None and link not in tree.links:
             raise InputError(path, named, f"there is no link '{link}'", f"Links: {_some(sorted(tree.links))}")
@@ -201,7 +204,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
 
 def chain_ends(path: Path) -> list[str]:
     """The links at which an arm may end, those that ``tip`` can name."""
-    tree = Tree(path, [_joint(path, element, False) for element in _joint_elements(path)])
+    tree = Tree(path, [_joint(path, element, False) for element in urdf_root(path).findall("joint")])
     return [end for root in sorted(set(tree.by_parent) - set(tree.by_child)) for end in tree.ends(root)]
 
 
@@ -249,27 +252,52 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:SHOWN]) + more
 
 
-def _joint_elements(path: Path) -> list[ElementTree.Element]:
+def urdf_root(path: Path) -> ElementTree.Element:
+    """The ``<robot>`` of a URDF that holds joints.
+
+    Prefixes that the file does not declare are read as parts of the names, as by parsers that know no namespaces.
+
+    Raises
+    ------
+    InputError
+        for a file that is no URDF, such as xacro that is not expanded
+    """
     text = read_text(path, MOST_BYTES, "Leave out of it what is no link or joint of the arm")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(path, None, "holds a document type or entities", "Remove them; a URDF needs none")
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise InputError(path, None, f"not valid XML ({error})", "Correct the file") from None
+        try:
+            root = ElementTree.fromstring(PREFIXED.sub(r"\1_\2", text))
+        except ElementTree.ParseError:
+            raise InputError(path, None, f"not valid XML ({error})", "Correct the file") from None
     if root.tag != "robot":
         raise InputError(path, None, f"the top element is <{root.tag}>", "A URDF has <robot> (expand xacro first)")
-    if any("xacro" in element.tag for element in root.iter()):
-        raise InputError(path, None, "holds xacro macros", "Expand it first: xacro FILE > arm.urdf")
-    elements = root.findall("joint")
-    for element in elements:
-        for name, value in ((name, value) for each in element.iter() for name, value in each.items()):
-            if "${" in value or "$(" in value:
-                where, problem = f"joint {element.get('name', '?')}, {name}", f"'{value[:60]}' is a xacro expression"
-                raise InputError(path, where, problem, "Expand it first: xacro FILE > arm.urdf")
-    if not elements:
+    if (where := _xacro(root)) is not None:
+        raise InputError(path, where or None, "is xacro, which has to be expanded to a URDF", EXPAND)
+    if root.find("joint") is None:
         raise InputError(path, "robot", "holds no joints", "Give a URDF of a serial arm")
-    return elements
+    return root
+
+
+def _xacro(root: ElementTree.Element) -> str | None:
+    """Where a file is xacro: macros, or expressions in what is read of joints and links; None where it is not.
+
+    Definitions alone are left over in many URDFs and change nothing.
+    """
+    for element in root.iter():
+        name = element.tag.rpartition("}")[2].removeprefix("xacro_")
+        prefixed = "xacro" in element.tag
+        if (prefixed and name not in DEFINITIONS) or (name in ("include", "macro") and element in list(root)):
+            return f"xacro:{name}"
+    for part in [*root.findall("joint"), *root.findall("link/inertial/.."), *root.findall("link/collision/..")]:
+        named = f"{part.tag} {part.get('name', '?')}"
+        read = [part, *(each for child in part if child.tag != "visual" for each in child.iter())]
+        for value in (value for each in read for value in each.attrib.values()):
+            if "${" in value or "$(" in value:
+                return f"{named}, '{value[:60]}'"
+    return None
 
 
 def _link(path: Path, element: ElementTree.Element, role: str) -> str:
