@@ -147,6 +147,7 @@ def arms(draw, orthogonal_wrist: bool = False) -> Robot:
         lower=draw(six(-350 * DEG, -30 * DEG)),
         upper=draw(six(30 * DEG, 350 * DEG)),
         base=placement(draw(six(-2, 2))[:3], draw(six(-np.pi, np.pi))[:3]),
+        flange=placement(draw(six(-0.3, 0.3))[:3], draw(six(-np.pi, np.pi))[:3]),
         tool=placement(draw(six(-0.3, 0.3))[:3], draw(six(-np.pi, np.pi))[:3]),
     )
 
@@ -180,6 +181,7 @@ def chains(draw, least: int = 1, most: int = 10, coupled: bool = True) -> Robot:
         coupling=coupling,
         continuous=endless & ~sliding[:joints],
         base=placement(numbers(-2, 2, 3), numbers(-3, 3, 3)),
+        flange=placement(numbers(-0.3, 0.3, 3), numbers(-3, 3, 3)),
         tool=placement(numbers(-0.3, 0.3, 3), numbers(-3, 3, 3)),
     )
 
@@ -216,7 +218,7 @@ def dh_matrix(convention: str, a: float, alpha: float, d: float, theta: float) -
 
 
 def frame_by_hand(robot: Robot, q: np.ndarray, frame: int) -> np.ndarray:
-    """Frame after joint ``frame``, base included, tool not."""
+    """Frame after joint ``frame``, base included, flange and tool not."""
     T = robot.base.copy()
     for k in range(frame):
         theta = robot.direction[k] * q[k] + robot.offset[k]
@@ -241,8 +243,9 @@ class PinocchioArm:
             axis = kind(np.array([0, 0, robot.direction[k]]))
             parent = self.model.addJoint(parent, axis, before * across if modified else before, f"joint_{k + 1}")
             before = offset * along if modified else offset * along * across
-        tool = before * pin.SE3(robot.tool[:3, :3], robot.tool[:3, 3])
-        frame = pin.Frame("tool", parent, 0, tool, pin.FrameType.OP_FRAME)
+        for T in (robot.flange, robot.tool):
+            before = before * pin.SE3(T[:3, :3], T[:3, 3])
+        frame = pin.Frame("tool", parent, 0, before, pin.FrameType.OP_FRAME)
         self.tool = self.model.addFrame(frame)
         self.data = self.model.createData()
 

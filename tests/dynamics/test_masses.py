@@ -256,31 +256,6 @@ def test_urdf_is_what_pinocchio_makes_of_it(arm, tmp_path):
     np.testing.assert_allclose(er3a.torques(arm, q, qd, qdd), expected, atol=1e-10)
 
 
-BAD_URDF = """<inertial><origin xyz="0 0 0.1" rpy="0.3 0.2 0.1"/><mass value="{mass}"/>
-<inertia ixx="{xx}" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>"""
-
-
-@pytest.mark.parametrize(
-    ("mass", "xx", "note"),
-    [
-        ("-1", "0.1", "has a mass below 0"),
-        ("1", "0.5", "above the sum"),
-        ("x", "0.1", "contains something"),
-        ("1", "0.1", ""),
-    ],
-)
-def test_inertials_of_a_urdf_that_no_body_has_are_noted(arm, tmp_path, mass, xx, note):
-    text = export_urdf(arm.replace(masses=Masses()))
-    text = text.replace('<link name="link_3" />', f'<link name="link_3">{BAD_URDF.format(mass=mass, xx=xx)}</link>')
-    text = text.replace('effort="0.0"', 'effort="0"')
-    path = tmp_path / "arm.urdf"
-    path.write_text(text)
-    found = import_urdf(path)
-    assert found.robot.masses.drives is None  # an effort of 0 is an unknown one
-    assert [each.link for each in found.robot.masses.links] == ([] if note else [3])
-    assert any(note in text and "link_3" in text for text in found.notes) == bool(note)
-
-
 def test_links_fixed_to_one_another_count_as_one(arm, tmp_path):
     text = export_urdf(arm)
     extra = '<link name="box"><inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" '

@@ -70,7 +70,9 @@ def test_each_frame_is_the_product_of_the_rows_up_to_it(data, robot):
     q = data.draw(joints_within(robot))
     for k in range(7):
         np.testing.assert_allclose(forward(robot, q, frame=k), frame_by_hand(robot, q, k), rtol=0, atol=1e-13)
-    np.testing.assert_allclose(forward(robot, q), frame_by_hand(robot, q, 6) @ robot.tool, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        forward(robot, q), frame_by_hand(robot, q, 6) @ robot.flange @ robot.tool, rtol=0, atol=1e-13
+    )
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])

@@ -62,4 +62,4 @@ def test_joints_that_slide_and_coupled_ones_have_them(convention):
         product = robot.base
         for link in link_transforms(robot):
             product = product @ link.at(moved)
-        np.testing.assert_allclose(product @ robot.tool, forward(robot, q), atol=1e-12)
+        np.testing.assert_allclose(product @ robot.flange @ robot.tool, forward(robot, q), atol=1e-12)
