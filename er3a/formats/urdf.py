@@ -192,8 +192,8 @@ def link_shapes(
                 continue
             envelopes += [shape for shape in made if isinstance(shape, Envelope)]
             hulls += [shape for shape in made if isinstance(shape, ConvexPiece)]
-    envelopes, hulls = (sorted(shapes, key=lambda shape: shape.link) for shapes in (envelopes, hulls))
-    return tuple(envelopes), tuple(hulls), tuple(notes)
+    capsules, pieces = sorted(envelopes, key=lambda each: each.link), sorted(hulls, key=lambda each: each.link)
+    return tuple(capsules), tuple(pieces), tuple(notes)
 
 
 def _coupling(path: Path, found: UrdfChain, moving: list[UrdfJoint]) -> tuple[list[UrdfJoint], Reals, Reals]:

@@ -230,7 +230,8 @@ def fleet(tmp_path_factory) -> list[tuple[str, UrdfFile, UrdfImport]]:
                     try:
                         found.append((f"{file.name} to {tip}", file, import_urdf(file.path, tip=tip)))
                     except InputError as error:
-                        assert "moving joints" in error.problem, error
+                        if "moving joints" not in error.problem:
+                            raise
     return found
 
 
