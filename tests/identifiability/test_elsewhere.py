@@ -7,7 +7,13 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.elsewhere import same_robots
+from er3a.identifiability.extreme_climb import climber, measure_code
 from er3a.kinematics.table_batch import frames_of, tables_of
+from er3a.references.quantities import AxisDistance, SectionExtent
+from er3a.references.reach import search
+from testing.arms import placement
+
+STARTS = 20
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
@@ -22,3 +28,15 @@ def test_all_equivalent_rows_put_the_flange_where_the_table_does(convention, ran
     assert np.abs(flange - flange[0]).max() < 1e-12
     rows = np.concatenate([getattr(every, name) for name in ("a", "d", "direction")], axis=1)
     assert len(np.unique(rows, axis=0)) > 500
+
+
+@pytest.mark.parametrize("reach", [AxisDistance("flange", "greatest", 1), SectionExtent("flange", "greatest", "z")])
+def test_climbing_takes_the_flange_where_it_stands_off_the_table(reach, random):
+    """The kernels that climb to an extreme look at the same point as the search, which goes through forward."""
+    robot = load_robot("er3_600").without_tool().replace(flange=placement([0.1, -0.05, 0.08], [0.4, -0.3, 1.0]))
+    least, _ = search(robot.replace(flange=np.eye(4)), reach, STARTS)
+    expected, _ = search(robot, reach, STARTS)
+    climb = climber(tables_of(robot), robot, measure_code(reach), 1.0, np.arange(6))
+    best = max(climb(random.uniform(robot.lower, robot.upper, (20, 6)))[1] for _ in range(20))
+    assert 1000 * best == pytest.approx(expected, abs=1e-3)
+    assert expected > least + 20

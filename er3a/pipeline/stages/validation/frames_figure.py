@@ -58,8 +58,10 @@ def link_frames(robot: Robot, other: Robot | None, other_label: str) -> Figure:
 
 
 def _frames_of_links(robot: Robot) -> Reals:
-    """Frames 1 to m of the table (m, 4, 4) at all joints 0: those in which its rows are written."""
-    return np.stack([forward(robot, np.zeros(robot.joints), frame=k) for k in range(1, robot.rows + 1)])
+    """Frames 1 to m - 1 of the table, in which its rows are written, and the flange (m, 4, 4), at all joints 0."""
+    zero = np.zeros(robot.joints)
+    own = [forward(robot, zero, frame=k) for k in range(1, robot.rows)]
+    return np.stack([*own, forward(robot.without_tool(), zero)])
 
 
 def _seen(points: Reals) -> Reals:
