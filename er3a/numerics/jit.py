@@ -34,6 +34,12 @@ _IMPORT = re.compile(r"^from er3a\.([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTI
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+def cache_folder() -> Path:
+    """Where compiled kernels are kept on this machine."""
+    home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(home) / "er3a"
+
+
 def kernel(function: Function) -> Function:
     """Compile a function on its first call and keep the machine code on disk; its signature stays visible.
 
@@ -100,8 +106,7 @@ class _KernelLocator(_CacheLocator):
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         path = Path(file).resolve()
-        home = os.environ.get("NUMBA_CACHE_DIR") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        self._folder = Path(home) / "er3a" / f"{path.stem}-{_kernels_digest(path)}"
+        self._folder = cache_folder() / f"{path.stem}-{_kernels_digest(path)}"
         self._line = function.__code__.co_firstlineno
 
     def get_cache_path(self) -> str:
