@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 HULL, CYLINDER, HALF_SPACE = 0, 1, 2
 EXACT = 1e-11  # m, to which the iteration goes on
@@ -26,7 +26,7 @@ ROUNDS = 64
 _V, _WEIGHT, ROOM = 12, 13, 17  # rows of scratch memory behind the simplex and its points on either core
 
 
-@kernel
+@inner_kernel
 def _point_on_line(w: Reals, p: int, a: int, b: int) -> float:
     """Parameter in [0, 1] of the point of the line from row a to row b that is nearest to row p."""
     length = along = 0.0
@@ -75,7 +75,7 @@ def _lines(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) -> float:
     return float(np.sqrt(best))
 
 
-@kernel
+@inner_kernel
 def _support(w: Reals, first: int, last: int, disc: float, room: Reals, sign: float, row: int) -> None:
     """The point of a core that is farthest along ``sign`` times the row V of ``room``, into a row of it."""
     x, y, z = sign * room[_V, 0], sign * room[_V, 1], sign * room[_V, 2]
@@ -97,7 +97,7 @@ def _support(w: Reals, first: int, last: int, disc: float, room: Reals, sign: fl
             room[row, 2] += scale * k
 
 
-@kernel
+@inner_kernel
 def _triangle(room: Reals, i: int, j: int, k: int) -> tuple[float, float, float]:
     """Weights of the point of a triangle that is nearest to the origin (Ericson, 5.1.5)."""
     d1 = d2 = d3 = d4 = d5 = d6 = 0.0
@@ -129,7 +129,7 @@ def _triangle(room: Reals, i: int, j: int, k: int) -> tuple[float, float, float]
     return va / total, vb / total, vc / total
 
 
-@kernel
+@inner_kernel
 def _faces_origin(room: Reals, i: int, j: int, k: int, out: int) -> bool:
     """Whether a face of a tetrahedron has the origin on its outer side, or the tetrahedron is flat."""
     ux, uy, uz = room[j, 0] - room[i, 0], room[j, 1] - room[i, 1], room[j, 2] - room[i, 2]
@@ -140,7 +140,7 @@ def _faces_origin(room: Reals, i: int, j: int, k: int, out: int) -> bool:
     return bool(here * there <= 0 or abs(there) <= 1e-18)
 
 
-@kernel
+@inner_kernel
 def _nearest_of_simplex(room: Reals, count: int) -> bool:
     """Weights (first column of the rows from _WEIGHT on) of the simplex's point that is nearest to the origin.
 
@@ -179,7 +179,7 @@ def _nearest_of_simplex(room: Reals, count: int) -> bool:
     return inside
 
 
-@kernel
+@inner_kernel
 def _cores(
     w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals
 ) -> float:
@@ -228,7 +228,7 @@ def _cores(
     return float(size)
 
 
-@kernel
+@inner_kernel
 def _above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near: Reals) -> float:
     """How far a core stays above a half-space, whose rows begin with ``plane``; negative by the depth."""
     x, y, z = w[plane, 0], w[plane, 1], w[plane, 2]
@@ -273,7 +273,7 @@ def pair_distance(
     return core - sizes, core == 0.0
 
 
-@kernel
+@inner_kernel
 def apart_along(
     w: Reals, shape: tuple[Integers, Integers, Reals, Reals], a: int, b: int, room: Reals, axis: Reals
 ) -> bool:

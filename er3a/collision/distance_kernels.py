@@ -16,7 +16,7 @@ import numpy as np
 from er3a.collision.core_distance import HALF_SPACE, ROOM, apart_along, pair_distance
 from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 WORLD = -1  # link of what stands around the arm
 DEEPEST = 512  # boxes that wait at one time
@@ -59,7 +59,7 @@ class Layout(NamedTuple):
     inner: Integers
 
 
-@kernel
+@inner_kernel
 def _row_value(coupling: Reals, q: Reals, k: int) -> float:
     """What row k moves by, for joints (n,)."""
     if coupling.shape[0] == 0:
@@ -70,7 +70,7 @@ def _row_value(coupling: Reals, q: Reals, k: int) -> float:
     return value
 
 
-@kernel
+@inner_kernel
 def _row_reach(coupling: Reals, half: Reals, k: int) -> float:
     """What row k moves by at most while each joint moves by up to ``half`` (n,)."""
     if coupling.shape[0] == 0:
@@ -90,7 +90,7 @@ def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> No
         _place_points(layout, T, b, world)
 
 
-@kernel
+@inner_kernel
 def _place_frames(layout: Layout, q: Reals, T: Reals) -> None:
     direction, starts, sliding, links = layout.direction, layout.starts, layout.sliding, layout.links
     T[0] = layout.base
@@ -106,7 +106,7 @@ def _place_frames(layout: Layout, q: Reals, T: Reals) -> None:
         x, y, z = step_row(x, links[k + 1]), step_row(y, links[k + 1]), step_row(z, links[k + 1])
 
 
-@kernel
+@inner_kernel
 def _place_middle(layout: Layout, T: Reals, b: int, middle: Reals) -> None:
     centre, f = layout.centre, layout.link[b]
     for r in range(3):
@@ -118,7 +118,7 @@ def _place_middle(layout: Layout, T: Reals, b: int, middle: Reals) -> None:
             )
 
 
-@kernel
+@inner_kernel
 def _place_points(layout: Layout, T: Reals, b: int, world: Reals) -> None:
     points, f = layout.points, layout.link[b]
     for r in range(3):
@@ -225,13 +225,13 @@ def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
                     axes[k, r] /= np.sqrt(width)
 
 
-@kernel
+@inner_kernel
 def _balls_apart(middle: Reals, reach: Reals, a: int, b: int) -> bool:
     x, y, z = middle[a, 0] - middle[b, 0], middle[a, 1] - middle[b, 1], middle[a, 2] - middle[b, 2]
     return bool(x * x + y * y + z * z >= (reach[a] + reach[b]) ** 2)
 
 
-@kernel
+@inner_kernel
 def _ball_above(layout: Layout, middle: Reals, a: int, plane: int) -> float:
     """How far the ball around a body stays above a half-space."""
     height, p = -layout.points[layout.start[plane] + 1, 0] - layout.reach[a], layout.start[plane]
@@ -240,7 +240,7 @@ def _ball_above(layout: Layout, middle: Reals, a: int, plane: int) -> float:
     return float(height)
 
 
-@kernel
+@inner_kernel
 def _body_motion(layout: Layout, T: Reals, w: Reals, b: int, inner: int, half: Reals) -> float:
     """How far a body moves at most, seen from what carries row ``inner``, while joints move by up to ``half`` (n,)."""
     moved, first, last = 0.0, layout.start[b], layout.start[b + 1]
@@ -258,14 +258,14 @@ def _body_motion(layout: Layout, T: Reals, w: Reals, b: int, inner: int, half: R
     return moved
 
 
-@kernel
+@inner_kernel
 def _pair_motion(layout: Layout, T: Reals, w: Reals, k: int, half: Reals) -> float:
     """How far the bodies of a pair move against each other at most; what moves is no cylinder."""
     b = layout.first[k] if layout.link[layout.second[k]] == WORLD else layout.second[k]
     return _body_motion(layout, T, w, b, layout.inner[k], half)
 
 
-@kernel
+@inner_kernel
 def _box_state(
     layout: Layout, q: Reals, half: Reals, placed: tuple[Reals, Reals, Reals], room: Reals, near: Reals
 ) -> tuple[int, float]:
@@ -361,6 +361,13 @@ def judge_polyline(layout: Layout, q: Reals, depth: float, states: Integers) -> 
     return looked
 
 
+@inner_kernel
+def _set_box(box: Reals, low: Reals, high: Reals) -> None:
+    """Written out: numba's assignment of a slice brings its error message with it, a second of compiling."""
+    for j in range(low.shape[0]):
+        box[0, j], box[1, j] = low[j], high[j]
+
+
 @kernel
 def search_boxes(
     layout: Layout, k: int, box: Reals, aim: tuple[bool, float], most: int, at: Reals
@@ -383,7 +390,7 @@ def search_boxes(
     last, sign = layout.link[a if layout.link[b] == WORLD else b], -1.0 if overlapping else 1.0
     cuts = (layout.inner[k], last) if layout.coupling.shape[0] == 0 else (0, n)
     stack, value = np.empty((DEEPEST, 2, n)), np.empty(2)
-    stack[0] = box
+    _set_box(stack[0], box[0], box[1])
     height, looked, least, outcome = 1, 0, np.inf, FREE
     half, alone = np.empty(n), np.zeros(n)
     while height:
@@ -391,13 +398,15 @@ def search_boxes(
             return UNDECIDED, looked, 0.0
         height -= 1
         low, high = stack[height, 0].copy(), stack[height, 1].copy()
-        half[:] = (high - low) / 2
+        for j in range(n):
+            half[j] = (high[j] - low[j]) / 2
         place(layout, (low + high) / 2, T, w, middle)
         looked += 1
         distance, inside = pair_distance(w, shape, a, b, room, near)
         distance *= sign
         if distance < 0 or (inside and not overlapping):
-            at[:] = (low + high) / 2
+            for j in range(n):
+                at[j] = (low[j] + high[j]) / 2
             return MEETS, looked, distance
         moved = _pair_motion(layout, T, w, k, half)
         if distance - moved > goal:
@@ -414,14 +423,14 @@ def search_boxes(
             outcome = UNDECIDED
             continue
         for side in range(2):  # the half that is nearer to what is sought is looked at first
-            stack[height, 0], stack[height, 1] = low, high
+            _set_box(stack[height], low, high)
             stack[height, 1 - side, cut] = (low[cut] + high[cut]) / 2
             place(layout, (stack[height, 0] + stack[height, 1]) / 2, T, w, middle)
             value[side] = sign * pair_distance(w, shape, a, b, room, near)[0]
         for side in range(2):
             first = (value[0] < value[1]) == (side == 0)
             row = height + 1 if first else height
-            stack[row, 0], stack[row, 1] = low, high
+            _set_box(stack[row], low, high)
             stack[row, 1 - side, cut] = (low[cut] + high[cut]) / 2
         height += 2
     return outcome, looked, least

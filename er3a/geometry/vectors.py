@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 Vector = tuple[float, float, float]
 
@@ -45,7 +45,7 @@ def scaled(a: Vector, factor: float) -> Vector:
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
-@kernel
+@inner_kernel
 def in_frame_of(T: Reals, v: Vector) -> Vector:
     """Components, in the frame that a transform T leads to, of a vector given in the frame it leads from."""
     return (
@@ -55,7 +55,7 @@ def in_frame_of(T: Reals, v: Vector) -> Vector:
     )
 
 
-@kernel
+@inner_kernel
 def rotated(v: Vector, axis: Vector, c: float, s: float) -> Vector:
     """v turned about a unit axis by the angle with cosine c and sine s: Rodrigues' formula [1]_."""
     u = cross(axis, v)

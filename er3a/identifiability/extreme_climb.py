@@ -12,7 +12,7 @@ import numpy as np
 
 from er3a.kinematics.table_batch import Tables, fill_frames, kernel_columns
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.references.quantities import FRAME_OF_POINT, AxisDistance, Extreme, SectionExtent
 from er3a.robots.robot import Robot
 
@@ -111,7 +111,7 @@ def _climb(
     return best
 
 
-@kernel
+@inner_kernel
 def _from(ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, joints: Integers, what: What) -> float:
     """Climb from q (n,), which is changed to where that leads; the value there."""
     lower, upper = bounds
@@ -158,7 +158,7 @@ def _from(ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, j
     return here
 
 
-@kernel
+@inner_kernel
 def _fill_stencil(q: Reals, joints: Integers, stencil: Reals) -> None:
     k = joints.shape[0]
     at = 1 + 2 * k
@@ -172,7 +172,7 @@ def _fill_stencil(q: Reals, joints: Integers, stencil: Reals) -> None:
             at += 1
 
 
-@kernel
+@inner_kernel
 def _slope_and_curvature(values: Reals, slope: Reals, curvature: Reals) -> None:
     k = slope.shape[0]
     at = 1 + 2 * k
@@ -185,7 +185,7 @@ def _slope_and_curvature(values: Reals, slope: Reals, curvature: Reals) -> None:
             at += 1
 
 
-@kernel
+@inner_kernel
 def _damped(slope: Reals, curvature: Reals, free: Flags, damping: float) -> tuple[Reals, bool]:
     """Step uphill by (damping - curvature)^-1 slope over the free joints, and whether that matrix is definite."""
     k = slope.shape[0]

@@ -19,7 +19,7 @@ from er3a.geometry.vectors import Vector
 from er3a.kinematics.block_constants import EDGE, BlockConstants
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 BLOCK = 64
@@ -102,7 +102,7 @@ def _check(w: Reals) -> None:
         w[_RIGID * BLOCK + i] = 1.0 if straight & near & (w[_RIGID * BLOCK + i] <= 1e-12) & (volume > 0.0) else 0.0
 
 
-@kernel
+@inner_kernel
 def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None:
     """Angles theta into the manufacturer's, by the nearest turn within the limits (``nearest_equivalent``)."""
     direction, offset, lower, upper = joints
@@ -140,7 +140,7 @@ def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -
             turns[n, j, 0], turns[n, j, 1] = np.int8(low if known else 0.0), np.int8(high if known else -1.0)
 
 
-@kernel
+@inner_kernel
 def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float) -> Vector:
     """A vector turned by a rotation given as three rows."""
     a, b, c = rows
@@ -185,7 +185,7 @@ def _shoulder(arm: BlockConstants, w: Reals, near: Reals, far: Reals) -> None:
         far[_REACHED * BLOCK + i] = reached
 
 
-@kernel
+@inner_kernel
 def _elbow(arm: BlockConstants, w: Reals, side: Reals) -> None:
     """The triangle of upper arm and forearm for one shoulder branch."""
     longest, shortest = arm.upper_arm + arm.forearm, abs(arm.upper_arm - arm.forearm)
@@ -258,7 +258,7 @@ def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals)
         pair[9 * BLOCK + i], pair[11 * BLOCK + i] = phi_4 - arm.turn_4, phi_6
 
 
-@kernel
+@inner_kernel
 def seen_by_wrist(
     arm: BlockConstants, x: float, y: float, z: float, cos_1: float, sin_1: float, c: float, s: float
 ) -> Vector:
@@ -269,7 +269,7 @@ def seen_by_wrist(
     return arm.sin_lean * x - arm.cos_lean * z, y, arm.cos_lean * x + arm.sin_lean * z
 
 
-@kernel
+@inner_kernel
 def _outer_angles(
     arm: BlockConstants, zx: float, zy: float, beside_6: Vector, px: float, py: float, cos_5: float, sin_5: float
 ) -> tuple[float, float]:

@@ -49,7 +49,7 @@ from er3a.geometry.vectors import (
     unsigned_angle,
 )
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 Joints = tuple[Reals, Reals]
 Slots = tuple[Reals, NDArray[np.int8], Reals]
@@ -101,14 +101,14 @@ class ArmConstants(NamedTuple):
     most_tilt_offset: float
 
 
-@kernel
+@inner_kernel
 def _wrap(angle: float) -> float:
     """Into (-pi, pi]."""
     wrapped: float = angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi))
     return wrapped
 
 
-@kernel
+@inner_kernel
 def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, high_offset: float) -> float:
     """An angle in 0..pi, put beside that end whose distance from the fold (m or rad) is nothing but rounding."""
     if to_low < AT_FOLD and low_offset > 0.0:
@@ -185,7 +185,7 @@ def solve(
                         q[n, wrist, j] = _wrap(direction[j] * (q[n, wrist, j] - offset[j]))
 
 
-@kernel
+@inner_kernel
 def _solve_wrist(
     arm: ArmConstants, axis_6: Vector, beside_6: Vector, free_4: float, keep_folds: bool, keep_free: bool, theta: Reals
 ) -> float:

@@ -14,7 +14,7 @@ from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot
 
 Row = tuple[float, float, float, float]
@@ -106,19 +106,19 @@ def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Flags]:
     return u, robot.direction, joint_starts(robot), robot.sliding
 
 
-@kernel
+@inner_kernel
 def turn_row(row: Row, c: float, s: float) -> Row:
     """Row (4 floats) of T, after T is multiplied from the right by Rz, given its cosine and sine."""
     return row[0] * c + row[1] * s, row[1] * c - row[0] * s, row[2], row[3]
 
 
-@kernel
+@inner_kernel
 def slide_row(row: Row, along: float) -> Row:
     """Row (4 floats) of T, after T is multiplied from the right by a shift along z."""
     return row[0], row[1], row[2], row[3] + along * row[2]
 
 
-@kernel
+@inner_kernel
 def step_row(row: Row, link: Reals) -> Row:
     """Row (4 floats) of T, after T is multiplied from the right by the constant transform ``link``."""
     return (
@@ -139,14 +139,14 @@ def rows_of(T: Reals) -> tuple[Row, Row, Row]:
     )
 
 
-@kernel
+@inner_kernel
 def write_rows(x: Row, y: Row, z: Row, out: Reals) -> None:
     for j in range(4):
         out[0, j], out[1, j], out[2, j] = x[j], y[j], z[j]
     out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
 
 
-@kernel
+@inner_kernel
 def _cos_sin_rows(q: Reals, direction: Reals, offset: Reals, start: int, k: int, rows: Reals) -> None:
     """Cosines and sines of joint ``k`` for a block, as rows 12 and 13; poses past the end repeat the last."""
     sign, zero, far = direction[k], offset[k], False
@@ -163,7 +163,7 @@ def _cos_sin_rows(q: Reals, direction: Reals, offset: Reals, start: int, k: int,
             rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = np.cos(angle), np.sin(angle)
 
 
-@kernel
+@inner_kernel
 def _slide_rows(q: Reals, sign: float, start: int, k: int, rows: Reals) -> None:
     """Shift a block of transforms along their z axes by joint ``k``, and leave no turn in rows 12 and 13."""
     for i in range(BLOCK):
@@ -173,7 +173,7 @@ def _slide_rows(q: Reals, sign: float, start: int, k: int, rows: Reals) -> None:
         rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = 1.0, 0.0
 
 
-@kernel
+@inner_kernel
 def _move_joint(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, start: int, k: int, rows: Reals) -> None:
     """Shift by joint ``k`` if it slides; leave the cosine and sine of its turn in rows 12 and 13."""
     if sliding[k]:
@@ -198,7 +198,7 @@ def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links:
             out[start + i, 3, 3] = 1.0
 
 
-@kernel
+@inner_kernel
 def _turn_and_step(rows: Reals, link: Reals) -> None:
     """Multiply a block of transforms by Rz of the block's cosines and sines and by a constant transform."""
     a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
@@ -256,14 +256,14 @@ def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links
                     out[start + i, r, k] = columns[k, r * BLOCK + i]
 
 
-@kernel
+@inner_kernel
 def _fill_start(rows: Reals, link: Reals) -> None:
     for r in range(3):
         for c in range(4):
             rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]
 
 
-@kernel
+@inner_kernel
 def _keep_axis(rows: Reals, sign: float, column: Reals) -> None:
     """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
@@ -280,7 +280,7 @@ def _along(column: Reals) -> None:
             column[r * BLOCK + i], column[(3 + r) * BLOCK + i] = column[(3 + r) * BLOCK + i], 0.0
 
 
-@kernel
+@inner_kernel
 def _lever(rows: Reals, column: Reals) -> None:
     """The tool point's velocity: axis times arm from the axis to the tool point."""
     for i in range(BLOCK):

@@ -24,7 +24,7 @@ import numpy as np
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.cholesky import LANES, solve_by_cholesky
 from er3a.numerics.fast_math import arctan2, cos_sin
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 DAMPING = 0.1
 MOST_ITERATIONS = 40
@@ -114,7 +114,7 @@ def uniform(seed: np.uint64, pose: int, start: int, joint: int) -> float:
     return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@kernel
+@inner_kernel
 def _take(w: Reals, i: int, T: Reals, n: int) -> None:
     for r in range(3):
         for c in range(4):
@@ -168,7 +168,7 @@ def _joint(sign: float, zero: float, link: Reals, k: int, w: Reals, column: Real
             row[3 * LANES + i] += p * x + s * y + t * z
 
 
-@kernel
+@inner_kernel
 def _pose_error(mask: Reals, length: float, w: Reals) -> None:
     m0, m1, m2, m3, m4, m5 = mask[0], mask[1], mask[2], mask[3], mask[4], mask[5]
     for i in range(LANES):
@@ -205,7 +205,7 @@ def _pose_error(mask: Reals, length: float, w: Reals) -> None:
         w[_ROTATION * LANES + i] = np.sqrt(wx * wx + wy * wy + wz * wz)
 
 
-@kernel
+@inner_kernel
 def _column(mask: Reals, length: float, w: Reals, column: Reals) -> None:
     """One joint's column: a point and an axis in, the derivative of the pose error out."""
     m0, m1, m2, m3, m4, m5 = mask[0] / length, mask[1] / length, mask[2] / length, mask[3], mask[4], mask[5]
@@ -229,7 +229,7 @@ def _column(mask: Reals, length: float, w: Reals, column: Reals) -> None:
         column[5 * LANES + i] = -(bz - 0.5 * cz + squared * (wx * cy - wy * cx)) * m5
 
 
-@kernel
+@inner_kernel
 def _dot_rows(a: Reals, b: Reals, out: Reals) -> None:
     """Sum over 6 rows of the products of two columns."""
     for i in range(LANES):

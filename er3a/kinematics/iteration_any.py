@@ -23,7 +23,7 @@ from er3a.kinematics.iteration import (
     uniform,
 )
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 ABOVE_ROUNDING = 1e-13  # of the normal matrix, which is singular where the arm is
 
@@ -61,7 +61,7 @@ def solve_any(
         q[pose] = best
 
 
-@kernel
+@inner_kernel
 def _descend(arm: AnyArm, limits: Limits, T: Reals, goal: Goal, x: Reals, e: Reals, J: Reals) -> tuple[float, float]:
     """Iterate from x; returns the errors in position (m) and rotation (rad) where it ends."""
     (lower, upper, respect), (mask, tolerances, length) = limits, goal

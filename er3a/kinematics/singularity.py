@@ -28,7 +28,7 @@ from er3a.kinematics.wrist_partitioned import (
     wrist_partitioned_arm,
 )
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
@@ -158,7 +158,7 @@ def _factors(
         out[n, 2] = dot(sideways, from_axis) / np.sqrt(dot(sideways, sideways))
 
 
-@kernel
+@inner_kernel
 def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
     """Signed angle from the line of a to the line of b, in (-pi/2, pi/2], as seen along the axis."""
     angle: float = np.arctan2(dot(axis, cross(a, b)), abs(dot(a, b) - dot(a, axis) * dot(b, axis)))

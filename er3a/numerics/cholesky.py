@@ -13,13 +13,13 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel
 
 LANES = 32
 LEAST_PIVOT = 1e-15
 
 
-@kernel
+@inner_kernel
 def solve_by_cholesky(A: Reals, step: Reals) -> None:
     """Replace ``step`` (6 rows of lanes) by the solutions x of A x = step; of A (36 rows) the lower half is read."""
     for i in range(LANES):

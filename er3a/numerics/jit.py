@@ -4,26 +4,40 @@ numba does not notice when a kernel in one file calls one in another file that c
 serve stale machine code. Each kernel is therefore kept in a folder named by a digest of its file and of all files with
 kernels that this one imports. Copies of the package with equal kernels share what one of them has compiled, and an
 edit compiles again what depends on it. Nothing of numba's own settings is touched.
+
+Compiling is what a first run on a machine waits for, so three things are spared: kernels that only kernels call get no
+entry for Python (a quarter of the time), integer constants in a call make no version of their own, and processes that
+need a kernel at once compile it once: one holds its lock, the others wait and load.
 """
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import re
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.registry import CPUDispatcher
 
 _PACKAGE = Path(__file__).resolve().parents[1]
+_KERNEL = b"kernel\ndef "  # @kernel or @inner_kernel
 _IMPORT = re.compile(r"^from er3a\.([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def cache_folder() -> Path:
+    """Where compiled kernels are kept on this machine."""
+    home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(home) / "er3a"
 
 
 def kernel(function: Function) -> Function:
@@ -31,11 +45,60 @@ def kernel(function: Function) -> Function:
 
     No fastmath and no contraction across operations: results must not depend on the machine's vector width.
     """
-    dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
-    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-        with suppress(RuntimeError):  # no folder to write into: compiled again by each process
-            dispatcher._cache = _KernelCache(function)  # type: ignore[attr-defined, no-untyped-call]
+    return _compiled(function, _Kernel, no_cfunc_wrapper=True)
+
+
+def inner_kernel(function: Function) -> Function:
+    """A kernel that only kernels call: it is compiled without the entry that Python would call it by.
+
+    Called from Python it raises a TypeError, unless numba is switched off (``NUMBA_DISABLE_JIT``).
+    """
+    return _compiled(function, _InnerKernel, no_cfunc_wrapper=True, no_cpython_wrapper=True)
+
+
+def _compiled(function: Function, kind: type[_Kernel], **wrappers: bool) -> Function:
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return function
+    dispatcher = kind(function, targetoptions={"nopython": True, "error_model": "numpy", "nogil": True, **wrappers})
+    with suppress(RuntimeError):  # no folder to write into: compiled again by each process
+        dispatcher._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
     return cast(Function, dispatcher)
+
+
+class _Kernel(CPUDispatcher):
+    def compile(self, sig: Any) -> Any:
+        with _alone(self._cache, self.py_func.__qualname__):
+            return super().compile(sig)  # type: ignore[no-untyped-call]
+
+    def get_call_template(self, args: tuple[types.Type, ...], kws: dict[str, types.Type]) -> Any:
+        """Numba compiles a call with a constant integer for that very integer; one version serves all."""
+        return super().get_call_template(  # type: ignore[no-untyped-call]
+            tuple(types.unliteral(arg) for arg in args), {name: types.unliteral(arg) for name, arg in kws.items()}
+        )
+
+
+class _InnerKernel(_Kernel):
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        raise TypeError(f"{self.py_func.__qualname__} is compiled for kernels only; make it a @kernel to call it")
+
+
+@contextmanager
+def _alone(cache: object, name: str) -> Iterator[None]:
+    """One process at a time compiles a kernel: what another has compiled meanwhile is then loaded.
+
+    A kernel's lock is held while those that it calls are compiled, theirs never while it is: no two processes can wait
+    for each other, because kernels call each other in one direction.
+    """
+    lock = None
+    if isinstance(cache, _KernelCache):
+        with suppress(OSError):  # a file system without locks
+            lock = os.open(Path(cache.cache_path) / f"{name}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if lock is not None:
+            os.close(lock)
 
 
 class _KernelLocator(_CacheLocator):
@@ -43,8 +106,7 @@ class _KernelLocator(_CacheLocator):
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         path = Path(file).resolve()
-        home = os.environ.get("NUMBA_CACHE_DIR") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        self._folder = Path(home) / "er3a" / f"{path.stem}-{_kernels_digest(path)}"
+        self._folder = cache_folder() / f"{path.stem}-{_kernels_digest(path)}"
         self._line = function.__code__.co_firstlineno
 
     def get_cache_path(self) -> str:
@@ -96,5 +158,5 @@ def _kernel_files(path: Path) -> tuple[Path, ...]:
     for module, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
         parts = [module, *(f"{module}.{name}" for name in re.findall(r"\w+", names))]
         files = [_PACKAGE.joinpath(*part.split(".")).with_suffix(".py") for part in parts]
-        found += [file for file in files if file.is_file() and b"@kernel" in file.read_bytes()]
+        found += [file for file in files if file.is_file() and _KERNEL in file.read_bytes()]
     return tuple(found)

@@ -11,13 +11,17 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 from er3a.errors import Er3aError
 from er3a.files.kept_files import half_written
 from er3a.files.shipped import ROOT
+from er3a.pipeline import job_server
 from er3a.pipeline.check import check_study
 from er3a.pipeline.corrupted import corrupted
+from er3a.pipeline.run_log import logger_words
+from er3a.pipeline.stages.registry import STAGES
 
 _STATE = Path(".snakemake")
 
@@ -60,7 +64,25 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     os.set_inheritable(lock, True)  # held until the last job of this run has ended
     sys.stdout.flush()
     plain = ["--nocolor"] if os.environ.get("NO_COLOR") else []
-    return _snakemake([*snakemake, *plain, *words, *study_words])
+    expected = {(name, stage): verdict for name in study.names for stage, verdict in study.entry(name).expect.items()}
+    with job_server.running(lock) if _on_this_machine(words) else nullcontext():
+        return _snakemake(
+            [*snakemake, *plain, *_one_at_first(words), *logger_words(expected, words), *words, *study_words]
+        )
+
+
+def _one_at_first(words: Sequence[str]) -> list[str]:
+    """Words that let just one job of a stage run at a time where its kernels are not compiled yet.
+
+    Others of the stage would wait for that job's compiling, on a core that other stages can use.
+    """
+    new = [stage.name for stage in STAGES.values() if not stage.compiled.exists()]
+    return ["--resources", *(f"compiles_{stage}=1" for stage in new)] if new and "--resources" not in words else []
+
+
+def _on_this_machine(words: Sequence[str]) -> bool:
+    """Whether Snakemake runs jobs itself, not by an executor or a profile that may name one."""
+    return not any(word.startswith(("-e", "--executor", "--profile", "--workflow-profile")) for word in words)
 
 
 def _taken_lock() -> int:

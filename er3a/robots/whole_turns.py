@@ -21,7 +21,7 @@ import numpy as np
 
 from er3a.geometry.angles import TURN
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
@@ -194,7 +194,7 @@ def _windows(robot: Robot, q_ref: Reals, widened: float) -> tuple[Reals, Reals]:
     return lower, upper
 
 
-@kernel
+@inner_kernel
 def take_turns_off(step: Reals, turns: tuple[Reals, Reals]) -> None:
     """Make a move of joints (n,) the one by the shortest way; ``turns`` are steps (n, r) and counts (r, n)."""
     steps, counts = turns

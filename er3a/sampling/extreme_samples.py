@@ -16,7 +16,7 @@ import numpy as np
 
 from er3a.geometry.vectors import Vector
 from er3a.numerics.arrays import Integers, Reals, Singles
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 NearLists = tuple[Reals, Integers, Integers, Reals]
 Cells = tuple[Reals, float, tuple[int, int, int]]
@@ -94,7 +94,7 @@ def _patch(x: float, y: float, z: float) -> int:
     return (face * _PATCHES + i) * _PATCHES + j
 
 
-@kernel
+@inner_kernel
 def _set_thresholds(directions: Reals, seen: Reals, patches: Reals, widen: float, threshold: Reals) -> None:
     """Squared distance per patch, grown by the angle ``widen`` (rad), below which nothing improves any direction."""
     cos_widen, sin_widen = np.cos(widen), np.sin(widen)
@@ -114,7 +114,7 @@ def _set_thresholds(directions: Reals, seen: Reals, patches: Reals, widen: float
         threshold[p] = (threshold[p] * _SAFETY) ** 2
 
 
-@kernel
+@inner_kernel
 def _set_lists(directions: Reals, seen: Reals, patches: Reals, least: Reals, lists: NearLists) -> None:
     """List for each patch the directions that may be improved there, by the distance from which on they are.
 
@@ -149,7 +149,7 @@ def _set_lists(directions: Reals, seen: Reals, patches: Reals, least: Reals, lis
             count[p] += 1
 
 
-@kernel
+@inner_kernel
 def refresh(
     directions: Reals, support: Reals, inner: Reals, patches: Reals, lists: NearLists, grid: Cells, idle: Singles
 ) -> None:
@@ -193,7 +193,7 @@ def near_lists(patches: int) -> NearLists:
     return np.zeros(patches), np.zeros(patches, np.int64), np.zeros(shape, np.int64), np.zeros(shape)
 
 
-@kernel
+@inner_kernel
 def take_point(point: Vector, block: int, sample: int, inner: Reals, lists: NearLists, furthest: Furthest) -> None:
     """Take one point (x, y, z) into the extremes; samples of a block come in their order."""
     (complete, count, near, limits), (directions, support, blocks, samples) = lists, furthest

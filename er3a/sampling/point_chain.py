@@ -21,7 +21,7 @@ from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Reals, Singles
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import CHUNK, UNIT_ROWS
 
@@ -132,7 +132,7 @@ def _z_x_z(R: Reals) -> tuple[float, float, float]:
     return np.arctan2(R[0, 2], -R[1, 2]), tilt, np.arctan2(R[2, 0], R[2, 1])
 
 
-@kernel
+@inner_kernel
 def cos_sin_turns(turns: np.float32) -> tuple[np.float32, np.float32]:
     """Cosine and sine of an angle in turns, all in single precision."""
     # The quarter angle lies in [-pi/4, pi/4]; both polynomials (interpolated at Chebyshev nodes) carry a factor
@@ -146,7 +146,7 @@ def cos_sin_turns(turns: np.float32) -> tuple[np.float32, np.float32]:
     return _ONE - double * half_sine, double * (_ONE - s * s)
 
 
-@kernel
+@inner_kernel
 def turn_joint(rows: Singles, k: int, first: np.float32, span: np.float32, link: Singles) -> None:
     """Turn a chunk of points by joint k and take the link to the frame before it."""
     cos_x, sin_x, step_x, step_y, step_z = link[0], link[1], link[2], link[3], link[4]
@@ -160,7 +160,7 @@ def turn_joint(rows: Singles, k: int, first: np.float32, span: np.float32, link:
         p[2 * CHUNK + i] = sin_x * y + cos_x * z + step_z
 
 
-@kernel
+@inner_kernel
 def points_about_axis_1(chain: PointChain, rows: Singles) -> None:
     """Set the points of a chunk, from its random numbers, in the frame that turns with joint 1 (z along axis 1)."""
     last, point, first, span, links, _, sliding, slide, mix, _ = chain
@@ -175,7 +175,7 @@ def points_about_axis_1(chain: PointChain, rows: Singles) -> None:
         _slide_points(rows, 0, slide[0])
 
 
-@kernel
+@inner_kernel
 def _slide_points(rows: Singles, k: int, slide: Singles) -> None:
     """Shift a chunk of points along the axis of joint k."""
     start, span = slide[0], slide[1]
@@ -183,7 +183,7 @@ def _slide_points(rows: Singles, k: int, slide: Singles) -> None:
         rows[Z + i] += start + rows[k * CHUNK + i] * span
 
 
-@kernel
+@inner_kernel
 def _mix_rows(mix: Singles, rows: Singles) -> None:
     """Take the random numbers of a chunk to those of the table's rows."""
     own = np.empty(mix.shape[1], dtype=np.float32)
@@ -197,7 +197,7 @@ def _mix_rows(mix: Singles, rows: Singles) -> None:
             rows[k * CHUNK + i] = total
 
 
-@kernel
+@inner_kernel
 def within_sums(sums: Singles, rows: Singles, inside: Flags) -> None:
     """Set which samples of a chunk of random numbers keep the limits of sums of joints."""
     joints = sums.shape[1] - 2
@@ -210,7 +210,7 @@ def within_sums(sums: Singles, rows: Singles, inside: Flags) -> None:
             inside[i] = inside[i] and total >= sums[row, joints] and total <= sums[row, joints + 1]
 
 
-@kernel
+@inner_kernel
 def point_in_base(chain: PointChain, rows: Singles, i: int) -> Vector:
     """Point i of a chunk that stands in the frame of joint 1, in the base frame."""
     c, s = cos_sin_turns(chain[2][0] + rows[i] * chain[3][0])

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from er3a.numerics.arrays import Integers, Reals, Singles, Words
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 from er3a.sampling.sobol import fill_sobol, shifted_directions
@@ -101,7 +101,7 @@ class Draw:
         return robot.lower + out * (robot.upper - robot.lower)
 
 
-@kernel
+@inner_kernel
 def _round(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64, r: int) -> Counter:
     k0, k1 = (k0 + np.uint64(r) * _W0) & _LOW, (k1 + np.uint64(r) * _W1) & _LOW
     p0, p1 = _M0 * c0, _M1 * c2
@@ -122,13 +122,13 @@ def _unit(bits: np.uint64) -> np.float32:
     return (np.float32(np.int32(bits)) + _HALF) * _STEP
 
 
-@kernel
+@inner_kernel
 def _fifth(a: np.uint64, b: np.uint64) -> np.uint64:
     """The bits that two words have left over."""
     return ((a & _MASK_11) << _10) | (b & _MASK_10)
 
 
-@kernel
+@inner_kernel
 def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, draw: int, rows: Singles) -> None:
     """Set six rows of ``CHUNK`` numbers to those of the samples from ``first`` on, in (0, 1): the draw 0 or 1."""
     k0, k1 = seed & _LOW, seed >> _32

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Singles, Words
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel
 
 BITS = 40
 """Of the number of a point: more than the study allows samples. Of a coordinate, the first 21 are used."""
@@ -57,7 +57,7 @@ def shifted_directions(seed: int, dimensions: int) -> Words:
     return np.concatenate([direction_numbers(dimensions), shift], axis=1)
 
 
-@kernel
+@inner_kernel
 def fill_sobol(directions: Words, first: int, count: int, chunk: int, rows: Singles) -> None:
     """Set a row (``chunk`` long) for each dimension to the points numbered from ``first`` on, in (0, 1)."""
     for k in range(directions.shape[0]):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from er3a.geometry.sphere import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals, Singles, Words
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot
 from er3a.sampling.extreme_samples import Extremes, Furthest, NearLists, cube_map, near_lists, refresh, take_point
 from er3a.sampling.grid import Grid
@@ -124,7 +124,7 @@ def tally_blocks(
     return Tally(blocks, counts, first_block, side, extremes)
 
 
-@kernel
+@inner_kernel
 def _side_cells(
     rows: Singles, lowest: np.float32, per_length: np.float32, n_rho: np.int32, n_z: np.int32, cells: NDArray[np.int32]
 ) -> None:
@@ -136,7 +136,7 @@ def _side_cells(
         cells[i] = column * n_z + np.int32((z - lowest) * per_length)
 
 
-@kernel
+@inner_kernel
 def _voxel_of(
     rows: Singles, chain: PointChain, voxels: _Voxels, inner: Reals, cells: NDArray[np.int32], squared: Singles
 ) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.azimuths import MOST_ARCS, TURN, measure, meets, remove
 from er3a.workspace.empty import STACK, is_empty
 from er3a.workspace.filled import ConfigurationGrid, SectionConfiguration, climb, reached_angles, slack, turn_aside
@@ -53,7 +53,8 @@ def judge_cells(
     for n in range(cells.shape[0]):
         cell = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
         known_count = empty_count[n]
-        known[:known_count] = empty_arcs[n, :known_count]
+        for k in range(known_count):
+            known[k, 0], known[k, 1] = empty_arcs[n, k, 0], empty_arcs[n, k, 1]
         count = _fill(arm, cell, grid, unfilled_arcs[n], unfilled_count[n], best, witness[n])
         unfilled_count[n] = count
         if count == 0 or most_boxes == 0:
@@ -73,14 +74,14 @@ def _row(configurations: Reals, i: int) -> SectionConfiguration:
     return row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8]
 
 
-@kernel
+@inner_kernel
 def _angle(configuration: SectionConfiguration, side: float, rho: float, X: float) -> float:
     """phi at which the configuration reaches a point of the section."""
     phi: float = configuration[2] + side * np.arccos(min(1.0, max(-1.0, X / max(rho, 1e-12))))
     return phi
 
 
-@kernel
+@inner_kernel
 def _cover(
     arm: SectionArm, configuration: SectionConfiguration, side: float, cell: Cell, arcs: Reals, count: int
 ) -> int:
@@ -89,7 +90,7 @@ def _cover(
     return _take(arm, low, high, arcs, count) if filled else count
 
 
-@kernel
+@inner_kernel
 def _take(arm: SectionArm, low: float, high: float, arcs: Reals, count: int) -> int:
     """Take what joint 1 brings the angles from ``low`` to ``high`` to, for all of them, out of the arcs."""
     if arm.full_turn:
@@ -100,7 +101,7 @@ def _take(arm: SectionArm, low: float, high: float, arcs: Reals, count: int) -> 
     return count
 
 
-@kernel
+@inner_kernel
 def _fill(
     arm: SectionArm, cell: Cell, grid: ConfigurationGrid, arcs: Reals, count: int, best: Best, witness: Reals
 ) -> int:
@@ -174,7 +175,7 @@ def _fill(
     return count
 
 
-@kernel
+@inner_kernel
 def _exclude(
     arm: SectionArm, cell: Cell, most_boxes: int, arcs: Reals, count: int, parent: Known, memory: tuple[Reals, Reals]
 ) -> tuple[int, int]:

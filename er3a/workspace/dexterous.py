@@ -16,7 +16,7 @@ from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Reals, Words
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import SECTORS, cell_frame
 from er3a.workspace.directions import Roll, left_to_roll, point_tool, tool_rotations
@@ -116,7 +116,7 @@ def _arc(first: int, many: int) -> np.uint64:
     return (bits << by) | (bits >> (np.uint64(SECTORS) - by))
 
 
-@kernel
+@inner_kernel
 def _sectors(ranges: Reals, branch: _Found) -> tuple[np.uint64, np.uint64]:
     """Masks of the sectors where some branch is good, and where none is."""
     good, maybe, (state, theta_1) = _NONE, _NONE, branch
@@ -191,7 +191,7 @@ def _judge(
     return used
 
 
-@kernel
+@inner_kernel
 def _not_out(
     asked: _Asked, T: Reals, against: Reals, radius: float, numbers: _Numbers, rest: np.uint64, branch: _Found
 ) -> tuple[np.uint64, int]:
@@ -215,7 +215,7 @@ def _not_out(
     return rest, used
 
 
-@kernel
+@inner_kernel
 def _halve(stack: Reals, top: int, p_0: float, p_1: float, a_0: float, a_1: float, across: bool) -> int:
     """Push both halves of a patch; returns the new height of the stack."""
     middle = 0.5 * (p_0 + p_1) if across else 0.5 * (a_0 + a_1)

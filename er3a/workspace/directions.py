@@ -14,7 +14,7 @@ import numpy as np
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel
 from er3a.robots.robot import Robot
 
 _ON_AXIS = 1e-12
@@ -130,7 +130,7 @@ def poses(points: Reals, rotations: Reals) -> Reals:
     return T
 
 
-@kernel
+@inner_kernel
 def point_tool(T: Reals, frame: Reals, polar: float, around: float, c_roll: float, s_roll: float) -> None:
     """Turn a pose (4, 4): its z axis at angles (rad) from and around z of a frame (columns x, y, z), rolled."""
     cp, sp, ca, sa = np.cos(polar), np.sin(polar), np.cos(around), np.sin(around)

@@ -26,7 +26,7 @@ import numpy as np
 
 from er3a.geometry.vectors import cross, dot, subtract
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel
 from er3a.workspace.section_arm import ROUND_OFF, Cell, SectionArm, along_change, turned, wrist_and_forearm
 
 STACK = 512
@@ -34,7 +34,7 @@ _SMALL = 0.1
 """Boxes that move the tool point less than this share of the cell end the attempt."""
 
 
-@kernel
+@inner_kernel
 def zone_distance(arm: SectionArm, along: float, across: float, length: float) -> float:
     """Distance (m) to the outer zone of a point at ``length`` from W, ``along`` f and ``across`` it."""
     if along > length * arm.outer_high:
@@ -48,13 +48,13 @@ def zone_distance(arm: SectionArm, along: float, across: float, length: float) -
     return abs(length - arm.d)
 
 
-@kernel
+@inner_kernel
 def _chord(half_width: float) -> float:
     """How far a turn by up to ``half_width`` moves a point at distance 1."""
     return 2.0 * np.sin(0.5 * half_width) if half_width < np.pi else 2.0
 
 
-@kernel
+@inner_kernel
 def is_empty(
     arm: SectionArm, cell: Cell, phi_low: float, phi_high: float, most_boxes: int, stack: Reals
 ) -> tuple[bool, int]:

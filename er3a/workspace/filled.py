@@ -19,7 +19,7 @@ import numpy as np
 
 from er3a.geometry.vectors import dot
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.section_arm import ROUND_OFF, Cell, Range, SectionArm, wrist_and_forearm
 
 SectionConfiguration = tuple[float, float, float, float, float, float, float, float, float]
@@ -72,7 +72,7 @@ def slack(
     return least, X
 
 
-@kernel
+@inner_kernel
 def reached_angles(
     arm: SectionArm, configuration: SectionConfiguration, side: float, cell: Cell
 ) -> tuple[bool, float, float]:
@@ -136,12 +136,12 @@ def reached_angles(
     return True, phi_W - b, phi_W - a
 
 
-@kernel
+@inner_kernel
 def _tilted(k: float, rho: float, fixed: float, z: float, W_z: float, f_z: float) -> float:
     return k * (rho * rho + fixed + (z - W_z) ** 2) + f_z * z
 
 
-@kernel
+@inner_kernel
 def _neighbour(
     arm: SectionArm, configuration: SectionConfiguration, move: int, step_2: float, step_3: float
 ) -> SectionConfiguration:
@@ -172,7 +172,7 @@ def climb(
     return configuration
 
 
-@kernel
+@inner_kernel
 def turn_aside(
     arm: SectionArm, configuration: SectionConfiguration, side: float, cell: Cell, steps: Range, sense: int
 ) -> SectionConfiguration:

@@ -15,7 +15,7 @@ from er3a.geometry.transforms import rot_z, translation
 from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
 from er3a.workspace.directions import across
@@ -219,7 +219,7 @@ def _freed(arm: GeneralArm, ends: Reals) -> GeneralArm:
     )
 
 
-@kernel
+@inner_kernel
 def own_range(arm: GeneralArm, v: Reals) -> tuple[float, float]:
     """How far joint 1 goes (lowest and highest x[0]) with the others at ``v``; none if the first is the greater."""
     low, high = arm.lower[0], arm.upper[0]

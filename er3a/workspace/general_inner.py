@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.numerics.arrays import Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.azimuths import TURN, measure, meets, remove
 from er3a.workspace.general_arm import GeneralArm, curvature, own_range, place, point_of
 from er3a.workspace.section_arm import ROUND_OFF, Cell
@@ -111,13 +111,13 @@ def memory(arm: GeneralArm) -> Memory:
     )
 
 
-@kernel
+@inner_kernel
 def _radius(arm: GeneralArm, x: float, y: float) -> float:
     """Distance from axis 1 (m), or the place across bars."""
     return x if arm.bar > 0.0 else np.sqrt(x * x + y * y)
 
 
-@kernel
+@inner_kernel
 def _azimuth(arm: GeneralArm, x: float, y: float) -> float:
     """Azimuth about axis 1 (rad), or the place along bars."""
     return y * TURN / arm.bar if arm.bar > 0.0 else np.arctan2(y, x)
@@ -232,7 +232,7 @@ def _directions(memory: Memory, hold: float) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def _approach(arm: GeneralArm, rho: float, z: float, near: float, hold: float, memory: Memory) -> bool:
     """Move ``memory.v`` until the tool point is within ``near`` (m) of a point of the section; sets the directions."""
     best = np.inf
@@ -257,7 +257,7 @@ def _approach(arm: GeneralArm, rho: float, z: float, near: float, hold: float, m
     return False
 
 
-@kernel
+@inner_kernel
 def _misses(x_0: float, y_0: float, x_1: float, y_1: float, w: float, h: float) -> bool:
     """Whether a segment misses the rectangle of half-widths w and h about the origin."""
     if min(x_0, x_1) > w or max(x_0, x_1) < -w or min(y_0, y_1) > h or max(y_0, y_1) < -h:
@@ -265,7 +265,7 @@ def _misses(x_0: float, y_0: float, x_1: float, y_1: float, w: float, h: float) 
     return bool(abs(x_0 * y_1 - x_1 * y_0) > abs(y_1 - y_0) * w + abs(x_1 - x_0) * h)
 
 
-@kernel
+@inner_kernel
 def _winds(arm: GeneralArm, cell: Cell, across: float, up: float, memory: Memory) -> bool:
     """Whether the parallelogram of so much (m) about ``memory.v`` winds around a rectangle; keeps its corners."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
@@ -311,7 +311,7 @@ def _winds(arm: GeneralArm, cell: Cell, across: float, up: float, memory: Memory
     return winding != 0
 
 
-@kernel
+@inner_kernel
 def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float, float]:
     """Range of azimuths (rad) of the points that the parallelogram reaches in the rectangle, about ``memory.v``.
 
@@ -346,7 +346,7 @@ def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float,
     return True, middle + np.arcsin(low) - ROUND_OFF, middle + np.arcsin(high) + ROUND_OFF
 
 
-@kernel
+@inner_kernel
 def _try(
     arm: GeneralArm, cell: Cell, hold: float, known: Postures, memory: Memory, arcs: Reals, count: int, witness: Reals
 ) -> int:

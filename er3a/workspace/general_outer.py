@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.azimuths import TURN, remove
 from er3a.workspace.general_arm import GeneralArm
 from er3a.workspace.section_arm import FULL_TURN, ROUND_OFF, Cell
@@ -117,7 +117,7 @@ def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, 
                 rings.counts[i, j] = remove(rings.empty[i, j], rings.counts[i, j], a, b, True)
 
 
-@kernel
+@inner_kernel
 def _range_of(spread: Spread, rings: Rings) -> tuple[int, int, int, int]:
     """First and last ring in radius and height; none if the first is behind the last."""
     n_rho, n_z = rings.counts.shape
@@ -127,7 +127,7 @@ def _range_of(spread: Spread, rings: Rings) -> tuple[int, int, int, int]:
     return i_0, min(i_1, n_rho - 1), max(j_0, 0), min(j_1, n_z - 1)
 
 
-@kernel
+@inner_kernel
 def _within(arcs: Reals, count: int, low: float, high: float) -> bool:
     """Whether azimuths from ``low`` to ``high`` (any turn) all lie within one arc (two across azimuth 0)."""
     if high - low >= TURN:
@@ -203,7 +203,7 @@ def _meets(L: Reals, cell: Cell, angle: float, width: float, behind: Rings, bar:
     return False
 
 
-@kernel
+@inner_kernel
 def _meets_anywhere(L: Reals, cell: Cell, behind: Rings, levels: int) -> bool:
     """Whether a cell may meet what is not empty at any angle."""
     stack = np.empty((levels + 2, 2))
@@ -224,7 +224,7 @@ def _meets_anywhere(L: Reals, cell: Cell, behind: Rings, levels: int) -> bool:
     return False
 
 
-@kernel
+@inner_kernel
 def exclude(
     L: Reals, cell: Cell, ends: tuple[float, float, float], behind: Rings, arcs: Reals, count: int, flags: Flags
 ) -> int:
@@ -319,7 +319,7 @@ def _shift(still: Rings, low: float, high: float, rings: Rings) -> None:
             rings.counts[i, j] = count
 
 
-@kernel
+@inner_kernel
 def _remove_rest(empty: Reals, empty_count: int, arcs: Reals, count: int) -> int:
     """Take what is outside of ``empty`` out of the arcs."""
     at = 0.0

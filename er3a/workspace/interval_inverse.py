@@ -20,7 +20,7 @@ from er3a.geometry.vectors import Vector, cross, in_frame_of
 from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.block_inverse import in_frame_1, seen_by_wrist
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
 from er3a.workspace.section_arm import FULL_TURN
@@ -51,7 +51,7 @@ def holds(ranges: Reals, joint: int, low: float, high: float) -> bool:
     return low + shift >= least and high + shift <= most
 
 
-@kernel
+@inner_kernel
 def misses(ranges: Reals, joint: int, low: float, high: float) -> bool:
     """Whether no angle from ``low`` to ``high`` is within the joint's range, by any turn."""
     least: float = ranges[joint, 0]
@@ -62,13 +62,13 @@ def misses(ranges: Reals, joint: int, low: float, high: float) -> bool:
     return low + shift > most and high + shift - _TURN < least
 
 
-@kernel
+@inner_kernel
 def _to_frame_1(arm: BlockConstants, T: Reals, v: Vector) -> Vector:
     x, y, z = in_frame_of(T, v)
     return in_frame_1(arm.to_frame_1, x, y, z)
 
 
-@kernel
+@inner_kernel
 def _opposite(a: float, b: float, opposite: float) -> float:
     """Angle of a triangle between the sides a and b; 0 or pi where there is no triangle."""
     s = 0.5 * (a + b + opposite)
@@ -76,7 +76,7 @@ def _opposite(a: float, b: float, opposite: float) -> float:
     return angle
 
 
-@kernel
+@inner_kernel
 def _angle_range(link: float, other: float, low: float, high: float) -> tuple[float, float]:
     """Range of the angle between ``link`` and the line from axis 2 to the wrist centre, whose length is in a range."""
     first, last = _opposite(low, link, other), _opposite(high, link, other)
@@ -87,13 +87,13 @@ def _angle_range(link: float, other: float, low: float, high: float) -> tuple[fl
     return least, most
 
 
-@kernel
+@inner_kernel
 def _swing(move: float, radius: float) -> float:
     """By how much a vector of length ``radius`` can turn when its tip moves by ``move``."""
     return np.arcsin(move / radius) if move < radius else np.pi
 
 
-@kernel
+@inner_kernel
 def _tilt_to_phi_5(arm: BlockConstants, tilt: float) -> float:
     """Angle of joint 5, 0 to pi, for the angle between axes 4 and 6 (spherical triangle)."""
     b, c = np.arctan2(arm.sin_45, arm.cos_45), np.arctan2(arm.sin_56, arm.cos_56)

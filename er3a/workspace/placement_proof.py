@@ -15,7 +15,7 @@ from er3a.kinematics.block_constants import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import Roll, across, left_to_roll, point_tool
@@ -309,7 +309,7 @@ def _some(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
     return False
 
 
-@kernel
+@inner_kernel
 def _none(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
     """Whether no branch, or not the one asked for, is possible."""
     for k in range(SLOTS):

@@ -26,7 +26,7 @@ import numpy as np
 from er3a.geometry.vectors import Vector, add, cross, dot, scaled, subtract
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
 
@@ -225,7 +225,7 @@ def wrist_and_forearm(arm: SectionArm, theta_2: float, tau: float) -> tuple[Vect
     return add(arm.centre, add(upper, forearm)), turned(arm.direction, arm.axis_2, c, s)
 
 
-@kernel
+@inner_kernel
 def along_change(
     arm: SectionArm, x: Vector, x_1: Vector, theta_2: float, f: Vector, e1: float, e2: float, e3: float
 ) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.geometry.vectors import Vector, cross, dot, subtract
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.section_arm import ROUND_OFF, Cell, Range, SectionArm, along_change, turned, wrist_and_forearm
 
 DIRECTIONS = 4
@@ -27,7 +27,7 @@ def _direction(k: int) -> Vector:
     return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, -1.0))[k]
 
 
-@kernel
+@inner_kernel
 def _plan(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, cell: Cell) -> tuple[float, float]:
     """Half-length (rad) of the line that sweeps the cell, and the margin (m) by which it should succeed."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
@@ -62,7 +62,7 @@ def _plan(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, 
     return t, margin
 
 
-@kernel
+@inner_kernel
 def _sweeps(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, t: float, cell: Cell) -> bool:
     """Whether the line of half-length t provably sweeps the whole cell."""
     for sign in (-1.0, 1.0):
@@ -107,7 +107,7 @@ def _sweeps(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector
     return True
 
 
-@kernel
+@inner_kernel
 def swept_angles(
     arm: SectionArm, phi: float, theta_2: float, tau: float, cell: Cell, steps: Range
 ) -> tuple[bool, float, float]:

@@ -43,11 +43,11 @@ for stage in STAGES.values():
             results_of(stage.name),
         log:
             f"logs/{{robot}}/{stage.name}.compute.log",
-        benchmark:
-            f"logs/{{robot}}/{stage.name}.compute.tsv"
-        priority: int(stage.sampled)
+        priority: 3 if stage.name == "validation" else int(stage.sampled)
         conda:
             "../envs/er3a.yaml"
+        resources:
+            **{f"compiles_{stage.name}": 1},
         params:
             stage=stage.name,
             settings=computed_from(stage.name),

@@ -6,8 +6,7 @@ rule record:
         picture="reports/{robot}/{stage}.webp",
     log:
         "logs/{robot}/{stage}.record.log",
-    benchmark:
-        "logs/{robot}/{stage}.record.tsv"
+    priority: 4
     conda:
         "../envs/er3a.yaml"
     params:
@@ -34,8 +33,7 @@ rule report:
         ),
     log:
         "logs/{robot}/{stage}.report.log",
-    benchmark:
-        "logs/{robot}/{stage}.report.tsv"
+    priority: 4  # pages to read while the rest is computed
     conda:
         "../envs/er3a.yaml"
     params:
@@ -62,8 +60,6 @@ rule teach:
         ),
     log:
         "logs/{robot}/teach.log",
-    benchmark:
-        "logs/{robot}/teach.tsv"
     conda:
         "../envs/er3a.yaml"
     params:
@@ -99,8 +95,6 @@ rule index:
         "reports/junit.xml",
     log:
         "logs/index.log",
-    benchmark:
-        "logs/index.tsv"
     conda:
         "../envs/er3a.yaml"
     params:

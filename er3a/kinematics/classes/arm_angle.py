@@ -32,7 +32,7 @@ from er3a.kinematics.classes.spherical_joints import (
 )
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2, cos_sin
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 SLOTS = 8
 BLOCK = 64
@@ -199,7 +199,7 @@ def _dot(r: Vector, x: float, y: float, z: float) -> float:
     return r[0] * x + r[1] * y + r[2] * z
 
 
-@kernel
+@inner_kernel
 def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, size: int, w: Reals) -> None:
     """Rows 0-8 of ``w``: n, e and n x e in the frame before axis 1; 9-14 axis 7 and the vector beside it along those;
     37 the distance of S and W, 38 whether the pose is singular."""
@@ -240,7 +240,7 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
         w[38 * BLOCK + i] = 1.0 if (length < NEAR) | (distance < NEAR) else 0.0
 
 
-@kernel
+@inner_kernel
 def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
     """Joint 4 by one root (row 36, NaN if S and W are too far or near), then axis 3 before axis 1 (rows 24-29, with the
     vector beside it) and axis 7 before axis 5 (rows 30-35)."""
@@ -287,7 +287,7 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
                 w[(30 + 3 * vector + row) * BLOCK + i] = _dot(k.forearm[row], p0, p1, p2)
 
 
-@kernel
+@inner_kernel
 def _three(k: SphericalConstants, w: Reals, row: int, sign: float, out: Reals) -> None:
     for i in range(BLOCK):
         z, x = row * BLOCK + i, (row + 3) * BLOCK + i

@@ -18,7 +18,7 @@ from math import comb, factorial
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 DEGREE = 8
 TERMS = 2 * DEGREE + 1
@@ -80,7 +80,7 @@ HARMONICS, BERNSTEIN, LOCAL_BERNSTEIN = (
 SAMPLE_ANGLES = FIRST_ANGLE + 2 * np.pi * np.arange(SAMPLES) / SAMPLES
 
 
-@kernel
+@inner_kernel
 def value_and_slope(terms: Reals, angle: float) -> tuple[float, float]:
     """Value and derivative of the polynomial with coefficients 1, cos, sin, ... at an angle."""
     c, s = np.cos(angle), np.sin(angle)
@@ -92,7 +92,7 @@ def value_and_slope(terms: Reals, angle: float) -> tuple[float, float]:
     return value, slope
 
 
-@kernel
+@inner_kernel
 def _zero_between(terms: Reals, low: float, high: float, rises: bool) -> float:
     """The zero in an interval on which the values' signs differ: Newton's steps, halving where they leave it."""
     angle = 0.5 * (low + high)
@@ -112,7 +112,7 @@ def _zero_between(terms: Reals, low: float, high: float, rises: bool) -> float:
     return angle
 
 
-@kernel
+@inner_kernel
 def isolate(stack: Reals, order: int, noise: float, found: Reals, count: int) -> int:
     """Intervals of -1..1 with zeros of the polynomial whose Bernstein coefficients are ``stack[0, :order + 1]``.
 
@@ -203,7 +203,7 @@ def zeros_on_circle(terms: Reals, noise: float, found: Reals, stack: Reals) -> i
     return count
 
 
-@kernel
+@inner_kernel
 def zeros_between(values: Reals, noise: float, peak: float, low: float, high: float, found: Reals, stack: Reals) -> int:
     """The same on a short interval, from values (13,) with that noise at :data:`NODES` of it.
 

@@ -31,7 +31,7 @@ from er3a.kinematics.classes.circle_zeros import HARMONICS, SAMPLE_ANGLES, SAMPL
 from er3a.kinematics.classes.lines import NUMBERS, carry, slid_parts, turned_parts
 from er3a.kinematics.classes.links import invert_rigid
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 EQUATIONS, MONOMIALS = 6, 9
 SHIFT_4, SHIFT_5 = 0.7312, -1.1753  # angles from which halves are taken, so that no usual angle is at infinity
@@ -152,7 +152,7 @@ def left_side(links: Reals, slides: Flags, left: Reals) -> None:
                                 left[7 + 2 * b, column] += w * carried[3 * b + 1]
 
 
-@kernel
+@inner_kernel
 def _monomial(part: int, power: int, c: float, s: float, slides: bool) -> float:
     """Coefficient of C^2, C S or S^2 (``power``) in the cosine, the sine or 1 (``part``) of an angle shifted by (c, s);
     in 1, x or x^2 if the joint is prismatic, x = S / C."""
@@ -192,7 +192,7 @@ def equations_of_pose(reading: Reading, pose_link: Reals, m: Scratch) -> None:
                 m.equations[i, r, j] *= per
 
 
-@kernel
+@inner_kernel
 def _right_side(slides: bool, m: Scratch) -> None:
     """``m.right`` (3, 15): K_1^-1 Rz(-x_1) K_6^-1 axis = cos right[0] + sin right[1] + right[2]; of a prismatic joint 1
     x^2 and x stand for cos and sin."""
@@ -214,7 +214,7 @@ def _right_side(slides: bool, m: Scratch) -> None:
         carry(K, parts[i], m.right[i])
 
 
-@kernel
+@inner_kernel
 def _without_first_joint(left: Reals, slides: Flags, m: Scratch) -> None:
     """Four equations from the rows along joint 2: two reflections take cos x_1 and sin x_1 out of all but two rows.
 
@@ -260,7 +260,7 @@ def _without_first_joint(left: Reals, slides: Flags, m: Scratch) -> None:
                     m.equations[2, r, 3 * i + j] -= A[2 + r, 2]
 
 
-@kernel
+@inner_kernel
 def _without_second_joint(left: Reals, m: Scratch) -> None:
     """Two equations from the rows across joint 2: the complex row that is orthogonal to the right side's columns."""
     B, normal, v = np.empty((4, 3), np.complex128), np.zeros((3, 4), np.complex128), np.zeros(4, np.complex128)
@@ -305,7 +305,7 @@ def _without_second_joint(left: Reals, m: Scratch) -> None:
             m.equations[i, 4, j], m.equations[i, 5, j] = re, im
 
 
-@kernel
+@inner_kernel
 def at_angle(equations: Reals, angle: float, F: Reals) -> None:
     """The equations (6, 9) at one value of the hidden joint."""
     c, s = np.cos(angle), np.sin(angle)
@@ -314,7 +314,7 @@ def at_angle(equations: Reals, angle: float, F: Reals) -> None:
             F[r, j] = c * equations[0, r, j] + s * equations[1, r, j] + equations[2, r, j]
 
 
-@kernel
+@inner_kernel
 def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
     """``M`` (9, 9), singular where the twelve equations are, from equations F (6, 9), which it changes.
 
@@ -376,7 +376,7 @@ def determinant(M: Reals) -> tuple[float, float]:
     return value, least
 
 
-@kernel
+@inner_kernel
 def determinant_at(equations: Reals, angle: float, F: Reals, M: Reals) -> tuple[float, float]:
     """The determinant of the twelve equations at an angle, and about how much of it is rounding."""
     at_angle(equations, angle, F)

@@ -14,7 +14,7 @@ References
 from __future__ import annotations
 
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 NUMBERS = 15
 
@@ -46,7 +46,7 @@ def carry(K: Reals, v: Reals, out: Reals) -> None:
     out[2] += t2 * v[14]
 
 
-@kernel
+@inner_kernel
 def turned_parts(v: Reals, parts: Reals) -> None:
     """``parts`` (3, 15) with ``Rz(angle) v = cos(angle) parts[0] + sin(angle) parts[1] + parts[2]``."""
     parts[:, :] = 0.0
@@ -57,7 +57,7 @@ def turned_parts(v: Reals, parts: Reals) -> None:
     parts[2, 12], parts[2, 13], parts[2, 14] = v[12], v[13], v[14]
 
 
-@kernel
+@inner_kernel
 def slid_parts(v: Reals, parts: Reals) -> None:
     """``parts`` (3, 15) with ``Tz(x) v = parts[0] + x parts[1] + x^2 parts[2]``."""
     parts[:, :] = 0.0

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel
 
 
 def links_of_rows(a: Reals, alpha: Reals, d: Reals, offset: Reals | None = None) -> Reals:
@@ -80,7 +80,7 @@ def inverse_rigid(K: Reals) -> Reals:
     return out
 
 
-@kernel
+@inner_kernel
 def multiply_rigid(A: Reals, B: Reals, out: Reals) -> None:
     """``out`` = A B of rigid transforms; ``out`` must be neither of them."""
     for i in range(3):
@@ -90,7 +90,7 @@ def multiply_rigid(A: Reals, B: Reals, out: Reals) -> None:
     out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
 
 
-@kernel
+@inner_kernel
 def invert_rigid(A: Reals, out: Reals) -> None:
     """``out`` = inverse of a rigid transform."""
     for i in range(3):
@@ -100,7 +100,7 @@ def invert_rigid(A: Reals, out: Reals) -> None:
     out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
 
 
-@kernel
+@inner_kernel
 def turn_behind(A: Reals, c: float, s: float) -> None:
     """A becomes A Rz for the angle with cosine c and sine s."""
     for i in range(3):

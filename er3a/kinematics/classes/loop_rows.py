@@ -24,7 +24,7 @@ from er3a.kinematics.classes.hidden_joint import (
 )
 from er3a.kinematics.classes.links import multiply_rigid, turn_behind
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 MOST_ZEROS = 48
 MOST_DARK = 64
@@ -133,7 +133,7 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
     return count
 
 
-@kernel
+@inner_kernel
 def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:
     """Angles of joints 4 and 5 at a zero, into ``m.pairs``: from null vectors of the nine equations."""
     at_angle(e.equations, angle, m.F)
@@ -174,7 +174,7 @@ def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:
     return count
 
 
-@kernel
+@inner_kernel
 def _null_vector(M: Reals, order: Integers, last: int, y: Reals) -> None:
     """Null vector of the reduced equations with 1 at place ``last`` and 0 behind it."""
     y[:] = 0.0
@@ -186,7 +186,7 @@ def _null_vector(M: Reals, order: Integers, last: int, y: Reals) -> None:
         y[order[k]] = total / M[k, k] if M[k, k] != 0.0 else 0.0
 
 
-@kernel
+@inner_kernel
 def _null_vector_of_both(M: Reals, order: Integers, y: Reals) -> None:
     """Null vector with 1 at the last place and 0 at the one before it, where both have no pivot."""
     y[:] = 0.0
@@ -198,7 +198,7 @@ def _null_vector_of_both(M: Reals, order: Integers, y: Reals) -> None:
         y[order[k]] = total / M[k, k] if M[k, k] != 0.0 else 0.0
 
 
-@kernel
+@inner_kernel
 def _angles_of(y: Reals, slides: Flags) -> tuple[float, float]:
     """The two angles (or lengths) whose half-angle squares and products are nearest to y (3 x 3)."""
     row, column, best = 0, 0, -1.0
@@ -214,14 +214,14 @@ def _angles_of(y: Reals, slides: Flags) -> tuple[float, float]:
     )
 
 
-@kernel
+@inner_kernel
 def _angle_of(cc: float, cs: float, ss: float) -> float:
     sign = 1.0 if cc + ss >= 0.0 else -1.0
     angle: float = np.arctan2(2.0 * cs * sign, (cc - ss) * sign)
     return angle
 
 
-@kernel
+@inner_kernel
 def _pencil(Y: Reals, step: int, slides: Flags, pairs: Reals, count: int) -> int:
     """Combinations of two null vectors that belong to one angle: entries one power further are tan(half) times.
 
@@ -268,7 +268,7 @@ def _pencil(Y: Reals, step: int, slides: Flags, pairs: Reals, count: int) -> int
     return count
 
 
-@kernel
+@inner_kernel
 def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:
     """Joints 1, 2 and 6 for joints 3, 4, 5 in ``m.x[0]``; two rows of ``m.x`` where the first is not told by one."""
     x = m.x[0]
@@ -321,7 +321,7 @@ def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:
     return count
 
 
-@kernel
+@inner_kernel
 def _first_shift(square: float, linear: float, alone: float, b0: float, b1: float, x: Reals) -> int:
     """Joint 1 that slides, from ``square x^2 + linear x = b0`` and ``alone x = b1``, into ``x`` (2, 6); how many."""
     if abs(alone) > 1e-5 * (abs(square) + abs(linear)):
@@ -334,7 +334,7 @@ def _first_shift(square: float, linear: float, alone: float, b0: float, b1: floa
     return 2
 
 
-@kernel
+@inner_kernel
 def _second_and_last(e: Scratch, across: Reals, slides: Flags, x: Reals) -> None:
     c, s = (x[0] * x[0], x[0]) if slides[0] else (np.cos(x[0]), np.sin(x[0]))
     re, im = 0.0, 0.0

@@ -32,7 +32,7 @@ from er3a.kinematics.classes.polish import newton
 from er3a.kinematics.classes.spherical_joints import Rows, about_x, about_z, vector_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 SLOTS = 8
 BLOCK = 64
@@ -194,7 +194,7 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
             marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
 
 
-@kernel
+@inner_kernel
 def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Reals) -> None:
     """W, axis 6 and the vector beside it in the arm's frame."""
     for i in range(BLOCK):
@@ -238,7 +238,7 @@ def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, sl
             side[(4 + 3 * vector) * BLOCK + i] = k.sin_lean * u + k.cos_lean * vz
 
 
-@kernel
+@inner_kernel
 def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float, out: Reals) -> None:
     """All joints of both elbows for one root of joint 5."""
     sum_s, sum_c = k.half_sum

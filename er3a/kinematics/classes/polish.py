@@ -11,7 +11,7 @@ import numpy as np
 
 from er3a.kinematics.classes.links import multiply_rigid, turn_behind
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 SOLVES = 1e-12  # residual, rad and parts of the chain's size
 LEAST_PIVOT = 1e-9
@@ -20,7 +20,7 @@ NEAR_FOLD = 2e-2
 PROBE = 1e-2
 
 
-@kernel
+@inner_kernel
 def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: Reals, J: Reals) -> float:
     """Fill ``J`` (6, 7), its last column the pose error; returns the error's largest component.
 
@@ -70,7 +70,7 @@ def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: R
     return largest
 
 
-@kernel
+@inner_kernel
 def eliminate(J: Reals, columns: Integers) -> float:
     """Reduce J (6, 7) by complete pivoting; returns the ratio of the last pivot to the first."""
     for k in range(6):
@@ -112,7 +112,7 @@ def _step(J: Reals, columns: Integers, dq: Reals) -> None:
         dq[columns[k]] = total / J[k, k] if abs(J[k, k]) > LEAST_PIVOT * first else 0.0
 
 
-@kernel
+@inner_kernel
 def newton(
     links: Reals, sliding: Flags, T: Reals, q: Reals, most: int, w: Reals, J: Reals, dq: Reals, columns: Integers
 ) -> tuple[float, float]:
@@ -151,7 +151,7 @@ def newton(
     return error, pivot
 
 
-@kernel
+@inner_kernel
 def twin_start(
     links: Reals, sliding: Flags, T: Reals, q: Reals, start: Reals, w: Reals, J: Reals, columns: Integers
 ) -> bool:

@@ -20,7 +20,7 @@ import numpy as np
 from er3a.geometry.angles import TURN
 from er3a.kinematics.classes.links import multiply_rigid, turn_behind
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 STEP = np.radians(2.0)  # greatest joint move between two points of a curve
 MOST_POINTS = 1200
@@ -81,7 +81,7 @@ def error_and_jacobian(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     return max(largest, 1.0) if trace < 0.0 else largest
 
 
-@kernel
+@inner_kernel
 def _without_what_is_open(T: Reals, task: int, frame: Reals, e: Reals, J: Reals) -> float:
     """Take what the task leaves open out of the error and the Jacobian; returns the cosine between the z axes, 1 if
     orientation is open."""
@@ -103,7 +103,7 @@ def _without_what_is_open(T: Reals, task: int, frame: Reals, e: Reals, J: Reals)
     return cosine
 
 
-@kernel
+@inner_kernel
 def least_step(J: Reals, e: Reals, out: Reals) -> bool:
     """``out`` (n,) = the shortest x with ``J x = e`` by factors of ``J J^T``; False if J is nearly dependent."""
     n = J.shape[1]
@@ -169,7 +169,7 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
     return dimension
 
 
-@kernel
+@inner_kernel
 def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     """Newton's steps of least length; returns the error that is left."""
     least, step = np.inf, np.empty(x.shape[0])
@@ -297,7 +297,7 @@ def between(posed: Posed, points: Reals, at: Reals, out: Reals) -> None:
             out[i] = np.nan
 
 
-@kernel
+@inner_kernel
 def _to_rounding(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     """Onto a curve, or to a root where the Jacobian is nearly singular: there each step halves what is missing."""
     error = onto_curve(posed, x, e, J)

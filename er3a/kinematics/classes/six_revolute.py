@@ -24,7 +24,7 @@ from er3a.kinematics.classes.links import inverse_rigid, invert_rigid, multiply_
 from er3a.kinematics.classes.loop_rows import LoopMemory, hidden_angles, new_memory, pairs_at, remaining_joints
 from er3a.kinematics.classes.polish import SOLVES, newton, residual_and_jacobian, twin_start
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 SLOTS = 16
 SAME_ZERO = 1e-9  # rad: zeros of two intervals that overlap
@@ -260,7 +260,7 @@ def in_order(q: Reals, count: Integers) -> None:
                     q[n, r, k], q[n, least, k] = q[n, least, k], q[n, r, k]
 
 
-@kernel
+@inner_kernel
 def _by_reading(
     reading: Reading, links: Reals, pose: Reals, pose_link: Reals, m: LoopMemory, q: Reals, rows: int
 ) -> tuple[int, int, float]:

@@ -14,7 +14,7 @@ import numpy as np
 from er3a.geometry.vectors import Vector
 from er3a.numerics.arrays import Reals
 from er3a.numerics.fast_math import arctan2
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel
 
 Rows = tuple[Vector, Vector, Vector]
 
@@ -89,7 +89,7 @@ def rows_of_vectors(array: Reals) -> Rows:
     return vector_of(array[0]), vector_of(array[1]), vector_of(array[2])
 
 
-@kernel
+@inner_kernel
 def three_angles(
     k: SphericalConstants, zx: float, zy: float, zz: float, xx: float, xy: float, xz: float, sign: float
 ) -> tuple[float, float, float, float, float]:

@@ -37,7 +37,7 @@ from er3a.kinematics.classes.six_revolute import (
     all_rows,
 )
 from er3a.numerics.arrays import Complexes, Flags, Integers, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 TRIALS = 24
 MOST_READINGS = 3  # that tell something, for a pose in doubt
@@ -197,7 +197,7 @@ def _zeros(terms: Reals, degree: int) -> Reals:
     return out
 
 
-@kernel
+@inner_kernel
 def _loop_of(reading: SlideReading, pose_link: Reals, links: Reals, A: Reals) -> None:
     """Fill ``links`` (6, 4, 4) of the loop and the rotations ``A`` (4, 3, 3) behind each joint that turns."""
     for i in range(6):
@@ -224,7 +224,7 @@ def _loop_of(reading: SlideReading, pose_link: Reals, links: Reals, A: Reals) ->
             A[at] = A[at].copy() @ np.ascontiguousarray(links[i, :3, :3])
 
 
-@kernel
+@inner_kernel
 def _second_angle(A: Reals, c1: float, s1: float) -> tuple[float, float, float]:
     """a, b, c of ``a cos x_2 + b sin x_2 + c = 0``, which keeps the angle between the axes of joints 3 and 4."""
     r0 = A[3, 2, 0] * c1 + A[3, 2, 1] * s1
@@ -237,7 +237,7 @@ def _second_angle(A: Reals, c1: float, s1: float) -> tuple[float, float, float]:
     return t0 * w0 + t1 * w1, t1 * w0 - t0 * w1, t2 * w2 - A[2, 2, 2]
 
 
-@kernel
+@inner_kernel
 def _others(A: Reals, turns: Complexes) -> None:
     """Fill rows 2 and 3 of ``turns`` (4, 2), complex cosine and sine of each joint, from rows 0 and 1."""
     M = np.zeros((3, 3), np.complex128)
@@ -258,7 +258,7 @@ def _others(A: Reals, turns: Complexes) -> None:
     turns[2, 0], turns[2, 1] = (h0 * M[2, 0] + h1 * M[2, 1]) * per, (h0 * M[2, 1] - h1 * M[2, 0]) * per
 
 
-@kernel
+@inner_kernel
 def _ends(links: Reals, slides: Flags, turns: Complexes, ways: Complexes) -> complex:
     """The determinant of both sliding directions and of where the loop ends with the slides at 0, which are the rows
     of ``ways`` (3, 3), complex."""
@@ -379,7 +379,7 @@ def _rows(
         verdicts[i] = verdict
 
 
-@kernel
+@inner_kernel
 def _as_joints(reading: SlideReading, turns: Complexes, ways: Complexes, x: Reals) -> None:
     """Fill x (6,) with the arm's joints: angles of ``turns``, slides that bring the loop's end back."""
     u, v, p = ways[0].real, ways[1].real, ways[2].real

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import traceback
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -39,6 +40,10 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
     import_module(stage.verdict_messages)
     results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
     write_results(folder, study, robot, stage, results, say)
+    if not isinstance(results, AbsentResults):
+        with suppress(OSError):
+            stage.compiled.parent.mkdir(parents=True, exist_ok=True)
+            stage.compiled.touch()
     return say(results.summary.verdict.finding) if isinstance(results, AbsentResults) else None
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from er3a.files.yaml_file import StrictModel
 from er3a.findings import Finding
+from er3a.numerics.jit import cache_folder
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.tables import table_types
 from er3a.robots.robot import Robot
@@ -111,6 +112,11 @@ class Stage:
     def verdict_messages(self) -> str:
         """The module that makes a sentence of the stage's verdict."""
         return f"er3a.pipeline.messages.{self.name}_verdict"
+
+    @property
+    def compiled(self) -> Path:
+        """The file that says that this stage's kernels have been compiled on this machine: it was computed once."""
+        return cache_folder() / "computed" / f"{self.name}-{self.digest('compute')[:16]}"
 
     def digest(self, verb: str) -> str:
         """The digest of what a verb's outcome depends on: its own modules, and the sentences of the verdict."""

@@ -20,7 +20,7 @@ from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import rows_of, step_row, turn_row
 from er3a.kinematics.singularity import characteristic_length
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.planning.avoidance.avoidance_findings import BeginsOutOfReach, NoDampingSuffices, NotPossible
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
 from er3a.planning.timing import Timed, joined, through
@@ -88,7 +88,7 @@ def _damped_steps(
                 q[n + 1, j] += vt[k, j] * along
 
 
-@kernel
+@inner_kernel
 def _pull(tool: tuple[Row, Row, Row], now: Reals, then: Reals, gain: float, length: float, wanted: Reals) -> None:
     """The step (6,) asked for: from one target to the next, and ``gain`` times from the tool to the target now."""
     for r in range(3):
@@ -101,7 +101,7 @@ def _pull(tool: tuple[Row, Row, Row], now: Reals, then: Reals, gain: float, leng
             wanted[3 + r] += 0.5 * gain * (tool[a][c] * now[b, c] - tool[b][c] * now[a, c])
 
 
-@kernel
+@inner_kernel
 def _scaled_jacobian(
     q: Reals, direction: Reals, offset: Reals, links: Reals, length: float, J: Reals
 ) -> tuple[Row, Row, Row]:
