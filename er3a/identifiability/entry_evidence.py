@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from er3a.by_value import ByValue
 from er3a.identifiability.alternatives import Alternative
 from er3a.identifiability.entries import EntryUnit, column_of
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
@@ -78,7 +79,7 @@ class EntryEvidence:
 
 
 @dataclass(frozen=True, eq=False)
-class OtherTable:
+class OtherTable(ByValue):
     """Another table (a batch of one): the one that evidence describes where it excludes the robot's, or one that it
     can't tell from the robot's, with all that is open at once."""
 
@@ -87,7 +88,7 @@ class OtherTable:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class Evidence(ByValue):
     """What references say about a table.
 
     Attributes

@@ -28,6 +28,7 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from er3a.by_value import ByValue
 from er3a.errors import ResultError
 from er3a.files.grades import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
@@ -83,7 +84,7 @@ ResultsT = TypeVar("ResultsT", bound="Results[Any]")
 
 
 @dataclass(frozen=True, eq=False)
-class Results(Generic[SummaryT]):
+class Results(ByValue, Generic[SummaryT]):
     """A stage's results: its summary, and the tables that a subclass adds."""
 
     summary: SummaryT
@@ -109,7 +110,7 @@ class Provenance:
 
 
 @dataclass(frozen=True, eq=False)
-class Stored(Generic[ResultsT]):
+class Stored(ByValue, Generic[ResultsT]):
     """Results as they were read, and where they come from.
 
     Attributes
