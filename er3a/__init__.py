@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from er3a.dynamics.torques import mass_matrix as mass_matrix
     from er3a.dynamics.torques import torques as torques
     from er3a.errors import Er3aError as Er3aError
+    from er3a.errors import InputWarning as InputWarning
     from er3a.files.by_name import calibrate as calibrate
     from er3a.files.by_name import diagnose as diagnose
     from er3a.files.by_name import evidence as evidence
@@ -79,6 +80,7 @@ _PUBLIC = {
     "write_program": "er3a.programs.write_program",
     "WriteOptions": "er3a.programs.writing",
     "Er3aError": "er3a.errors",
+    "InputWarning": "er3a.errors",
 }
 
 __all__ = list(_PUBLIC)
