@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from er3a.files.hand_eye_file import load_hand_eye as load_hand_eye
     from er3a.files.measurements import load_measurements as load_measurements
     from er3a.files.reference_sets import load_references as load_references
+    from er3a.files.result_table import load_table as load_table
     from er3a.files.robot_library import load_robot as load_robot
     from er3a.files.scene_file import load_scene as load_scene
     from er3a.files.target_file import load_targets as load_targets
@@ -65,6 +66,7 @@ _PUBLIC = {
     "evidence": "er3a.files.by_name",
     "calibrate": "er3a.files.by_name",
     "load_measurements": "er3a.files.measurements",
+    "load_table": "er3a.files.result_table",
     "load_references": "er3a.files.reference_sets",
     "load_hand_eye": "er3a.files.hand_eye_file",
     "CalibrationSet": "er3a.vision.calibration_set",

@@ -2,8 +2,8 @@
 
 Public functions are those that ``er3a`` names. Arguments of er3a's own types are compared with the function's
 annotations, robots are asked for numbers that can't be an arm's, and joint values for NaN and for degrees
-(:mod:`er3a.robots.usable`). Other arrays are checked by the functions themselves. The same functions inside the library take what they are given, because validation computes
-with tables that no arm can have.
+(:mod:`er3a.robots.usable`). Other arrays are checked by the functions themselves. The same functions inside the library
+take what they are given, because validation computes with tables that no arm can have.
 """
 
 from __future__ import annotations
