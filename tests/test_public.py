@@ -305,6 +305,11 @@ def shown_objects(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
     }
 
 
+@pytest.fixture(scope="module")
+def shown(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
+    return shown_objects(arm, pose)
+
+
 class Cells(html.parser.HTMLParser):
     """The numbers of cells in the rows of a table."""
 
@@ -319,9 +324,10 @@ class Cells(html.parser.HTMLParser):
             self.rows[-1] += 1
 
 
-def test_objects_show_themselves_in_a_few_lines_and_as_tables(arm, pose):
-    shown = {name: each for name, each in shown_objects(arm, pose).items() if isinstance(each, Displayed | Measurement)}
+def test_objects_show_themselves_in_a_few_lines_and_as_tables(shown):
     for name, each in shown.items():
+        if not isinstance(each, Displayed | Measurement):
+            continue
         text = repr(each)
         assert len(text) < MOST_LETTERS, name
         assert text.count("\n") < 40, name
@@ -339,8 +345,8 @@ COPIES: dict[str, Callable[[Any], Any]] = {
 }
 
 
-def test_every_public_object_equals_its_copies_and_hashes_alike(arm, pose):
-    for name, each in shown_objects(arm, pose).items():
+def test_every_public_object_equals_its_copies_and_hashes_alike(shown):
+    for name, each in shown.items():
         for way, made in COPIES.items():
             again = made(each)
             assert again is not each, (name, way)
@@ -349,8 +355,8 @@ def test_every_public_object_equals_its_copies_and_hashes_alike(arm, pose):
                 assert hash(again) == hash(each), (name, way)
 
 
-def test_all_that_public_objects_hold_can_be_compared(arm, pose):
-    left, met = list(shown_objects(arm, pose).values()), list[Any]()
+def test_all_that_public_objects_hold_can_be_compared(shown):
+    left, met = list(shown.values()), list[Any]()
     seen: set[int] = set()
     while left:
         each = left.pop()

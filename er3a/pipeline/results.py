@@ -187,7 +187,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     rests_on: dict[str, Status] = {
         name: _record(folder.parent / name)["verdict"]["status"]
         for name in stage.rests_on
-        if (folder.parent / name / SUMMARY).exists()
+        if is_computed(folder.parent / name)
     }
     if record["verdict"]["status"] == "not_computed":
         absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))
@@ -201,6 +201,11 @@ def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
     kinds = {str(kind.code): kind for kind in known}
     found: Finding = _adapter(kinds[verdict["code"]]).validate_python(verdict["params"])
     return found
+
+
+def is_computed(folder: Path) -> bool:
+    """Whether a folder holds a stage's results, be they that it could not be computed."""
+    return (folder / SUMMARY).is_file()
 
 
 def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:
