@@ -8,10 +8,17 @@ from __future__ import annotations
 
 import fcntl
 import os
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Sequence
+from contextlib import redirect_stderr, suppress
+from io import StringIO
 from pathlib import Path
+from typing import Any
+
+import psutil
 
 from er3a.errors import Er3aError
 from er3a.files.kept_files import half_written
@@ -20,6 +27,7 @@ from er3a.pipeline.check import check_study
 from er3a.pipeline.corrupted import corrupted
 
 _STATE = Path(".snakemake")
+_PATIENCE_S = 1.0
 
 
 class RunError(Er3aError):
@@ -40,10 +48,12 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     Raises
     ------
     RunError
-        another run is active, or the folder can't be written into
+        another run is active, the folder can't be written into, or Snakemake knows no such option
     InputError
         the study, or a file that it leads to, can't be used
     """
+    if _is_dry(words):
+        return _dry_run(study_file, results, reports, words)
     lock = _taken_lock()
     study = check_study(study_file)
     for path in (*half_written(results), *half_written(reports)):
@@ -58,9 +68,70 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
         unlock = [sys.executable, "-m", "snakemake", *snakemake, "--unlock", "--quiet", "all", *study_words]
         subprocess.run(unlock, check=True)
     os.set_inheritable(lock, True)  # held until the last job of this run has ended
+    _end_on_sigterm(results, reports)
     sys.stdout.flush()
     plain = ["--nocolor"] if os.environ.get("NO_COLOR") else []
     return _snakemake([*snakemake, *plain, *words, *study_words])
+
+
+def _is_dry(words: Sequence[str]) -> bool:
+    """Whether Snakemake is asked to do nothing but say what it would do: ``-n``, ``-np``, ``--dry-run`` ..."""
+    from snakemake.cli import get_argument_parser
+    from snakemake.exceptions import CliException
+
+    said = StringIO()
+    try:
+        with redirect_stderr(said):
+            asked = get_argument_parser().parse_args(list(words))
+    except CliException as error:
+        raise RunError(" ".join(str(error).split())) from None
+    except SystemExit as end:
+        if not end.code:
+            raise
+        problem = said.getvalue().strip().rpartition("error: ")[2]
+        raise RunError(f"{' '.join(problem.split())}. All that it takes: snakemake --help") from None
+    return bool(asked.dryrun)
+
+
+def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str]) -> bool:
+    """Say what a run would do, and change nothing."""
+    for _, fault in corrupted(check_study(study_file), results, reports):
+        print(f"note: {fault.file}: {fault.problem}; a run makes it again", file=sys.stderr)
+    sys.stdout.flush()
+    return _snakemake(["--snakefile", str(ROOT / "Snakefile"), *words, "--nolock", "--configfile", str(study_file)])
+
+
+def _end_on_sigterm(results: Path, reports: Path) -> None:
+    """Have SIGTERM end this process and all below it at once; Snakemake would wait for the end of its jobs."""
+    from snakemake.scheduling.job_scheduler import JobScheduler
+
+    def end(*_: Any) -> None:
+        print(
+            "error: ended by SIGTERM; what is finished stays, and the same command goes on from there", file=sys.stderr
+        )
+        sys.stderr.flush()
+        silence = os.open(os.devnull, os.O_WRONLY)
+        for output in (1, 2):  # Snakemake's threads would tell of each job
+            os.dup2(silence, output)
+        _end_processes_below()
+        for path in (*half_written(results), *half_written(reports), *(_STATE / "locks").glob("*")):
+            path.unlink(missing_ok=True)
+        os._exit(128 + signal.SIGTERM)
+
+    JobScheduler.exit_gracefully = end  # type: ignore[method-assign]
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, end)
+
+
+def _end_processes_below() -> None:
+    """Ask all processes below this one to end, and end those that are still there after a moment."""
+    below = psutil.Process().children(recursive=True)
+    for ask in (psutil.Process.terminate, psutil.Process.kill):
+        for process in below:
+            with suppress(psutil.NoSuchProcess):
+                ask(process)
+        _, below = psutil.wait_procs(below, timeout=_PATIENCE_S)
+        below = list({*below, *psutil.Process().children(recursive=True)})
 
 
 def _taken_lock() -> int:
