@@ -6,6 +6,7 @@ process, so whoever gets it knows that no run is active and may clear Snakemake'
 
 from __future__ import annotations
 
+import atexit
 import fcntl
 import os
 import signal
@@ -27,7 +28,7 @@ from er3a.pipeline.check import check_study
 from er3a.pipeline.corrupted import corrupted
 
 _STATE = Path(".snakemake")
-_PATIENCE_S = 1.0
+_PATIENCE_S = 0.7
 
 
 class RunError(Er3aError):
@@ -116,7 +117,8 @@ def _end_on_sigterm(results: Path, reports: Path) -> None:
         _end_processes_below()
         for path in (*half_written(results), *half_written(reports), *(_STATE / "locks").glob("*")):
             path.unlink(missing_ok=True)
-        os._exit(128 + signal.SIGTERM)
+        atexit._run_exitfuncs()  # Snakemake's temporary folder goes
+        os._exit(128 + signal.SIGTERM)  # waits for no thread
 
     JobScheduler.exit_gracefully = end  # type: ignore[method-assign]
     if threading.current_thread() is threading.main_thread():
