@@ -113,4 +113,4 @@ def test_an_index_without_validation_says_so(study, tmp_path, monkeypatch):
     write_index(study, tmp_path / "results", tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Its table has not been examined yet" in page
-    assert "teach.html" not in page
+    assert "er3_600/teach.html" not in page
