@@ -11,12 +11,14 @@ if TYPE_CHECKING:
     from er3a.dynamics.torques import mass_matrix as mass_matrix
     from er3a.dynamics.torques import torques as torques
     from er3a.errors import Er3aError as Er3aError
+    from er3a.errors import InputWarning as InputWarning
     from er3a.files.by_name import calibrate as calibrate
     from er3a.files.by_name import diagnose as diagnose
     from er3a.files.by_name import evidence as evidence
     from er3a.files.hand_eye_file import load_hand_eye as load_hand_eye
     from er3a.files.measurements import load_measurements as load_measurements
     from er3a.files.reference_sets import load_references as load_references
+    from er3a.files.result_table import load_table as load_table
     from er3a.files.robot_library import load_robot as load_robot
     from er3a.files.scene_file import load_scene as load_scene
     from er3a.files.target_file import load_targets as load_targets
@@ -64,6 +66,7 @@ _PUBLIC = {
     "evidence": "er3a.files.by_name",
     "calibrate": "er3a.files.by_name",
     "load_measurements": "er3a.files.measurements",
+    "load_table": "er3a.files.result_table",
     "load_references": "er3a.files.reference_sets",
     "load_hand_eye": "er3a.files.hand_eye_file",
     "CalibrationSet": "er3a.vision.calibration_set",
@@ -79,6 +82,7 @@ _PUBLIC = {
     "write_program": "er3a.programs.write_program",
     "WriteOptions": "er3a.programs.writing",
     "Er3aError": "er3a.errors",
+    "InputWarning": "er3a.errors",
 }
 
 __all__ = list(_PUBLIC)

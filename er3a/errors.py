@@ -37,7 +37,7 @@ class InputError(Er3aError):
 
 
 class InputWarning(UserWarning):
-    """Something in a file that can be meant as it is written, and looks like a slip."""
+    """Something in a file or an argument that can be meant as it is written, and looks like a slip."""
 
 
 class ArgumentError(Er3aError, TypeError):

@@ -1,9 +1,9 @@
 """The edge of the library: what every public function checks before it begins.
 
 Public functions are those that ``er3a`` names. Arguments of er3a's own types are compared with the function's
-annotations, and robots are asked for numbers that can't be an arm's (:mod:`er3a.robots.usable`). Arrays are checked by
-the functions themselves. The same functions inside the library take what they are given, because validation computes
-with tables that no arm can have.
+annotations, robots are asked for numbers that can't be an arm's, and joint values for NaN and for degrees
+(:mod:`er3a.robots.usable`). Other arrays are checked by the functions themselves. The same functions inside the library
+take what they are given, because validation computes with tables that no arm can have.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 
 from er3a.errors import ArgumentError
 from er3a.robots.robot import Robot
-from er3a.robots.usable import check_robot
+from er3a.robots.usable import check_joint_values, check_robot
 
 Check = Callable[[Any], None]
 Function = TypeVar("Function", bound=Callable[..., Any])
 LOOK_FOR_CROSSED_LIMITS = {"diagnose"}
+JOINT_VALUES = ("q", "q_ref", "q0")
 CONTAINERS = (Sequence, Mapping)
 CALLED = {str: "a text", Path: "a path", NoneType: "None"}
 
@@ -29,6 +30,8 @@ CALLED = {str: "a text", Path: "a path", NoneType: "None"}
 def checked(function: Function) -> Function:
     """The function as ``er3a`` offers it: it refuses unusable arguments with an :class:`er3a.Er3aError`."""
     checks = _checks(function)
+    places = list(signature(function).parameters)
+    joints = [(places.index(name), name) for name in JOINT_VALUES if name in places and places[0] == "robot"]
 
     def public(*args: Any, **named: Any) -> Any:
         for place, name, check in checks:
@@ -36,6 +39,11 @@ def checked(function: Function) -> Function:
                 check(args[place])
             elif name in named:
                 check(named[name])
+        for place, name in joints:
+            if place < len(args):
+                check_joint_values(args[0], args[place], name)
+            elif named.get(name) is not None:
+                check_joint_values(args[0] if args else named["robot"], named[name], name)
         return function(*args, **named)
 
     update_wrapper(public, function)

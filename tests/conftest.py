@@ -88,9 +88,9 @@ class StudyRun:
         """The environment that makes the copy's package the one that is imported."""
         return os.environ | {"PYTHONPATH": str(self.folder)}
 
-    def planned(self) -> set[str]:
+    def planned(self, *words: str) -> set[str]:
         """Messages of the jobs that a run would do now, such as ``er3_600: compute workspace``."""
-        output = self.snakemake("--dry-run", "--nocolor").stdout
+        output = self.snakemake("--dry-run", "--nocolor", *words).stdout
         return set(re.findall(r"^Job \d+: (.+)$", output, flags=re.MULTILINE)) - {ALL_THERE}
 
     def _run(self, command: list[str], check: bool) -> subprocess.CompletedProcess[str]:

@@ -67,3 +67,27 @@ def test_a_study_that_names_a_missing_file_is_refused(tmp_path, monkeypatch):
     path.write_text(yaml.safe_dump(content))
     with pytest.raises(InputError, match=r"nowhere\.yaml: there is no such file"):
         check_study(path)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        *(("robots", "er3_600", key) for key in ("targets", "paths", "programs", "vision", "scene", "file")),
+        *((key, "scene") for key in ("capability", "collision", "inverse", "trajectory", "vision")),
+    ],
+    ids=".".join,
+)
+def test_each_file_that_a_study_names_is_looked_at(tmp_path, monkeypatch, place):
+    monkeypatch.chdir(ROOT)
+    elsewhere = tmp_path / "users.txt"
+    elsewhere.write_text("root:x:0:0:root:/root:/bin/sh\n")
+    content = yaml.safe_load((ROOT / "config/small.yaml").read_text())
+    content["robots"] = {"er3_600": content["robots"]["er3_600"]}
+    inner = content
+    for key in place[:-1]:
+        inner = inner.setdefault(key, {})
+    inner[place[-1]] = str(elsewhere)
+    study = tmp_path / "study.yaml"
+    study.write_text(yaml.safe_dump(content))
+    with pytest.raises(InputError, match=r"users\.txt"):
+        check_file(study)

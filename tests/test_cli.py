@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -74,6 +75,44 @@ def test_a_machine_at_its_limits_is_one_line_and_exit_code_2(monkeypatch, capsys
     assert caught.value.code == 2
     assert error.startswith(f"error: {told}")
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        ("verdicts --fail-on never", "Invalid value for '--fail-on': 'never' is not one of 'caution', 'fail'"),
+        ("run --fail-on maybe", "'maybe' is not one of 'caution', 'fail'"),
+        ("verdicts --bogus", "No such option: --bogus"),
+        ("chek", "No such command 'chek'"),
+        ("check", "Missing argument"),
+        ("sample er3_600", "Missing option '--part'"),
+        ("mesh a.stl --unit inch --output a.json", "'inch' is not one of 'm', 'mm'"),
+        ("program write x --language perl --robot er3_600", "'perl' is not one of 'krl'"),
+        ("import-urdf x --output", "requires an argument"),
+        ("run -- --cores two", "number of cores"),
+        ("run -- --bogus", "unrecognized arguments: --bogus"),
+        ("run -- --cores", "expected one argument"),
+    ],
+)
+def test_a_wrong_option_is_one_line_and_exit_code_2(monkeypatch, capsys, tmp_path, words, problem):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["er3a", *words.split()])
+    with pytest.raises(SystemExit) as caught:
+        main()
+    told = capsys.readouterr()
+    assert (caught.value.code, told.out) == (2, "")
+    assert told.err.startswith("error: ")
+    assert told.err.count("\n") == 1
+    assert problem in told.err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(autouse=True)
+def _own_sigterm():
+    """What SIGTERM does in the test's process is as before."""
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
 
 
 @pytest.mark.long

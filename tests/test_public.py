@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import ast
+import copy
 import html.parser
+import multiprocessing
 import pickle
-from collections.abc import Callable
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +25,8 @@ from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.display import Displayed, Sheet, as_html, as_text
 from er3a.files.reference_sets import load_references
 from er3a.kinematics import forward as forward_module
+from er3a.pipeline.stages.workspace.workspace_tables import GrowthCurve
+from er3a.robots.masses import Drives, Masses
 from er3a.robots.robot import Robot
 from er3a.robots.usable import check_robot
 
@@ -250,11 +258,19 @@ def test_an_unknown_name_is_an_attribute_error():
         er3a.forwards  # noqa: B018
 
 
+def exported(arm: Robot) -> Path:
+    """A robot as a URDF file."""
+    file = Path(tempfile.mkdtemp()) / "arm.urdf"
+    file.write_text(er3a.export_urdf(arm), encoding="utf-8")
+    return file
+
+
 def shown_objects(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
     """Objects of every type that a user gets."""
     far = pose.copy()
     far[0, 3] = 9.0
     solutions = er3a.inverse(arm, pose)
+    read = er3a.read_program("data/programs/weld_seam.src")
     points = [Measurement(k, tuple(np.degrees(Q) + k), "flange", (None, 0.0, 1.0), 0.1) for k in range(5000)]
     return {
         "robot": arm,
@@ -276,10 +292,22 @@ def shown_objects(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
         "scene": er3a.load_scene("data/scenes/table_and_post.yaml"),
         "calibration set": er3a.load_hand_eye("data/vision/carried_camera.yaml", arm),
         "hand-eye": er3a.calibrate_hand_eye(er3a.load_hand_eye("data/vision/carried_camera.yaml", arm)),
+        "evidence": er3a.evidence(arm),
+        "imported": er3a.import_urdf(exported(arm)),
+        "program": read,
+        "execution": er3a.execute(read),
+        "check": er3a.check_program(read, arm),
+        "options": er3a.CheckOptions(start=Q),
+        "load": er3a.Load(2.0, (0.0, 0.0, 0.1)),
         "target": er3a.load_targets("data/targets/er3_600.yaml", arm)[0],
         "measurement": points[0],
         "empty scene": Scene("nothing", ()),
     }
+
+
+@pytest.fixture(scope="module")
+def shown(arm: Robot, pose: np.ndarray) -> dict[str, Any]:
+    return shown_objects(arm, pose)
 
 
 class Cells(html.parser.HTMLParser):
@@ -296,8 +324,10 @@ class Cells(html.parser.HTMLParser):
             self.rows[-1] += 1
 
 
-def test_objects_show_themselves_in_a_few_lines_and_as_tables(arm, pose):
-    for name, each in shown_objects(arm, pose).items():
+def test_objects_show_themselves_in_a_few_lines_and_as_tables(shown):
+    for name, each in shown.items():
+        if not isinstance(each, Displayed | Measurement):
+            continue
         text = repr(each)
         assert len(text) < MOST_LETTERS, name
         assert text.count("\n") < 40, name
@@ -307,6 +337,144 @@ def test_objects_show_themselves_in_a_few_lines_and_as_tables(arm, pose):
             cells.feed(each._repr_html_())
             assert len(set(cells.rows)) <= 1, name
             assert len(each._repr_html_()) < 2 * MOST_LETTERS, name
+
+
+COPIES: dict[str, Callable[[Any], Any]] = {
+    "pickle": lambda each: pickle.loads(pickle.dumps(each)),
+    "deep copy": copy.deepcopy,
+}
+
+
+def test_every_public_object_equals_its_copies_and_hashes_alike(shown):
+    for name, each in shown.items():
+        for way, made in COPIES.items():
+            again = made(each)
+            assert again is not each, (name, way)
+            assert again == each, (name, way)
+            if not isinstance(each, list):
+                assert hash(again) == hash(each), (name, way)
+
+
+def test_all_that_public_objects_hold_can_be_compared(shown):
+    left, met = list(shown.values()), list[Any]()
+    seen: set[int] = set()
+    while left:
+        each = left.pop()
+        if id(each) in seen:
+            continue
+        seen.add(id(each))
+        met.append(each)
+        if isinstance(each, Mapping):
+            left += each.values()
+        elif isinstance(each, list | tuple):
+            left += each
+        elif isinstance(each, np.ndarray) and each.dtype == object:
+            left += each.ravel().tolist()
+        elif is_dataclass(each):
+            assert type(each).__eq__ is not object.__eq__, type(each).__name__
+            assert (each == pickle.loads(pickle.dumps(each))) is True, type(each).__name__
+            left += [getattr(each, part.name) for part in fields(each) if part.compare]
+    assert {type(each).__name__ for each in met} >= {"Robot", "Masses", "Box", "Family", "CheckedMotion", "MotionWay"}
+
+
+def test_copies_are_as_read_only_and_as_useful_as_the_robot(arm, pose):
+    for made in COPIES.values():
+        again = made(arm)
+        with pytest.raises(ValueError, match="read-only"):
+            again.a[0] = 1.0
+        with pytest.raises(TypeError):
+            again.sources["dh"] = None
+        assert (er3a.forward(again, Q) == pose).all()
+        assert er3a.inverse(again, pose) == er3a.inverse(arm, pose)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"title": "another"},
+        {"a": np.arange(6.0)},
+        {"speed": np.full(6, np.nan)},
+        {"sources": {}},
+        {"coupling": np.eye(6)},
+        {"masses": Masses(drives=Drives.unknown(6))},
+    ],
+)
+def test_robots_that_differ_are_unequal(arm, change):
+    other = arm.replace(**change)
+    assert other != arm
+    assert other == arm.replace(**change)
+    assert len({arm, other, arm.replace(**change), arm.replace()}) == 2
+
+
+def test_a_robot_is_no_array(arm):
+    assert arm != np.eye(4).tolist()
+    assert arm != "er3_600"
+
+
+@pytest.mark.long
+def test_robots_and_results_reach_a_process_that_is_started_anew(arm, pose):
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        assert (pool.submit(er3a.forward, arm, Q).result() == pose).all()
+        assert pool.submit(er3a.inverse, arm, pose).result() == er3a.inverse(arm, pose)
+
+
+NOT_FINITE = {"one row": ([0, 0, np.nan, 0, 0, 0], "q holds NaN"), "batch": (np.full((3, 6), np.inf), "q[0] holds NaN")}
+
+
+@pytest.mark.parametrize("kind", NOT_FINITE)
+@pytest.mark.parametrize("name", ["forward", "jacobian"])
+def test_joint_values_that_are_not_finite_are_refused(arm, name, kind):
+    values, message = NOT_FINITE[kind]
+    assert refusal(lambda: getattr(er3a, name)(arm, values)).startswith(message)
+    assert refusal(lambda: getattr(er3a, name)(q=values, robot=arm)).startswith(message)
+
+
+@pytest.mark.parametrize(
+    "q", [[20, 10, 15, 30, 40, 50], [0, -90, 90, 0, 45, 0], np.full((2000, 6), 60), np.eye(6) * 90]
+)
+def test_joint_values_that_can_only_be_degrees_are_warned_of(arm, q):
+    with pytest.warns(er3a.InputWarning, match=r"takes rad: np\.radians\(q\)") as caught:
+        er3a.forward(arm, q)
+    assert caught[0].filename == __file__
+    with pytest.warns(er3a.InputWarning, match="q_ref"):
+        er3a.inverse(arm, er3a.forward(arm, np.zeros(6)), np.array([0, -90, 90, 0, 45, 0]))
+
+
+def test_joint_values_that_can_be_radians_are_not_warned_of(arm, random):
+    turns = arm.replace(lower=np.full(6, -2 * np.pi), upper=np.full(6, 2 * np.pi))
+    endless = arm.replace(continuous=np.ones(6, dtype=bool))
+    sliding = arm.replace(sliding=np.arange(6) == 2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        er3a.forward(arm, random.uniform(arm.lower, arm.upper, (5000, 6)))
+        er3a.forward(arm, random.uniform(arm.lower - 4 * np.pi, arm.upper + 4 * np.pi, (5000, 6)))
+        er3a.forward(turns, random.uniform(turns.lower - 2 * np.pi, turns.upper + 2 * np.pi, (5000, 6)))
+        er3a.forward(endless, random.uniform(-300, 300, (5000, 6)))
+        er3a.forward(sliding, [0, 0, 250, 0, 0, 0])
+        er3a.forward(arm, [400, 0, 0, 0, 0, 0])  # neither rad nor deg
+
+
+def test_evidence_is_a_table_of_a_screen(arm):
+    lines = str(er3a.evidence(arm)).splitlines()
+    assert len(lines) < 15
+    assert max(map(len, lines)) <= 100
+    (open_row,) = (line.split() for line in lines if line.split()[0] == "open")
+    assert open_row == ["open", "6", "alpha6", "offset6", "direction1,4-6"]
+    counts = {line.split()[0]: int(line.split()[1]) for line in lines if line.split()[1].isdigit()}
+    found = er3a.evidence(arm)
+    assert sum(counts.values()) == len(found.entries) + len(found.combinations)
+
+
+def test_a_table_s_units_and_meanings_reach_pandas(tmp_path):
+    table = GrowthCurve.of_rows([(1.0, 2, 3.0), (4.0, 5, 6.0)])
+    table.write(tmp_path / "curve.parquet")
+    frame = er3a.load_table(tmp_path / "curve.parquet")
+    assert frame.attrs["columns"]["touched_m3"] == {"unit": "m^3", "meaning": "volume of the touched cells"}
+    assert frame.attrs == table.frame().attrs
+    assert (frame == table.frame()).all(axis=None)
+    assert GrowthCurve.read((tmp_path / "curve.parquet").read_bytes()) == table
+    assert "no Parquet file" in refusal(lambda: er3a.load_table(__file__))
+    assert "No such file" in refusal(lambda: er3a.load_table(tmp_path / "none.parquet"))
 
 
 def test_a_robot_s_table_reads_as_its_file_does(arm):

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 from lxml import etree
 
-from er3a.pipeline.verdicts import StageVerdict
+from er3a.errors import ResultError
+from er3a.pipeline.stages import run
+from er3a.pipeline.study import Study
+from er3a.pipeline.verdicts import StageVerdict, read_verdicts
+from er3a.pipeline.viewing.index import write_index
 from er3a.pipeline.viewing.junit import write_junit
+
+ROOT = Path(__file__).resolve().parents[1]
 
 SCHEMA = Path(__file__).with_name("junit.xsd")
 GOOD = StageVerdict("arm", "validation", "pass", "v.good", "All checks agree.")
@@ -17,7 +25,8 @@ BAD = StageVerdict("arm", "trajectory", "fail", "t.none_safe", "No path is safe:
 UNKNOWN = StageVerdict("other", "validation", "no_reference", "v.none", "There is nothing to check against.")
 NOT_FOR_IT = StageVerdict("other", "workspace", "not_computed", "workspace.no_reach", "Does not apply.")
 BROKEN = StageVerdict("other", "inverse", "not_computed", "stage.not_computed", "ValueError: \x1b[31m odd")
-ALL = (GOOD, CAUTION, BAD, UNKNOWN, NOT_FOR_IT, BROKEN)
+NOT_YET = StageVerdict("other", "dynamics", "not_examined", "stage.not_examined", "Not yet.")
+ALL = (GOOD, CAUTION, BAD, UNKNOWN, NOT_FOR_IT, BROKEN, NOT_YET)
 
 
 @pytest.fixture
@@ -42,6 +51,7 @@ def test_each_verdict_is_the_outcome_that_it_means(report):
         ("other", "validation"): ["skipped"],
         ("other", "workspace"): ["skipped"],
         ("other", "inverse"): ["error"],
+        ("other", "dynamics"): ["skipped"],
     }
 
 
@@ -50,8 +60,8 @@ def test_texts_and_counts(report):
     assert report.find(".//failure").get("type") == BAD.code
     assert report.findtext(".//system-out") == "caution: Usable; 2 voids."
     assert report.find(".//error").get("message") == "ValueError: ?[31m odd"
-    assert dict(report.getroot().attrib) == {"name": "er3a", "tests": "6", "failures": "1", "errors": "1"}
-    assert report.find("testsuite[@name='other']").get("skipped") == "2"
+    assert dict(report.getroot().attrib) == {"name": "er3a", "tests": "7", "failures": "1", "errors": "1"}
+    assert report.find("testsuite[@name='other']").get("skipped") == "3"
 
 
 def test_equal_verdicts_are_equal_bytes(tmp_path):
@@ -63,3 +73,44 @@ def test_equal_verdicts_are_equal_bytes(tmp_path):
 def test_what_counts_from_which_level_on():
     assert [verdict for verdict in ALL if verdict.counts("fail")] == [BAD, BROKEN]
     assert [verdict for verdict in ALL if verdict.counts("caution")] == [CAUTION, BAD, BROKEN]
+
+
+@pytest.fixture
+def study():
+    content = yaml.safe_load((ROOT / "config/small.yaml").read_text(encoding="utf-8"))
+    content["robots"] = {"er3_600": {key: content["robots"]["er3_600"][key] for key in ("targets", "paths")}}
+    return Study.model_validate(content)
+
+
+def test_a_robot_without_camera_and_programs_goes_through_neither_stage(study):
+    assert study.stages("er3_600") == ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
+
+
+@pytest.mark.long
+def test_part_of_a_study_has_verdicts_an_index_and_a_report(study, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    results, reports = tmp_path / "results", tmp_path / "reports"
+    with pytest.raises(ResultError, match=r"er3_600/validation/summary\.json: missing"):
+        read_verdicts(study, results)
+    run.compute("validation", study, "er3_600", results / "er3_600/validation")
+    first, *others = read_verdicts(study, results)
+    assert (first.stage, first.status) == ("validation", "caution")
+    assert {verdict.status for verdict in others} == {"not_examined"}
+    assert not any(verdict.counts("caution") for verdict in others)
+
+    write_index(study, results, reports)
+    page = (reports / "index.html").read_text(encoding="utf-8")
+    assert "Not examined yet: workspace, collision, inverse, trajectory, dynamics." in page
+    assert re.findall(r'href="er3_600/(\w+)\.html"', page) == ["teach", "validation"]
+    skipped = etree.parse(reports / "junit.xml").findall(".//skipped")
+    assert len(skipped) == len(others)
+
+
+@pytest.mark.long
+def test_an_index_without_validation_says_so(study, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    run.compute("dynamics", study, "er3_600", tmp_path / "results/er3_600/dynamics")
+    write_index(study, tmp_path / "results", tmp_path)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "Its table has not been examined yet" in page
+    assert "er3_600/teach.html" not in page

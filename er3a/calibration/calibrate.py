@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.calibration import outcomes
 from er3a.calibration.identifiable import Level, choose_level
 from er3a.calibration.measured import Measurement, Observations, observed
@@ -76,7 +77,7 @@ class Close:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Displayed):
+class Calibration(ByValue, Displayed):
     """A table's corrections.
 
     Attributes

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from er3a.by_value import ByValue
 from er3a.collision.core_distance import distances_from_hull
 from er3a.errors import Er3aError
 from er3a.geometry.open3d_loader import load_open3d
@@ -31,7 +32,7 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class ConvexPieces:
+class ConvexPieces(ByValue):
     """Convex pieces of a mesh.
 
     Attributes

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.display import Displayed, Sheet, first_rows, shortly
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
@@ -16,7 +17,7 @@ UNIT_LENGTH = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class Box(ByValue):
     """A box about its own middle.
 
     Attributes
@@ -38,7 +39,7 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False)
-class Cylinder:
+class Cylinder(ByValue):
     """A cylinder about its own middle, along its z axis.
 
     Attributes
@@ -61,7 +62,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere:
+class Sphere(ByValue):
     """A ball.
 
     Attributes
@@ -83,7 +84,7 @@ class Sphere:
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class Plane(ByValue):
     """A half-space: all points p with normal . p <= offset are solid.
 
     Attributes
@@ -106,7 +107,7 @@ class Plane:
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(ByValue):
     """A solid of any shape, as convex pieces.
 
     Attributes
@@ -133,7 +134,7 @@ Solid = Box | Cylinder | Sphere | Plane | Mesh
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Scene(Displayed):
+class Scene(ByValue, Displayed):
     """What an arm may not touch; no two solids have the same name.
 
     Attributes

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.diagnosis.conclusions import (
     Conclusion,
     MainFault,
@@ -35,7 +36,7 @@ MOSTLY = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Hypothesis(Displayed):
+class Hypothesis(ByValue, Displayed):
     """A fault or two that would explain the disagreement.
 
     Attributes
@@ -91,7 +92,7 @@ def sheet_of(hypotheses: Sequence[Hypothesis], heading: str) -> Sheet:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Displayed):
+class Diagnosis(ByValue, Displayed):
     """What references say about a table.
 
     Attributes

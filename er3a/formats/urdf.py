@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
+from er3a.by_value import ByValue
 from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import Er3aError, InputError
 from er3a.formats.from_axes import table_from_axes
@@ -36,7 +37,7 @@ FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that n
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class UrdfImport(Displayed):
+class UrdfImport(ByValue, Displayed):
     """A robot derived from a URDF.
 
     Attributes

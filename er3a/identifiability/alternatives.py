@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.identifiability.entries import entries_of
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.flips import Flip, changed, flips_of, sets_of
@@ -29,7 +30,7 @@ MOST_COMPOSED = 2048
 
 
 @dataclass(frozen=True, eq=False)
-class Alternative:
+class Alternative(ByValue):
     """A table that differs by discrete changes.
 
     Attributes

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from typing import Literal
 
+from er3a.by_value import ByValue
+from er3a.display import Displayed, Sheet, shortly
 from er3a.identifiability.alternatives import Alternative
 from er3a.identifiability.entries import EntryUnit, column_of
 from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
@@ -78,7 +81,7 @@ class EntryEvidence:
 
 
 @dataclass(frozen=True, eq=False)
-class OtherTable:
+class OtherTable(ByValue):
     """Another table (a batch of one): the one that evidence describes where it excludes the robot's, or one that it
     can't tell from the robot's, with all that is open at once."""
 
@@ -86,8 +89,8 @@ class OtherTable:
     code: Literal["described", "allowed"]
 
 
-@dataclass(frozen=True, eq=False)
-class Evidence:
+@dataclass(frozen=True, eq=False, repr=False)
+class Evidence(ByValue, Displayed):
     """What references say about a table.
 
     Attributes
@@ -119,3 +122,41 @@ class Evidence:
     @cached_property
     def _by_name(self) -> dict[str, EntryEvidence]:
         return {each.entry: each for each in (*self.entries, *self.combinations)}
+
+    def sheet(self) -> Sheet:
+        """A row for each status: how many entries have it, and which; what is most to be looked at stands first."""
+        judged = (*self.entries, *self.combinations)
+        names = {status: [each.entry for each in judged if each.status == status] for status in _SHOWN}
+        kept = {"other_table": self.other.code if self.other else None, "unmet": self.unmet or None}
+        return Sheet(
+            f"Evidence of {self.robot.name}: {len(judged)} entries, "
+            f"tolerance {shortly(self.tolerance.mm)} mm, {shortly(self.tolerance.deg)} deg",
+            ("status", "count", "entries"),
+            tuple((status, str(len(found)), _in_short(found)) for status, found in names.items() if found),
+            facts=(
+                f"table_meets: {shortly(self.table_meets)}; conflicts: {len(self.conflicts)}; "
+                f"readings: {len(self.readings)}, allowed: {len(self.allowed)}",
+                *(f"{key}: {shortly(value)}" for key, value in kept.items() if value),
+            ),
+        )
+
+
+_SHOWN: tuple[Status, ...] = ("contradicted", "open", "weak", "consistent", "gauge", "given", "settled")
+
+
+def _in_short(names: list[str]) -> str:
+    """Names of entries, those of a column together: ``a1-3,5 d4 d2+d3``."""
+    parts = []
+    for column, found in groupby(names, key=column_of):
+        numbers = [name.removeprefix(column) for name in found]
+        if not all(number.isdigit() for number in numbers):
+            parts += [name.replace(" ", "") for name in (column + number for number in numbers)]
+            continue
+        runs: list[list[int]] = []
+        for number in map(int, numbers):
+            if runs and runs[-1][-1] == number - 1:
+                runs[-1].append(number)
+            else:
+                runs.append([number])
+        parts.append(column + ",".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs))
+    return " ".join(parts)

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.display import Displayed, Sheet, shortly
 from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.kinematics.aligned_wrist import (
@@ -44,7 +45,7 @@ FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Family(Displayed):
+class Family(ByValue, Displayed):
     """A continuum of solutions of one pose.
 
     For kind *wrist* its members are ``q0 + t * direction``. For the others joint 1 (*shoulder*) or 2 (*elbow*) is that

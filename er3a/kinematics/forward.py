@@ -28,7 +28,8 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
 
     Parameters
     ----------
-    q : (..., n), rad (m where a joint slides), the manufacturer's joint values; NaN in a row gives NaN in its pose
+    q : (..., n), rad (m where a joint slides), the manufacturer's joint values. ``er3a.forward`` refuses NaN, and warns
+        (``er3a.InputWarning``) of values that can only be degrees; here NaN in a row gives NaN in its pose
     frame : None for the tool point (``T_base_tool``); 0..m for the frame after that joint in the table's own
         convention, base included, tool not
     out : (..., 4, 4) writeable float64 C-contiguous array to fill and return

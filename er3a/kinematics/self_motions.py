@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.display import Displayed, Sheet, shortly
 from er3a.kinematics.chain import joint_starts, row_values
 from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
@@ -22,7 +23,7 @@ SAME_TURN, COVERS = 1e-6, 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SelfMotionCurve(Displayed):
+class SelfMotionCurve(ByValue, Displayed):
     """A part of a curve of solutions of one pose: joints move with the tool at rest.
 
     Its members are told by a parameter t (rad), which is the summed length of the joint moves from q0 on.

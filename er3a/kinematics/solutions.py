@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import ByValue
 from er3a.display import MOST_ROWS, Displayed, Sheet, first_rows, shortly
 from er3a.geometry.angles import TURN, wrap_to_pi
 from er3a.kinematics.classes.class_solvers import ArmClassCode, BranchLabel, SlotName
@@ -182,7 +183,7 @@ Unsolved = SideUnsolved | PoseUnsolved
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solutions(Displayed):
+class Solutions(ByValue, Displayed):
     """Joint solutions of one pose (``inverse``) or of many (``inverse_batch``, ``solve``).
 
     What is told of each solution has the leading axes of ``q``: (k,) from ``inverse``; (N, S) from ``inverse_batch``,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import kernel
@@ -14,7 +15,7 @@ from er3a.robots.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
-class Tables:
+class Tables(ByValue):
     """A batch of H tables of arms with the same base and flange.
 
     Attributes

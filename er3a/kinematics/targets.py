@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.display import Displayed, Sheet, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
@@ -19,7 +20,7 @@ TargetOutcome = Literal["reached", "unreachable", "leaves limits", "collides"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Target(Displayed):
+class Target(ByValue, Displayed):
     """A pose of the tool.
 
     Attributes

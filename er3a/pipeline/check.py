@@ -30,6 +30,7 @@ from er3a.files.yaml_file import load, read_yaml
 from er3a.formats.text_file import read_text
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.class_follow import follows_tool_paths
 from er3a.programs.read_program import SUFFIXES, read_program
@@ -89,7 +90,10 @@ def stage_forms(robot: Robot) -> dict[str, str]:
 
 
 def check_file(path: Path) -> str:
-    """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it."""
+    """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
+
+    Of a study each file that it names is looked at too, from the folder that it is run in.
+    """
     if path.suffix == ".csv" and path.parent.name == "targets":
         read_targets(path)
         return _WORDS["targets"]
@@ -107,6 +111,9 @@ def check_file(path: Path) -> str:
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(path, None, f"'{path.suffix}' files are none of er3a's inputs", "Give a .yaml or .csv file")
     kind = read_yaml(path).get("kind")
+    if kind == "study":
+        check_study(path)
+        return _WORDS[kind]
     if not isinstance(kind, str) or kind not in _CHECKS:
         problem = "missing" if kind is None else f"'{kind}' is not known"
         raise InputError(path, "kind", problem, f"Write one of: {', '.join(_CHECKS)}")
@@ -149,7 +156,9 @@ def check_study(path: Path) -> Study:
             own = load_vision(entry.vision, robot)
             load_hand_eye(Path(entry.vision).parent / own.calibration, robot)
         load_of(study.loads(name))
-        for stage in ("collision", "inverse", "trajectory", "vision"):
-            if scene := study.scene(name, stage):
+        for key in (
+            key for stage in STAGES.values() for key in stage.settings if hasattr(getattr(study, key), "scene")
+        ):
+            if scene := study.scene(name, key):
                 load_scene(scene)
     return study

@@ -1,17 +1,26 @@
 """The command line: what the workflow's rules call, and what a person may call by hand.
 
 Exit codes: 0; 1 for findings that were asked for with ``--fail-on``, and for a difference; 2 for what a person has to
-correct. Results go to standard output, notes and progress to standard error.
+correct; 143 for a command that SIGTERM ended. Results go to standard output, notes and progress to standard error.
 """
 
 from __future__ import annotations
 
+import os
+import re
+import signal
 import sys
 import warnings
 from importlib import import_module
+from types import FrameType
+from typing import Any
+
+import typer
 
 from er3a.errors import Er3aError
 from er3a.pipeline.commands.options import app, print_error, print_warning
+
+_UsageError: Any = typer.BadParameter.__base__  # click's, which some versions of typer carry with them
 
 for _room in (
     "studies",
@@ -25,8 +34,13 @@ for _room in (
 def main() -> None:
     """Entry point: errors that a user can correct are one line on standard error and exit code 2."""
     warnings.showwarning = print_warning
+    signal.signal(signal.SIGTERM, _end)
     try:
-        app(standalone_mode=True)
+        raise SystemExit(app(standalone_mode=False, prog_name="er3a"))
+    except _UsageError as error:
+        _complain_of_usage(error)
+    except typer.Abort:
+        print_error("stopped")
     except Er3aError as error:
         print_error(error)
     except MemoryError:
@@ -35,9 +49,28 @@ def main() -> None:
         if "failed to map" not in str(error):
             raise
         _complain_of_memory()
+    except BrokenPipeError:  # whoever reads has read enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(1) from None
     except OSError as error:
         print_error(f"{error.filename or 'the system'}: {error.strerror or error}")
     raise SystemExit(2)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """What SIGTERM does: all that stands in ``finally`` is done, temporary files go."""
+    print_error("ended by SIGTERM")
+    raise SystemExit(128 + number)
+
+
+def _complain_of_usage(error: Any) -> None:
+    """One line for a wrong option or argument; where a group of commands was called without any, its help."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()
+        return
+    problem = re.sub(r"\bValue error, ", "", " ".join(error.format_message().split())).rstrip(".")
+    command = error.ctx.command_path if error.ctx else "er3a"
+    print_error(f"{problem}{'' if problem.endswith('?') else '.'} All that it takes: {command} --help")
 
 
 def _complain_of_memory() -> None:

@@ -28,6 +28,7 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from er3a.by_value import ByValue
 from er3a.errors import ResultError
 from er3a.files.grades import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
@@ -83,7 +84,7 @@ ResultsT = TypeVar("ResultsT", bound="Results[Any]")
 
 
 @dataclass(frozen=True, eq=False)
-class Results(Generic[SummaryT]):
+class Results(ByValue, Generic[SummaryT]):
     """A stage's results: its summary, and the tables that a subclass adds."""
 
     summary: SummaryT
@@ -109,7 +110,7 @@ class Provenance:
 
 
 @dataclass(frozen=True, eq=False)
-class Stored(Generic[ResultsT]):
+class Stored(ByValue, Generic[ResultsT]):
     """Results as they were read, and where they come from.
 
     Attributes
@@ -186,7 +187,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     rests_on: dict[str, Status] = {
         name: _record(folder.parent / name)["verdict"]["status"]
         for name in stage.rests_on
-        if (folder.parent / name / SUMMARY).exists()
+        if is_computed(folder.parent / name)
     }
     if record["verdict"]["status"] == "not_computed":
         absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))
@@ -200,6 +201,11 @@ def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
     kinds = {str(kind.code): kind for kind in known}
     found: Finding = _adapter(kinds[verdict["code"]]).validate_python(verdict["params"])
     return found
+
+
+def is_computed(folder: Path) -> bool:
+    """Whether a folder holds a stage's results, be they that it could not be computed."""
+    return (folder / SUMMARY).is_file()
 
 
 def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from logging import WARNING, LogRecord
 from pathlib import Path
@@ -24,21 +24,17 @@ MARKS = {"pass": "✓", "caution": "!", "fail": "✗"}
 NO_VERDICT = "–"
 HEAVY = {"sample_workspace": 6.0, "compute_workspace": 8.0, "compute_validation": 5.0, "compute_programs": 5.0}
 """Jobs beside the others, by rule: what they take on average, in units of a page."""
-_OWN_LOG = {"-n", "--dry-run", "--dryrun", "--logger", "--verbose", "-p", "--printshellcmds", "--debug-dag"}
 
 Expected = Mapping[tuple[str, str], str]
 
 
-def logger_words(expected: Expected, words: Sequence[str]) -> list[str]:
+def logger_words(expected: Expected) -> list[str]:
     """The words that make Snakemake, called in this process, report to a person in this way.
 
     Parameters
     ----------
     expected : verdicts that the study expects, by robot and stage
-    words : handed to Snakemake; none are added where they ask for a log of its own kind
     """
-    if _OWN_LOG & set(words):
-        return []
     module = ModuleType("snakemake_logger_plugin_er3a")
     module.LogHandler = type("LogHandler", (RunLog,), {"expected": expected})  # type: ignore[attr-defined]
     module.LogHandlerSettings = RunLogSettings  # type: ignore[attr-defined]
@@ -144,5 +140,3 @@ def _verdict(robot: str, stage: str) -> str:
         return str(summary["verdict"]["status"])
     except (OSError, ValueError, KeyError):
         return "no result"
-
-

@@ -30,6 +30,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
+from er3a.by_value import ByValue
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -124,7 +126,7 @@ def _declared(pattern: str, meaning: str, unit: str, dtype: Any, parts: tuple[st
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Table(ByValue):
     """Base of all tables; see the module."""
 
     joints: ClassVar[int] = 6
@@ -155,6 +157,12 @@ class Table:
         if any(flags):
             object.__setattr__(found, "slides", flags)
         return found
+
+    def __eq__(self, other: object) -> bool:
+        equal = super().__eq__(other)
+        return equal if equal is NotImplemented or not equal else self.slides == other.slides  # type: ignore[attr-defined]
+
+    __hash__ = ByValue.__hash__
 
     @classmethod
     def columns(cls) -> dict[str, Column]:
@@ -202,10 +210,21 @@ class Table:
         return taken
 
     def frame(self) -> pd.DataFrame:
-        """The table for pandas, with the names and the values of the file."""
+        """The table for pandas, with the names and the values of the file.
+
+        ``frame.attrs["columns"]`` has unit and meaning of each column by its name.
+        """
         import pandas as pd  # slow to import, and pages and recordings need none
 
-        return pd.DataFrame({name: values for name, values, _ in self._flat()})
+        flat = list(self._flat())
+        frame = pd.DataFrame({name: values for name, values, _ in flat})
+        frame.attrs["columns"] = {name: self._described(name, spec) for name, _, spec in flat}
+        return frame
+
+    def _described(self, name: str, spec: Column) -> dict[str, str]:
+        """Unit and meaning of a column of the file."""
+        unit = spec.unit.replace("deg", "mm") if self.slides and name not in spec.names(len(name)) else spec.unit
+        return {"unit": unit, "meaning": spec.meaning}
 
     def _flat(self) -> Iterator[tuple[str, NDArray[Any], Column]]:
         for name, spec in self.columns().items():
@@ -218,8 +237,7 @@ class Table:
         """Write a Parquet file; equal tables give equal bytes."""
         schema, arrays = [], []
         for name, values, spec in self._flat():
-            unit = spec.unit.replace("deg", "mm") if self.slides and name not in spec.names(len(name)) else spec.unit
-            schema.append(pa.field(name, spec.arrow_type, metadata={"unit": unit, "meaning": spec.meaning}))
+            schema.append(pa.field(name, spec.arrow_type, metadata=self._described(name, spec)))
             arrays.append(pa.array(np.ascontiguousarray(values), spec.arrow_type))
         pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema)), file, compression="zstd")
 

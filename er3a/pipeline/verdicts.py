@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from er3a.pipeline.results import NotComputed, Status, read_verdict
+from er3a.pipeline.results import NotComputed, Status, is_computed, read_verdict
 from er3a.pipeline.study import Study
 
 Level = Literal["caution", "fail"]
+NOT_EXAMINED = "not_examined"
 _COUNTED: dict[Level, tuple[Status, ...]] = {"caution": ("caution", "fail"), "fail": ("fail",)}
 
 
@@ -19,12 +20,13 @@ class StageVerdict:
 
     Attributes
     ----------
+    status : ``not_examined`` where the stage has not been computed yet
     code : of the finding; text : in English
     """
 
     robot: str
     stage: str
-    status: Status
+    status: Status | Literal["not_examined"]
     code: str
     text: str
 
@@ -39,15 +41,20 @@ class StageVerdict:
 
 
 def read_verdicts(study: Study, results: Path) -> list[StageVerdict]:
-    """The verdicts of all stages of all robots, in the study's order.
+    """The verdicts of all stages of all robots, in the study's order; those not computed yet are ``not_examined``.
 
     Raises
     ------
     ResultError
-        a stage has no results, or they are damaged or of another format version
+        results are damaged or of another format version, or no stage has any
     """
-    return [
+    found = [
         StageVerdict(robot, stage, *read_verdict(results / robot / stage))
+        if is_computed(results / robot / stage)
+        else StageVerdict(robot, stage, NOT_EXAMINED, "stage.not_examined", "This stage has not been computed yet.")
         for robot in study.names
         for stage in study.stages(robot)
     ]
+    if all(verdict.status == NOT_EXAMINED for verdict in found):
+        read_verdict(results / found[0].robot / found[0].stage)
+    return found

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.wrist_partitioned import parallel_axes_arm, solve_slots
@@ -26,7 +27,7 @@ JACOBIAN_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class BranchJump:
+class BranchJump(ByValue):
     """A place where the branch in use ends and no other continues it.
 
     Attributes
@@ -40,7 +41,7 @@ class BranchJump:
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
+class Followed(ByValue):
     """Joint angles along a line.
 
     Attributes

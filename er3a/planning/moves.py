@@ -21,6 +21,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
+from er3a.by_value import ByValue
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
@@ -79,7 +80,7 @@ class ToolPath(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class JointMove:
+class JointMove(ByValue):
     """All joints start and stop together.
 
     Attributes
@@ -105,7 +106,7 @@ class JointMove:
 
 
 @dataclass(frozen=True, eq=False)
-class Segment(ABC):
+class Segment(ByValue, ABC):
     """What a :class:`Line` and an :class:`er3a.planning.arcs.Arc` of the tool share.
 
     Attributes

@@ -21,6 +21,7 @@ import numpy as np
 import scipy
 from numpy.polynomial import chebyshev
 
+from er3a.by_value import ByValue
 from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.profiles import Rates
 
@@ -121,7 +122,7 @@ class Pieces:
 
 
 @dataclass(frozen=True, eq=False)
-class PiecewiseMotion:
+class PiecewiseMotion(ByValue):
     """A motion of n joints.
 
     Attributes

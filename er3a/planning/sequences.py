@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from er3a.by_value import ByValue
 from er3a.errors import PathError
 from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.arcs import Arc
@@ -32,7 +33,7 @@ RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
 
 
 @dataclass(frozen=True, eq=False)
-class SegmentPath:
+class SegmentPath(ByValue):
     """A sequence as a :class:`er3a.planning.moves.ToolPath`.
 
     Attributes

@@ -22,6 +22,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
+from er3a.by_value import ByValue
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.intervals import OVER, RateLimit
@@ -71,7 +72,7 @@ class TimingError(Er3aError):
 
 
 @dataclass(frozen=True, eq=False)
-class JointLimits:
+class JointLimits(ByValue):
     """Limits of the joints' rates, each (n,).
 
     Attributes

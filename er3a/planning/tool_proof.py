@@ -28,6 +28,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.factor_forms import ELBOW_JOINT, WRIST_JOINT, factor_forms
 from er3a.kinematics.forward import frames, jacobian
@@ -73,7 +74,7 @@ class Undecided:
 
 
 @dataclass(frozen=True, eq=False)
-class ToolProof:
+class ToolProof(ByValue):
     """What is known of all times of a followed path.
 
     Attributes

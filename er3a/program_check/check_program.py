@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.collision.scene import Scene
 from er3a.kinematics.near_singular import NearSingular
 from er3a.numerics.arrays import Reals
@@ -42,7 +43,7 @@ NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 
 
 @dataclass(frozen=True, eq=False)
-class CheckOptions:
+class CheckOptions(ByValue):
     """What a program is checked with.
 
     Attributes
@@ -137,7 +138,7 @@ class CycleTime:
 
 
 @dataclass(frozen=True, eq=False)
-class ProgramCheck:
+class ProgramCheck(ByValue):
     """What was found.
 
     Attributes

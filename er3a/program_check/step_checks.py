@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
@@ -72,7 +73,7 @@ def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float) -> Obstacl
 
 
 @dataclass(frozen=True, eq=False)
-class CheckedMotion:
+class CheckedMotion(ByValue):
     """A motion as it was carried out.
 
     Attributes

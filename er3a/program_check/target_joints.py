@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.errors import PoseError
 from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Reals
@@ -26,7 +27,7 @@ SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 
 
 @dataclass(frozen=True, eq=False)
-class PlacedMotion:
+class PlacedMotion(ByValue):
     """A motion with the arm that carries its tool.
 
     Attributes

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.collision.along import RateBounds
 from er3a.errors import NotWristPartitionedError, PoseError
 from er3a.geometry.angles import wrap_to_pi
@@ -71,7 +72,7 @@ SAME_ARRIVAL = 1e-4  # rad
 
 
 @dataclass(frozen=True, eq=False)
-class CheckRules:
+class CheckRules(ByValue):
     """What ways are checked against.
 
     Attributes
@@ -86,7 +87,7 @@ class CheckRules:
 
 
 @dataclass(frozen=True, eq=False)
-class MotionWay:
+class MotionWay(ByValue):
     """A motion's way.
 
     Attributes
@@ -128,19 +129,35 @@ class MotionWay:
         return round(1000 * self.length * float(progress(self.law, np.array(t))[0]), 3)
 
 
+@dataclass(frozen=True, eq=False)
+class _JointMove(ByValue):
+    """All joints from ``start`` by ``step`` (n,), in proportion."""
+
+    law: MotionLaw
+    start: Reals
+    step: Reals
+
+    def joints_at(self, share: Reals) -> Reals:
+        """Joint values (..., n) at shares of the way (...,)."""
+        return self.start + np.asarray(share)[..., None] * self.step
+
+    def joints(self, t: Reals) -> Reals:
+        """Joint values (..., n) at times (...,)."""
+        return self.joints_at(progress(self.law, np.asarray(t, float))[0])
+
+    def rates(self, t: Reals) -> tuple[Reals, Reals, Reals]:
+        """Joint values, speeds and accelerations (N, n) at times (N,)."""
+        share, speed, acceleration = (each[..., None] * self.step for each in progress(self.law, t))
+        return self.start + share, speed, acceleration
+
+
 def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> MotionWay | None:
     """A joint move; None if no joint moves."""
     step = end - start
     if np.abs(step).max() < NO_WAY:
         return None
     law = joint_law(motion, step, rules.limits, rules.assumed)
-
-    def joints_at(share: Reals) -> Reals:
-        return start + np.asarray(share)[..., None] * step
-
-    def joints(t: Reals) -> Reals:
-        return joints_at(progress(law, np.asarray(t, float))[0])
-
+    move = _JointMove(law, start, step)
     tool = forward(arm, np.stack([start, end]))
     moved = float(np.linalg.norm(tool[1, :3, 3] - tool[0, :3, 3]))
     turn = tool[1, :3, :3] @ tool[0, :3, :3].T
@@ -151,19 +168,15 @@ def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: Ch
     moments = {
         **_limit_moments(arm, law, start, end),
         **_rate_moments(arm, law, peaks, rules.limits),
-        **_configuration_moment(arm, law, joints_at),
+        **_configuration_moment(arm, law, move.joints_at),
     }
     findings = (*moments, *_joint_jumps(arm, start, end, moved, turned))
     lead = float(np.abs(step).max())
-    rates = polynomial_motion(lambda t: _scaled(progress(law, t), start, step), law.breaks, 2).rate_bounds
+    rates = polynomial_motion(move.rates, law.breaks, 2).rate_bounds
     return MotionWay(
-        *(arm, law, times, joints(times), joints, joints_at, rates, moved, lead, end, findings), moments=moments
+        *(arm, law, times, move.joints(times), move.joints, move.joints_at, rates, moved, lead, end, findings),
+        moments=moments,
     )
-
-
-def _scaled(shares: tuple[Reals, Reals, Reals], start: Reals, step: Reals) -> tuple[Reals, Reals, Reals]:
-    share, speed, acceleration = (each[..., None] * step for each in shares)
-    return start + share, speed, acceleration
 
 
 def limit_findings(arm: Robot, q: Reals) -> tuple[LimitCause, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import ByValue
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place, alike
 from er3a.programs.syntax import Program
 
@@ -66,7 +67,7 @@ class Ending:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Execution:
+class Execution(ByValue):
     """A program that was run.
 
     Attributes

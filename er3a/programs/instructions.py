@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.numerics.arrays import Reals
 
 RateUnit = Literal["m/s", "m/s2", "rad/s", "rad/s2", "share", "s"]
@@ -77,7 +78,7 @@ FINE = Zone()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NamedFrame:
+class NamedFrame(ByValue):
     """A tool (T_flange_tool) or base (T_robot_base) that targets are meant by.
 
     Attributes
@@ -91,7 +92,7 @@ class NamedFrame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointTarget:
+class JointTarget(ByValue):
     """Joint angles (n,) in rad; NaN for a joint that stays as it is.
 
     Attributes
@@ -104,7 +105,7 @@ class JointTarget:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseTarget:
+class PoseTarget(ByValue):
     """T_base_tool (4, 4) in m, in the motion's base and for its tool.
 
     Attributes
@@ -139,7 +140,7 @@ Target = JointTarget | PoseTarget | UnresolvedTarget
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ArmMotion:
+class ArmMotion(ByValue):
     """A motion of the arm.
 
     Attributes

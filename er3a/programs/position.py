@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.numerics.arrays import Reals
 from er3a.programs.arm_joints import MOST_ROBOT_AXES
 from er3a.programs.circle import arc_end
@@ -20,7 +21,7 @@ Flange = Callable[[Reals], Reals]
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
+class Cell(ByValue):
     """What is known of the cell that a program runs in.
 
     Attributes

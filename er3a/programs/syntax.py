@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from er3a.by_value import ByValue
 from er3a.programs.instructions import Instruction, Place
 from er3a.programs.program_findings import ProgramFinding
 from er3a.programs.values import Value
@@ -232,7 +233,7 @@ class Routine:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Program:
+class Program(ByValue):
     """A program that was read.
 
     Attributes

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from er3a.by_value import ByValue
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import (
     ArmMotion,
@@ -56,7 +57,7 @@ ARC_DEVIATION = 0.0001  # m, of lines that stand for an arc
 
 
 @dataclass(frozen=True, eq=False)
-class WrittenProgram:
+class WrittenProgram(ByValue):
     """A program as files.
 
     Attributes
@@ -71,7 +72,7 @@ class WrittenProgram:
 
 
 @dataclass(frozen=True, eq=False)
-class WriteOptions:
+class WriteOptions(ByValue):
     """How a program is written.
 
     Attributes

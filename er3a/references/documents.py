@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
+
+from er3a.by_value import ReadOnly
 
 NO_DOCUMENT = "none"
 """The origin of a value that rests on no document."""
@@ -39,7 +40,7 @@ class Documents:
     by_name: Mapping[str, Document] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "by_name", MappingProxyType(dict(self.by_name)))
+        object.__setattr__(self, "by_name", ReadOnly(self.by_name))
 
     @classmethod
     def of(cls, documents: Iterable[Document]) -> Documents:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import as_floats
 from er3a.numerics.arrays import Reals
@@ -69,7 +70,7 @@ class Load(MassBody):
 
 
 @dataclass(frozen=True, eq=False)
-class Drives:
+class Drives(ByValue):
     """What is known of the joints' drives, at the joint: (n,) each, NaN where unknown; N for N m where a joint slides.
 
     Attributes
@@ -101,8 +102,8 @@ class Drives:
         return cls(*(np.full(joints, np.nan) for _ in fields(cls)))
 
 
-@dataclass(frozen=True)
-class WristLoad:
+@dataclass(frozen=True, eq=False)
+class WristLoad(ByValue):
     """What the manufacturer lets the wrist carry.
 
     Attributes
@@ -116,8 +117,8 @@ class WristLoad:
     inertia: tuple[tuple[int, float], ...] = ()
 
 
-@dataclass(frozen=True)
-class Masses:
+@dataclass(frozen=True, eq=False)
+class Masses(ByValue):
     """Everything of a robot that dynamics rests on, beside its table.
 
     Attributes
@@ -129,7 +130,7 @@ class Masses:
     """
 
     links: tuple[LinkMass, ...] = ()
-    drives: Drives | None = field(default=None, compare=False)
+    drives: Drives | None = None
     wrist: WristLoad | None = None
     weight: float = np.nan
 

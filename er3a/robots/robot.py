@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import Any, Literal, get_args
 
 import numpy as np
 
+from er3a.by_value import ByValue, ReadOnly
 from er3a.display import Displayed, Sheet, shortly
 from er3a.errors import RobotError, ShapeError
 from er3a.geometry.transforms import as_floats, rpy_of
@@ -87,7 +87,7 @@ class PairRule:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Robot(Displayed):
+class Robot(ByValue, Displayed):
     """A serial arm of 1 to 10 joints. SI units; angles are in rad, arrays are read-only.
 
     With q what the teach pendant shows, joint i moves by ``u = coupling @ q`` (``u = q`` without a coupling). If it
@@ -159,7 +159,7 @@ class Robot(Displayed):
     masses: Masses = field(default_factory=Masses)
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
-    derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+    derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         rows, joints = np.size(self.direction), np.size(self.speed) or np.size(self.lower)
@@ -188,8 +188,14 @@ class Robot(Displayed):
         for limit in self.combined:
             if len(limit.factors) != joints:
                 raise ShapeError("combined", (len(limit.factors),), f"({joints},)")
-        object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
-        object.__setattr__(self, "origins", MappingProxyType(dict(self.origins)))
+        object.__setattr__(self, "sources", ReadOnly(self.sources))
+        object.__setattr__(self, "origins", ReadOnly(self.origins))
+
+    def __hash__(self) -> int:
+        if "hash" not in self.derived:
+            self.derived["hash"] = super().__hash__()
+        found: int = self.derived["hash"]
+        return found
 
     def _keep(self, key: str, array: Reals | Flags, expected: tuple[int, ...]) -> None:
         if array.shape != expected:

@@ -1,4 +1,4 @@
-"""Whether a robot's numbers can be computed with.
+"""Whether a robot's numbers, and joint values that someone gives for it, can be computed with.
 
 A :class:`Robot` may hold what a source prints even where that can't be right, so that validation can say what it is.
 Who computes with a robot asks here first; the answer is kept with the robot, so that asking again costs nothing.
@@ -6,12 +6,14 @@ Who computes with a robot asks here first; the answer is kept with the robot, so
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 
-from er3a.errors import ArgumentError, PoseError, RobotError
-from er3a.geometry.transforms import check_poses
+from er3a.errors import ArgumentError, InputWarning, PoseError, RobotError, ShapeError
+from er3a.geometry.transforms import as_floats, check_poses
+from er3a.numerics.arrays import Reals
 from er3a.robots.derived import derived
 from er3a.robots.robot import Robot
 
@@ -24,6 +26,8 @@ FINITE = (
     ("lower", "rad"),
     ("upper", "rad"),
 )
+SEVERAL_TURNS = 4 * np.pi
+_FEW = 1000
 
 
 def check_robot(robot: Any, crossed_limits: bool = False) -> None:
@@ -82,3 +86,54 @@ def limits_crossed(robot: Robot) -> str:
     scale, unit = (1000.0, "mm") if robot.slides[crossed[0]] else (np.degrees(1.0), "deg")
     low, high = scale * robot.lower[crossed[0]], scale * robot.upper[crossed[0]]
     return f"limits of joint {crossed[0] + 1} are crossed: lower {low:g} {unit}, upper {high:g} {unit}; swap them"
+
+
+def check_joint_values(robot: Robot, values: Any, argument: str, stacklevel: int = 2) -> None:
+    """Refuse NaN and infinity among joint values (..., n), and warn of those that can only be degrees.
+
+    A row can only be degrees if one of its joints that turn and have limits is several turns beyond them in rad, and
+    all of these are within them in degrees. Of joints that turn without end and of slides nothing is said. What has no
+    number for each joint is left to the function that takes it.
+
+    Raises
+    ------
+    PoseError
+        naming the first row that isn't finite
+    """
+    try:
+        q = as_floats(values, argument)
+    except ShapeError:
+        return
+    if q.ndim == 0 or q.shape[-1] != robot.joints or not q.size:
+        return
+    flat, far = q.ravel(), _surely_no_radians(robot)
+    if q.size <= _FEW and flat @ flat < far**2:  # what most calls ask, in a microsecond
+        return
+    highest, lowest = float(q.max()), float(q.min())
+    if not (np.isfinite(highest) and np.isfinite(lowest)):
+        row = np.argwhere(~np.isfinite(q))[0][:-1].tolist()
+        raise PoseError(f"{argument}{row if row else ''} holds NaN or infinity")
+    if max(highest, -lowest) > far and _holds_degrees(robot, q.reshape(-1, robot.joints)):
+        warnings.warn(
+            f"{argument} is several turns beyond the limits of {robot.name} in rad, and within them in degrees; er3a "
+            f"takes rad: np.radians({argument})",
+            InputWarning,
+            stacklevel=stacklevel + 1,
+        )
+
+
+@derived
+def _surely_no_radians(robot: Robot) -> float:
+    """The least value (rad) that is several turns beyond a joint's limits; infinite if no joint that turns has any."""
+    ends = np.maximum(np.abs(robot.lower), np.abs(robot.upper))[~robot.slides & ~robot.continuous]
+    return float(ends.min(initial=np.inf)) + SEVERAL_TURNS
+
+
+def _holds_degrees(robot: Robot, q: Reals) -> bool:
+    """Whether a row (N, n) can only be degrees."""
+    limited = ~robot.slides & ~robot.continuous
+    lower, upper = robot.lower[limited], robot.upper[limited]
+    far = q[(np.abs(q[:, limited]) > _surely_no_radians(robot)).any(axis=1)][:, limited]
+    beyond = np.maximum(far - upper, lower - far) > SEVERAL_TURNS
+    degrees = np.radians(far)
+    return bool((beyond.any(axis=1) & ((lower <= degrees) & (degrees <= upper)).all(axis=1)).any())

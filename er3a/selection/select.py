@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import bodies_of
 from er3a.collision.pairs import PairOverlaps
@@ -52,7 +53,7 @@ class BestByRules:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SolutionRanking(Displayed):
+class SolutionRanking(ByValue, Displayed):
     """Solutions of one pose in the order of a rule or of a mix of rules.
 
     Attributes

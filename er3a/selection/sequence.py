@@ -17,6 +17,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.collision.clearance import bodies_of
 from er3a.collision.scene import Scene
 from er3a.display import Displayed, Sheet, first_rows
@@ -32,7 +33,7 @@ MOVES: tuple[MoveRule, ...] = get_args(MoveRule)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SequenceChoice(Displayed):
+class SequenceChoice(ByValue, Displayed):
     """Solutions of a sequence of poses.
 
     Attributes

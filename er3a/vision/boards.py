@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import ByValue
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Reals
 from er3a.vision.opencv import opencv
@@ -50,7 +51,7 @@ class Board:
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class Camera(ByValue):
     """Intrinsics: matrix (3, 3) in pixels, distortion (k,) as OpenCV has it, and their standard deviations.
 
     ``deviations`` : (4 + k,), of fx, fy, cx, cy and the distortion; zeros where they are given
@@ -62,7 +63,7 @@ class Camera:
 
 
 @dataclass(frozen=True, eq=False)
-class BoardViews:
+class BoardViews(ByValue):
     """What was found in images.
 
     Attributes

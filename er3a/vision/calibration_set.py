@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.display import Displayed, Sheet, first_rows
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import check_poses
@@ -17,7 +18,7 @@ Setup = Literal["eye_in_hand", "eye_to_hand"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibrationSet(Displayed):
+class CalibrationSet(ByValue, Displayed):
     """Samples of one board seen by one camera. Lengths in m, angles in rad.
 
     Attributes

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from er3a.by_value import ByValue
 from er3a.display import Displayed, Sheet, first_rows, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Flags, Reals
@@ -48,7 +49,7 @@ DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
 
 
 @dataclass(frozen=True, eq=False)
-class MethodAnswer:
+class MethodAnswer(ByValue):
     """What a closed form answers, beside the likeliest.
 
     Attributes
@@ -68,7 +69,7 @@ class MethodAnswer:
 
 
 @dataclass(frozen=True, eq=False)
-class TouchCheck:
+class TouchCheck(ByValue):
     """Points touched with the robot, held out of the calibration, against where the camera puts them.
 
     Attributes
@@ -84,7 +85,7 @@ class TouchCheck:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HandEye(Displayed):
+class HandEye(ByValue, Displayed):
     """A calibration.
 
     Attributes

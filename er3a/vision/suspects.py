@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from er3a.by_value import ByValue
 from er3a.geometry.transforms import rotation_angle
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision.calibration_set import CalibrationSet
@@ -44,7 +45,7 @@ MEND_KINDS: tuple[SuspectKind, ...] = (*BOARD_TURNS, "mirrored_tilt")
 
 
 @dataclass(frozen=True, eq=False)
-class AngleCheck:
+class AngleCheck(ByValue):
     """What the turning angles tell.
 
     Attributes

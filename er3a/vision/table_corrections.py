@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
+from er3a.by_value import ByValue
 from er3a.calibration.calibrate import CLOSE, Close, Estimate
 from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
 from er3a.calibration.parameters import DEPENDENT, NO_EFFECT, SCALE, Parameter, parallel_pairs, parameters_of
@@ -58,7 +59,7 @@ class NoCorrections:
 
 
 @dataclass(frozen=True, eq=False)
-class TableCorrections:
+class TableCorrections(ByValue):
     """Hand-eye and board pose with the table's corrections.
 
     Attributes

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import base64
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
+from er3a.files.kept_files import half_written
 from testing.processes import started
 
 COMPUTED = ("compute_inverse", "compute_validation")
@@ -48,3 +51,50 @@ def test_kill_9_in_mid_run_then_run_again(small_study, fresh_project):
     assert compared >= 6
     for path, changed in finished.items():
         assert path.stat().st_mtime_ns == changed, f"{path} was finished and yet made again"
+
+
+@pytest.mark.long
+def test_sigterm_ends_a_run_and_its_jobs_with_one_line_and_without_temporary_files(fresh_project, tmp_path):
+    run = fresh_project("ended")
+    command = [sys.executable, "-m", "er3a", "run", "--study", "config/small.yaml", "--", "--cores", "2"]
+    told = tmp_path / "told"
+    environment = run.environment() | {"TMPDIR": str(tmp_path / "temporary")}
+    (tmp_path / "temporary").mkdir()
+    with (
+        told.open("w") as output,
+        started(command, cwd=run.folder, env=environment, stdout=output, stderr=output) as own,
+    ):
+        deadline = time.monotonic() + 120
+        while not (jobs := jobs_below(own.pid)) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert jobs
+        own.terminate()
+        assert own.wait(60) == 128 + signal.SIGTERM
+        assert not [job for job in jobs if job.is_running() and job.status() != psutil.STATUS_ZOMBIE]
+    assert told.read_text().splitlines()[-1].startswith("error: ended by SIGTERM")
+    assert told.read_text().count("error") == 1
+    assert not half_written(run.folder / "results")
+    assert not list((run.folder / ".snakemake/locks").iterdir())
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+def jobs_below(pid: int) -> list[psutil.Process]:
+    """The processes of jobs below a run."""
+    below = psutil.Process(pid).children(recursive=True)
+    return [each for each in below if {"compute", "sample"} & set(each.cmdline())]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("words", [("-n",), ("-np",), ("-nc1",), ("--dry-run",), ("--dryrun", "validation")])
+def test_a_dry_run_changes_nothing(small_study, words):
+    edited = small_study.folder / "results/er3_600/validation/checks.parquet"
+    before, parts = edited.read_bytes(), ("results", "reports", "logs")
+    edited.write_bytes(before + b"x")
+    try:
+        there = {path: path.stat().st_mtime_ns for part in parts for path in (small_study.folder / part).rglob("*")}
+        done = small_study.make_run(*words)
+        assert "note: results/er3_600/validation/checks.parquet: damaged" in done.stderr
+        again = {path: path.stat().st_mtime_ns for part in parts for path in (small_study.folder / part).rglob("*")}
+        assert again == there
+    finally:
+        edited.write_bytes(before)

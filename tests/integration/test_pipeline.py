@@ -121,6 +121,15 @@ def test_a_second_run_does_nothing(small_study):
     assert "Nothing to be done" in done.stdout + done.stderr
 
 
+def test_a_stage_that_is_asked_for_by_name_computes_no_other(small_study):
+    (robot, *_) = with_inverse(small_study)
+    with edited(small_study.folder / "config/small.yaml", "seed: 20261120", "seed: 20261121"):
+        planned = small_study.planned("inverse")
+    computed = {job.partition(": ")[2] for job in planned if ": compute" in job}
+    assert computed == {"compute inverse", "compute validation"}
+    assert {f"{robot}: compute inverse", f"{robot}: report inverse", "write the index"} <= planned
+
+
 def test_editing_a_template_renders_reports_only(small_study):
     template = small_study.folder / "er3a/pipeline/stages/inverse/report.html.j2"
     with edited(template, "{% block content %}", "{% block content %}<!-- -->"):

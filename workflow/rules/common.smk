@@ -116,6 +116,35 @@ def of_all(path, view=None):
     ]
 
 
+def is_asked(robot, stage):
+    """Whether the index waits for a stage of a robot: all, or those that are named and what their pages rest on.
+
+    Of others it shows what was computed before. A job that runs elsewhere finds what it shows in place.
+    """
+    named = set(workflow.dag_settings.targets or ())
+    asked = set(STAGES)
+    if named and named <= asked:
+        asked = {name for stage in named for name in (stage, *STAGES[stage].rests_on)}
+    if not workflow.is_main_process:
+        return os.path.exists(f"results/{robot}/{stage}/summary.json")
+    return stage in asked and stage in STUDY.stages(robot)
+
+
+def shown_in_index(wildcards):
+    """Input function: the results that the index waits for, and the pages that it links to."""
+    asked = [(robot, stage) for robot in ROBOTS for stage in STUDY.stages(robot) if is_asked(robot, stage)]
+    pages = [(robot, page) for robot in ROBOTS for page in STUDY.pages(robot)]
+    return [
+        *(f"results/{robot}/{stage}/summary.json" for robot, stage in asked),
+        *(f"results/{robot}/workspace/border.parquet" for robot in STUDY.robots if is_asked(robot, "workspace")),
+        *(
+            f"reports/{robot}/{page}.html"
+            for robot, page in pages
+            if is_asked(robot, "validation" if page == "teach" else page)
+        ),
+    ]
+
+
 def viewed(wildcards):
     """Input function: the results that a stage's views show."""
     return [path.format(robot=wildcards.robot) for path in results_of(wildcards.stage)]

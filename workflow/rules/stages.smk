@@ -56,3 +56,20 @@ for stage in STAGES.values():
             f"{{wildcards.robot}}: compute {stage.name}"
         shell:
             "er3a compute {params.stage} {wildcards.robot} {input.parts} 2> {log}"
+
+    rule:
+        name:
+            stage.name
+        input:
+            "reports/index.html",
+            [
+                path.format(robot=robot)
+                for robot in ROBOTS
+                if stage.name in STUDY.stages(robot)
+                for path in (
+                    *results_of(stage.name),
+                    *(f"reports/{{robot}}/{stage.name}.rrd" for view in stage.views if view == "record"),
+                )
+            ],
+        message:
+            f"all of the stage {stage.name} is there"

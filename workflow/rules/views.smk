@@ -75,9 +75,7 @@ rule teach:
 
 rule index:
     input:
-        of_all("results/{robot}/{stage}/summary.json"),
-        expand("results/{robot}/workspace/border.parquet", robot=STUDY.robots),
-        [f"reports/{robot}/{page}.html" for robot in ROBOTS for page in STUDY.pages(robot)],
+        shown_in_index,
         CATALOGUE,
     output:
         report(

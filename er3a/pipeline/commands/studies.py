@@ -30,7 +30,7 @@ from er3a.pipeline.commands.options import (
 )
 from er3a.pipeline.messages import language
 from er3a.pipeline.study import load_study
-from er3a.pipeline.verdicts import StageVerdict, read_verdicts
+from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 
 
 @app.command(rich_help_panel=FIRST)
@@ -133,6 +133,8 @@ def verdicts(
 def _end_with_findings(found: Sequence[StageVerdict], level: FailOn) -> None:
     """Name the findings at a level, and end with 1 if there are any."""
     counted = [verdict for verdict in found if verdict.counts(level.value)]
+    if unknown := sum(verdict.status == NOT_EXAMINED for verdict in found):
+        print_note(f"not examined, and neither passed nor failed: {unknown} of {len(found)} stages")
     for verdict in counted:
         print_note(f"{verdict.robot}, {verdict.stage} ({verdict.status.replace('_', ' ')}): {verdict.text}")
     if counted:

@@ -15,6 +15,8 @@ def decision(
     ``instead`` is a model of the same arm that evidence does not contradict; ``geometry``: how many of how many lengths
     and twists of a table that is not contradicted independent documents settle.
     """
+    if table == "not_examined":
+        return tr("Its table has not been examined yet: run the stage validation before you use it.")
     if table == "fail" and instead:
         return tr("Never use this table: evidence contradicts it. Use {robot} instead.", robot=instead)
     if table == "fail":

@@ -6,7 +6,6 @@ from er3a.pipeline.messages import hand_eye, pairs, planning  # noqa: F401  (the
 from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import counted, joined, listed, say, sentence, word
-from er3a.pipeline.stages.vision.no_camera import NoCamera
 from er3a.pipeline.stages.vision.vision_verdicts import (
     CalibrationDoubtful,
     CalibrationImpossible,
@@ -28,11 +27,6 @@ from er3a.vision.grasping import (
 )
 
 PARTS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
-
-
-@say.register
-def _(found: NoCamera) -> str:
-    return sentence(found.code, "The study names no vision file for this robot.")
 
 
 @say.register

@@ -49,7 +49,7 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
 
 def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> Results[Any]:
     try:
-        if finding := stage.applies(study.robot(robot)) or stage.missing(study, robot):
+        if finding := stage.applies(study.robot(robot)):
             return AbsentResults(Summary(Verdict("not_computed", finding), ()))
         computing: Compute = partial(stage.module("compute").compute, **extra)
         return computing(study, robot)

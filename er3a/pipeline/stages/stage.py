@@ -25,11 +25,6 @@ def applies_to_all(robot: Robot) -> Finding | None:
     return None
 
 
-def nothing_missing(study: Study, robot: str) -> Finding | None:
-    """For stages that need nothing of a study but what each robot has."""
-    return None
-
-
 def no_files(study: Study, robot: str) -> list[Path]:
     """For stages that read nothing but the robot's file."""
     return []
@@ -68,9 +63,8 @@ class Stage:
     title, question : marked with ``N_``: the page's title, and what it answers
     settings : per key of the study file the model of what stands there; the first is the stage's own
     inputs : the files that a robot's results rest on besides its own file
-    wanted : whether a robot of a study goes through the stage at all
+    wanted : whether a robot of a study goes through the stage at all: whether the study gives it what the stage reads
     applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
-    missing : likewise, what the study lacks for a robot
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
     rests_on : names of the stages whose verdict its pages say first
     sampled : whether ``compute`` gathers parts that jobs of their own have sampled
@@ -83,7 +77,6 @@ class Stage:
     inputs: Callable[[Study, str], list[Path]] = no_files
     wanted: Callable[[Study, str], bool] = wanted_of_all
     applies: Callable[[Robot], Finding | None] = applies_to_all
-    missing: Callable[[Study, str], Finding | None] = nothing_missing
     absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")
     rests_on: tuple[str, ...] = ()

@@ -11,7 +11,14 @@ import pandas as pd
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.results import AbsentResults, Input, Provenance, input_records, result_records
+from er3a.pipeline.results import (
+    AbsentResults,
+    Input,
+    Provenance,
+    input_records,
+    is_computed,
+    result_records,
+)
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.study import Study
@@ -22,7 +29,7 @@ from er3a.robots.robot import Robot
 from er3a.robots.shown import shown
 
 BORDER_POINT = "tool_point"
-Workspaces = Mapping[str, WorkspaceResults | AbsentResults]
+Workspaces = Mapping[str, WorkspaceResults | AbsentResults | None]
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 
 
@@ -44,6 +51,7 @@ def write_compare(study: Study, results: Path, workspaces: Workspaces, output: P
         }
         for name, robot in robots.items()
     }
+    validated = {name: results / name / "validation" for name in robots}
     corners = np.array([point for border in borders.values() for line in border for point in line] or [[0, 0]])
     page.render(
         Path(__file__).with_name("compare.html.j2"),
@@ -53,7 +61,8 @@ def write_compare(study: Study, results: Path, workspaces: Workspaces, output: P
         rows=rows,
         data=data,
         caveats={
-            name: caveat(stage_head(results / name / "validation", STAGES["validation"]).status) for name in robots
+            name: caveat(stage_head(folder, STAGES["validation"]).status if is_computed(folder) else "not_computed")
+            for name, folder in validated.items()
         },
         low=corners.min(axis=0).tolist(),
         high=corners.max(axis=0).tolist(),
@@ -99,7 +108,7 @@ def _finite(value: float) -> float | None:
 def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str], float | str | None]:
     """Verdicts and key figures of a robot's stages by (stage, name, unit)."""
     found: dict[tuple[str, str, str], float | str | None] = {}
-    for stage in (STAGES[name] for name in stages if name in STAGES):
+    for stage in (STAGES[name] for name in stages if name in STAGES and is_computed(folder / name)):
         head, title = stage_head(folder / stage.name, stage), tr(stage.title)
         found[title, tr("verdict"), ""] = page.status_word(head.status)
         for figure in head.figures:
@@ -111,9 +120,9 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
     return found
 
 
-def border_mm(workspace: WorkspaceResults | AbsentResults) -> list[list[list[float]]]:
+def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
     """The arcs of the tool point's border in the section through axis 1: lists of (radius, height) in mm."""
-    if isinstance(workspace, AbsentResults):
+    if not isinstance(workspace, WorkspaceResults):
         return []
     border: pd.DataFrame = workspace.border.frame()
     arcs = border[(border["point"] == BORDER_POINT) & (border["view"] == "section")].groupby("arc", sort=False)

@@ -11,11 +11,12 @@ from typing import Any
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.decision import decision
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.results import Provenance, read_stage, result_records
+from er3a.pipeline.results import AbsentResults, Provenance, is_computed, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.validation.validation_findings import LeftOpen
+from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.study import Study
-from er3a.pipeline.verdicts import read_verdicts
+from er3a.pipeline.verdicts import NOT_EXAMINED, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.comparison import write_compare
 from er3a.pipeline.viewing.heads import stage_head
@@ -31,9 +32,10 @@ FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass") 
 def write_index(study: Study, results: Path, folder: Path) -> None:
     """Render ``index.html``, ``compare.html`` and ``junit.xml`` from the results of all robots and stages.
 
+    Stages that have not been computed yet are named as such.
     The comparison offers the robots that are written in the study, not the variants that sweeps make of them.
     """
-    workspaces = {name: read_stage(results / name / "workspace", STAGES["workspace"]).results for name in study.robots}
+    workspaces = {name: _workspace(results / name / "workspace") for name in study.robots}
     robots = [
         _entry(study, name, results / name) | {"thumbnail": thumbnail(study.robot(name), workspaces[name])}
         for name in study.robots
@@ -56,16 +58,22 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     write_junit(read_verdicts(study, results), folder / "junit.xml")
 
 
+def _workspace(folder: Path) -> WorkspaceResults | AbsentResults | None:
+    """What the workspace stage found; None if it has not been computed yet."""
+    return read_stage(folder, STAGES["workspace"]).results if is_computed(folder) else None
+
+
 def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     """What the index shows of a robot."""
     expected = study.entry(name).expect
-    heads = {stage: stage_head(results / stage, STAGES[stage]) for stage in study.stages(name) if stage in STAGES}
+    stages = [stage for stage in study.stages(name) if stage in STAGES]
+    heads = {stage: stage_head(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
     failed = [
         tr(STAGES[stage].title)
         for stage, head in heads.items()
         if head.status == "fail" and expected.get(stage) != "fail"  # one that is expected is a demonstration
     ]
-    table = heads["validation"].status if "validation" in heads else "not_computed"
+    table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     shown = sorted(heads.values(), key=lambda head: FIRST.index(head.status))
     return {
         "robot": study.robot(name),
@@ -73,6 +81,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "heads": [(head, *page.led(head.text)) for head in shown],
         "counts": [(status, sum(head.status == status for head in shown)) for status in FIRST],
         "expected": expected,
+        "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "decision": decision(
             table, failed, table_instead(study, name, results.parent), _geometry(heads.get("validation"))
         ),

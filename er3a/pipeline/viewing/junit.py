@@ -18,7 +18,7 @@ def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
     """Write the report.
 
     A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
-    to the robot, are skipped; a caution passes and tells what it found.
+    to the robot or has not been computed yet, are skipped; a caution passes and tells what it found.
     """
     root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
     for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
@@ -45,7 +45,12 @@ def _outcome(verdict: StageVerdict) -> str | None:
     """The element that says how a case ended; None where it passed."""
     if verdict.broken:
         return "error"
-    return {"fail": "failure", "no_reference": "skipped", "not_computed": "skipped"}.get(verdict.status)
+    return {
+        "fail": "failure",
+        "no_reference": "skipped",
+        "not_computed": "skipped",
+        "not_examined": "skipped",
+    }.get(verdict.status)
 
 
 def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.results import Stored, read_stage
+from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceSummary
 from er3a.pipeline.study import Study
@@ -49,8 +49,13 @@ class Point:
 
 
 def sweep_sections(study: Study, results: Path) -> list[dict[str, Any]]:
-    """What the template shows of each sweep of the study."""
-    return [_section(study, name, results) for name in study.sweeps]
+    """What the template shows of each sweep of the study whose variants have all been computed."""
+    return [_section(study, name, results) for name in study.sweeps if _is_whole(study, name, results)]
+
+
+def _is_whole(study: Study, name: str, results: Path) -> bool:
+    variants = [variant.name for variant in study.variants.values() if variant.sweep == name]
+    return all(is_computed(results / variant / stage) for variant in variants for stage in study.stages(variant))
 
 
 def _section(study: Study, name: str, results: Path) -> dict[str, Any]:

@@ -26,10 +26,10 @@ class Thumbnail:
     arm: str
 
 
-def thumbnail(robot: Robot, workspace: WorkspaceResults | AbsentResults) -> Thumbnail:
+def thumbnail(robot: Robot, workspace: WorkspaceResults | AbsentResults | None) -> Thumbnail:
     """Draw a robot: with the exact border where there is one, else the outline of the sampled hull, if any."""
     arm = skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000
-    reach = [] if isinstance(workspace, AbsentResults) else [line * 1000 for line in _reach(workspace)]
+    reach = [line * 1000 for line in _reach(workspace)] if isinstance(workspace, WorkspaceResults) else []
     corners = np.concatenate([arm, *reach])
     low, high = corners.min(axis=0) - MARGIN_MM, corners.max(axis=0) + MARGIN_MM
     box = (low[0], -high[1], *(high - low))

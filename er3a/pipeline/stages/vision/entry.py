@@ -13,7 +13,6 @@ from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.vision.no_camera import NoCamera
 
 if TYPE_CHECKING:
     from er3a.pipeline.study import Study
@@ -42,8 +41,8 @@ def _inputs(study: Study, robot: str) -> list[Path]:
     return [*vision_files(file), *study.scenes(robot, STAGE.name)] if file else []
 
 
-def _missing(study: Study, robot: str) -> NoCamera | None:
-    return None if study.entry(robot).vision else NoCamera()
+def _wanted(study: Study, robot: str) -> bool:
+    return study.entry(robot).vision is not None
 
 
 STAGE = Stage(
@@ -52,7 +51,6 @@ STAGE = Stage(
     question=N_("Is the camera calibrated well enough, and which objects can be grasped?"),
     settings={"vision": VisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
-    missing=_missing,
-    absences=(NoCamera,),
+    wanted=_wanted,
     rests_on=("validation",),
 )
