@@ -13,7 +13,7 @@ ARGS   ?=
 export STUDY
 # A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
 unexport PYTHONDONTWRITEBYTECODE
-.PHONY: help run test test-all view estimate archive lint format schema words lock clean distclean campaigns docs pictures evidence release-check
+.PHONY: help run test test-all view archive lint format schema words lock clean distclean campaigns docs pictures evidence release-check
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  make \1\t/' | expand -t 18
@@ -29,9 +29,6 @@ test-all: $(VENV)/dev.stamp  ## set up and run all tests, the long ones too
 
 view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
 	@$(BIN)/er3a view $(ROBOT)
-
-estimate: $(VENV)/run.stamp  ## say what the study will take before it is run (STUDY=..., ARGS="--cores 1,8,64")
-	@$(BIN)/er3a estimate --study "$$STUDY" $(ARGS)
 
 archive: $(VENV)/run.stamp  ## pack the finished study into er3a-study.zip, with RO-Crate metadata
 	@$(BIN)/er3a archive --study "$$STUDY"

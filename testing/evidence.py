@@ -36,12 +36,11 @@ PAGES = (
     "capability",
     "teach",
     "pages",
-    "estimate",
     "fleet",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md", "slurm": "cluster.md"}
 CAMPAIGNS = (*PAGES, *PARTS)
-STARTING_COMMANDS = {"pages", "estimate", "faults", "kills", "slurm"}
+STARTING_COMMANDS = {"pages", "faults", "kills", "slurm"}
 DIGITS = 16
 LINE = "Code: `{digest}`, a digest of `benchmarks/campaign_{name}.py` and of {count} modules that it rests on."
 _NAMED = re.compile(r"^Code: `([0-9a-f]+)`, a digest of `benchmarks/campaign_(\w+)\.py`", re.MULTILINE)

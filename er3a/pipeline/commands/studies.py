@@ -163,34 +163,6 @@ def view(
 
 
 @app.command(rich_help_panel=FIRST)
-def estimate(
-    cores: Annotated[str, typer.Option(help="numbers of cores, of one machine or of nodes together")] = "1,2,8,64",
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
-    reports: Reports = DEFAULT_REPORTS,
-    logs: Annotated[Path, typer.Option(help="folder of a run's timings")] = Path("logs"),
-    as_json: AsJson = False,
-):
-    """Say what the study will take: samples/s, wall time, memory and disk, from a short calibration on this machine."""
-    from rich.console import Console
-
-    from er3a.pipeline.estimate.cost import measured_here
-    from er3a.pipeline.estimate.terminal import estimate_record, print_estimate
-
-    numbers = cores.split(",")
-    if not all(number.strip().isdigit() and int(number) > 0 for number in numbers):
-        raise Er3aError(f"--cores is '{cores}'; expected numbers such as 1,2,8,64")
-    loaded = load_study(study)
-    with Console(stderr=True).status("Measuring on this machine ..."):
-        measured = measured_here(loaded, results, reports, logs)
-    counts = sorted({int(number) for number in numbers})
-    if as_json:
-        print_json(estimate_record(loaded, measured, counts))
-    else:
-        print_estimate(loaded, measured, counts)
-
-
-@app.command(rich_help_panel=FIRST)
 def diff(
     old: Annotated[Path, typer.Argument(help="a results folder")],
     new: Annotated[Path, typer.Argument(help="another results folder")],
