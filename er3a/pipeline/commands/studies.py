@@ -29,6 +29,7 @@ from er3a.pipeline.commands.options import (
     print_note,
 )
 from er3a.pipeline.messages import language
+from er3a.pipeline.progress import shown_work
 from er3a.pipeline.study import load_study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts
 
@@ -49,10 +50,13 @@ def new(
     from er3a.pipeline.new_study.brought_arm import arm_of
     from er3a.pipeline.new_study.write import write_study
 
-    arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=(base, tip))
+    with shown_work(f"{folder}: the arm is read") as at:
+        arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=(base, tip))
+        at(f"{folder}: targets and paths that the arm can do are looked for")
+        files = write_study(arm, folder)
     for note in arm.notes:
         print_note(note)
-    for file in write_study(arm, folder):
+    for file in files:
         print(f"{file}: written")
     print(f"Next: cd {shlex.quote(str(folder))} && er3a run")
 
