@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from testing.evidence import sized
 from testing.hand_eye_coverage import SAMPLES, pose_coverage, table_coverage
 
 SETUPS = ("eye_in_hand", "eye_to_hand")
-SETS, RUNS, TABLE_RUNS, SEED = 10, 1000, 300, 20261121
+SETS, RUNS, TABLE_RUNS, SEED = sized(10), sized(1000), sized(300), 20261121
 
 
 def table() -> str:
