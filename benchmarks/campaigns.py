@@ -82,10 +82,7 @@ def main(words: Sequence[str]) -> int:
         ended = dict(zip(beside, pool.map(lambda name: _carried_out(name, asked.share), beside)))
     ended |= {name: _carried_out(name, asked.share) for name in names if name in ALONE}
     failed = [name for name, well in ended.items() if not well]
-    print(
-        f"{len(ended)} campaigns in {time.monotonic() - start:.0f} s"
-        + (f"; failed: {', '.join(failed)}" if failed else "")
-    )
+    print(f"{len(ended)} campaigns in {time.monotonic() - start:.0f} s; failed: {', '.join(failed) or 'none'}")
     return 1 if failed else 0
 
 

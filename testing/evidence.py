@@ -1,7 +1,7 @@
 """Pages of evidence: which there are, how large their campaigns are, and which commit a page was made from.
 
-A page tells of the code it was made from, and says which that is: version, commit, date. It is not made again with every
-edit; ``make campaigns`` makes again what the code, the data or the study files have changed for since.
+A page tells of the code that it was made from, and says which that is: version, commit, date. It is not made again
+with every edit; ``make campaigns`` makes those pages again since whose commit code, data or studies have changed.
 
 make release-check            an error if the papers of a release disagree; lists pages that tell of other code
 """
