@@ -22,7 +22,7 @@ from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.six_revolute import prepared, solve_six_revolute
 from testing.evidence import sized
 
-POSES = sized(10_000, 400)
+POSES = sized(2000, 400)
 SEED, ROUNDS = 20261121, 15
 SPECIAL_ARMS, SINGULAR = POSES // 50, POSES // 400
 H = np.pi / 2

@@ -17,7 +17,7 @@ from er3a.pipeline.messages.diagnosis import both
 from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3_600")
-NOISE_MM, DRAWS, RIGHT_DRAWS, BLIND_DRAWS, SEED = 0.5, sized(3), sized(500), sized(60), 20261120
+NOISE_MM, DRAWS, RIGHT_DRAWS, BLIND_DRAWS, SEED = 0.5, sized(3), sized(150), sized(30), 20261120
 SIZES, NOISY_SIZES, PAIRS, PAIRS_BEYOND = sized(8), sized(4), sized(100), 3.0
 
 HEAD = """# Diagnosis: faults put into each trustworthy table

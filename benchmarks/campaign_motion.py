@@ -24,10 +24,10 @@ from testing.motion_cases import ASSUMED, JOINT_KINDS, Tally, compare, contacts_
 from testing.motion_oracle import GRAZING, GRAZING_JERK, GRAZING_RAD, POINTS, SPAN_S, TOUCH, WIDER
 
 ROBOTS = ("er3_600", "er3a_c60")
-PATHS = dict.fromkeys((*JOINT_KINDS, "lines"), sized(500))  # per robot
-PATHS |= dict.fromkeys(("arcs", "rounded sequences"), sized(200))
+PATHS = dict.fromkeys((*JOINT_KINDS, "lines"), sized(100))  # per robot
+PATHS |= dict.fromkeys(("arcs", "rounded sequences"), sized(40))
 SAMPLES = (2, 500)
-QUERIES, SEED, DENSE, OTHER_S = sized(200), 20261120, 1001, 60.0
+QUERIES, SEED, DENSE, OTHER_S = sized(30), 20261120, 1001, 20.0
 FREE = 0.005  # m, by which both ends of a query are clear
 
 

@@ -75,6 +75,12 @@ def main(words: Sequence[str]) -> int:
         return 0
     kept = {each.campaign for each in evidence() if is_of_this_code(each)} if asked.share == 1 else set()
     names = [name for name in asked.names or CAMPAIGNS if asked.again or name not in kept]
+    try:
+        if asked.share == 1 and names:
+            made_from(names[0], 0)
+    except RuntimeError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
     names.sort(key=lambda name: FIRST.index(name) if name in FIRST else len(FIRST))
     start = time.monotonic()
     with ThreadPoolExecutor(asked.jobs) as pool:
