@@ -13,7 +13,7 @@ ARGS   ?=
 export STUDY
 # A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
 unexport PYTHONDONTWRITEBYTECODE
-.PHONY: help run test test-all view estimate archive lint format schema words lock clean distclean campaigns docs pictures evidence release-check
+.PHONY: help run test test-all view archive lint format schema words lock clean distclean campaigns docs pictures release-check
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## /  make \1\t/' | expand -t 18
@@ -29,9 +29,6 @@ test-all: $(VENV)/dev.stamp  ## set up and run all tests, the long ones too
 
 view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
 	@$(BIN)/er3a view $(ROBOT)
-
-estimate: $(VENV)/run.stamp  ## say what the study will take before it is run (STUDY=..., ARGS="--cores 1,8,64")
-	@$(BIN)/er3a estimate --study "$$STUDY" $(ARGS)
 
 archive: $(VENV)/run.stamp  ## pack the finished study into er3a-study.zip, with RO-Crate metadata
 	@$(BIN)/er3a archive --study "$$STUDY"
@@ -62,7 +59,7 @@ words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeli
 		--ignore-obsolete --ignore-pot-creation-date
 	rm $(LOCALE)/er3a.pot
 
-campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/evidence/ again
+campaigns: $(VENV)/dev.stamp  ## evidence whose code has changed, again (ARGS="motion --again", ARGS="--share 0.01")
 	$(BIN)/python -m benchmarks.campaigns $(ARGS)
 
 docs: $(VENV)/docs.stamp  ## build the documentation site in docs/_build/html, warnings as errors
@@ -73,11 +70,8 @@ pictures: $(VENV)/dev.stamp  ## pictures of the documentation again, from finish
 	$(BIN)/python -m testing.pictures playing
 	$(BIN)/python -m testing.pictures arms
 
-evidence: $(VENV)/run.stamp  ## list which pages of evidence rest on the code that is here
+release-check: $(VENV)/run.stamp  ## an error unless the papers of a release agree; lists pages of evidence of other code
 	@$(BIN)/python -m testing.evidence
-
-release-check: $(VENV)/run.stamp  ## the same; an error unless a release could be made of this
-	@$(BIN)/python -m testing.evidence --release
 
 lock: $(VENV)/uv.stamp  ## resolve the locked requirements again
 	$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt

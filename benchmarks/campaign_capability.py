@@ -20,13 +20,14 @@ from er3a.workspace.interval_inverse import GOOD, NEVER, branches, theta_ranges
 from er3a.workspace.placement import NO, Task, fitting_places, narrowed, survey
 from er3a.workspace.placement_proof import choose_places, proven_bricks
 from er3a.workspace.section_arm import section_arm
+from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 SEED, ACROSS, DIRECTIONS = 20261120, 64, 300
-BUDGETS = (1_000_000, 10_000_000)
-NEIGHBOURHOODS, MEMBERS = 4000, 50
+BUDGETS = (sized(1_000_000), sized(10_000_000))
+NEIGHBOURHOODS, MEMBERS = sized(4000), 50
 SIZES = ((0.001, 0.003), (0.005, 0.02), (0.02, 0.1))
-SERVICES = 400_000
+SERVICES = sized(400_000)
 TRAY = Task(np.array([0.2, 0.15, 0.05]), np.array([0.0, 0.0, -1.0]), np.radians(30), 0.0, 0.15, np.radians(2))
 
 

@@ -6,7 +6,6 @@ this file's own, from random joint values until 60 successes in a row bring noth
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 
@@ -21,8 +20,9 @@ from er3a.kinematics.classes.four_bar import solve_three_parallel
 from er3a.kinematics.classes.links import links_of_rows, poses_of
 from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.six_revolute import prepared, solve_six_revolute
+from testing.evidence import sized
 
-POSES = int(os.environ.get("CLASSES_POSES", "10000"))
+POSES = sized(2000, 400)
 SEED, ROUNDS = 20261121, 15
 SPECIAL_ARMS, SINGULAR = POSES // 50, POSES // 400
 H = np.pi / 2

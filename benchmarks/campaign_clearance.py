@@ -13,10 +13,11 @@ from er3a.collision.scene import Cylinder, Scene, Sphere
 from er3a.geometry.transforms import transform
 from er3a.planning.moves import JointMove
 from testing.dense_contacts import Contacts
+from testing.evidence import sized
 from testing.motion_cases import contacts_of
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-MOTIONS, SEED, DEPTH = 1000, 20261120, 1e-4
+MOTIONS, SEED, DEPTH = sized(400), 20261120, 1e-4
 DENSE, FINE = 501, 40  # even times of a motion; of each interval of them in which the bodies are near
 NEAR = 0.02  # m
 ENDS = np.array([0.0, 1.0])

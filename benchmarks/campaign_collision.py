@@ -11,13 +11,14 @@ from er3a import load_robot, load_scene
 from er3a.collision.bodies import Bodies
 from er3a.collision.distance_kernels import FREE, free_between, judge_polyline
 from testing.collision_peers import SHAPES, Outsider, Peer, coal_distance, fcl_distance, own_distance
+from testing.evidence import sized
 
 ROBOTS = {
     "er3a_c60": "data/scenes/table_and_post.yaml",
     "er3a_c60_article": "data/scenes/wall_and_low_floor.yaml",
     "er3_600": "data/scenes/table_and_post.yaml",
 }
-PAIRS, MOTIONS, SEED, SAMPLES = 400, 1000, 20261121, 10_000
+PAIRS, MOTIONS, SEED, SAMPLES = sized(400), sized(1000), 20261121, sized(10_000)
 DEPTH = 1e-4  # m, of the dense check
 
 

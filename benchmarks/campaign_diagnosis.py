@@ -14,10 +14,11 @@ from er3a.diagnosis.mutations import Mutation, Outcome, mutations_of, noisy, try
 from er3a.diagnosis.ranking import case_of, rank, usable
 from er3a.diagnosis.scans import is_identifiable, random_pairs, single_scan
 from er3a.pipeline.messages.diagnosis import both
+from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3_600")
-NOISE_MM, DRAWS, RIGHT_DRAWS, BLIND_DRAWS, SEED = 0.5, 3, 500, 60, 20261120
-SIZES, NOISY_SIZES, PAIRS, PAIRS_BEYOND = 8, 4, 100, 3.0
+NOISE_MM, DRAWS, RIGHT_DRAWS, BLIND_DRAWS, SEED = 0.5, sized(3), sized(150), sized(30), 20261120
+SIZES, NOISY_SIZES, PAIRS, PAIRS_BEYOND = sized(8), sized(4), sized(100), 3.0
 
 HEAD = """# Diagnosis: faults put into each trustworthy table
 

@@ -6,10 +6,11 @@ import tempfile
 import time
 from pathlib import Path
 
+from testing.evidence import sized
 from testing.file_judge import MOST_SECONDS, run
 from testing.input_files import seeds
 
-SEED, MUTANTS = 20261120, 6000
+SEED, MUTANTS = 20261120, sized(3000)
 KINDS = {
     "traceback": "a traceback, or a warning of a library",
     "hang": f"more than {MOST_SECONDS:g} s of processor time",

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from testing.evidence import sized
 from testing.hand_eye_coverage import SAMPLES, pose_coverage, table_coverage
 
 SETUPS = ("eye_in_hand", "eye_to_hand")
-SETS, RUNS, TABLE_RUNS, SEED = 10, 1000, 300, 20261121
+SETS, RUNS, TABLE_RUNS, SEED = sized(10), sized(250), sized(100), 20261121
+
+
+def _error(runs: int) -> str:
+    """Standard error of a share of 95 %."""
+    return f"{np.sqrt(0.95 * 0.05 / runs):.1%}"
 
 
 def table() -> str:
@@ -17,7 +23,7 @@ def table() -> str:
         "",
         f"The twelve numbers of hand-eye and board pose, from {SAMPLES} samples with normal errors of camera (where",
         f"deviations are stated, of the flange too): {SETS * RUNS} runs a row, {RUNS} at each of {SETS} sets of",
-        "poses. The standard error of a share is 0.2 %. Written by `make campaigns ARGS=hand_eye`.",
+        f"poses. The standard error of a share is {_error(SETS * RUNS)}. Written by `make campaigns ARGS=hand_eye`.",
         "",
         "| camera | deviations | all numbers | lowest of one | highest of one |",
         "|---|---|---|---|---|",
@@ -32,7 +38,7 @@ def table() -> str:
     lines += [
         "",
         f"With corrections to the table of er3a_c60 as well, from 25 samples at random joint angles: {TABLE_RUNS}",
-        "runs a row, each at other angles; the standard error of one number's share is 1.3 %.",
+        f"runs a row, each at other angles; the standard error of one number's share is {_error(TABLE_RUNS)}.",
         "",
         "| camera | deviations | numbers | all numbers | lowest of one | highest of one |",
         "|---|---|---|---|---|---|",

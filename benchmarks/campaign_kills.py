@@ -12,9 +12,10 @@ from pathlib import Path
 from random import Random
 
 from er3a.pipeline.viewing.viewer import without_statistics
+from testing.evidence import sized
 from testing.small_study import contents, environment, finished, fresh, run_command
 
-KILLS, SEED = 50, 20261120
+KILLS, SEED = sized(12), 20261120
 LONGEST_S = 40.0  # a kill comes at a moment drawn evenly from this long after each start
 RERUN = Path(sys.executable).with_name("rerun")
 

@@ -10,9 +10,10 @@ import pinocchio
 from er3a import forward, jacobian, load_robot
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.wrist_partitioned import solve_slots
+from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-POSES, ROUND_TRIPS, SEED = 10_000, 1_000_000, 20261120
+POSES, ROUND_TRIPS, SEED = sized(10_000), sized(1_000_000), 20261120
 
 
 def pinocchio_model(robot):

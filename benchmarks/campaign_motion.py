@@ -18,14 +18,16 @@ from er3a.collision.bodies import Bodies
 from er3a.planning.timing import joint_limits
 from er3a.planning.way_around import PlanningTask, WayAround, way_around
 from testing.dense_contacts import Contacts
+from testing.evidence import sized
 from testing.hard_scenes import hard_scenes
 from testing.motion_cases import ASSUMED, JOINT_KINDS, Tally, compare, contacts_of, looked_at, random_spec
 from testing.motion_oracle import GRAZING, GRAZING_JERK, GRAZING_RAD, POINTS, SPAN_S, TOUCH, WIDER
 
 ROBOTS = ("er3_600", "er3a_c60")
-PATHS = {**dict.fromkeys((*JOINT_KINDS, "lines"), 500), "arcs": 200, "rounded sequences": 200}  # per robot
+PATHS = dict.fromkeys((*JOINT_KINDS, "lines"), sized(100))  # per robot
+PATHS |= dict.fromkeys(("arcs", "rounded sequences"), sized(40))
 SAMPLES = (2, 500)
-QUERIES, SEED, DENSE, OTHER_S = 200, 20261120, 1001, 60.0
+QUERIES, SEED, DENSE, OTHER_S = sized(30), 20261120, 1001, 20.0
 FREE = 0.005  # m, by which both ends of a query are clear
 
 

@@ -21,11 +21,12 @@ from er3a.planning.follow import follow
 from er3a.planning.moves import line
 from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
+from testing.evidence import sized
 from testing.exact_paths import worst_location
 from testing.random_paths import KINDS, NEAR, Found
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-PATHS, LINES, TROUBLED, SEED = 120, 200, 30, 20261120
+PATHS, LINES, TROUBLED, SEED = sized(120), sized(200), sized(30), 20261120
 SAMPLES = 10_000
 
 

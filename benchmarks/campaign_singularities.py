@@ -11,10 +11,11 @@ import numpy as np
 
 from er3a import forward, inverse, load_robot
 from testing.arms import pose_errors
+from testing.evidence import sized
 from testing.singular_poses import CLASSES, admissible_slots, family_holds, joints_near, tolerance, turned
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-POSES, SEED = 10_000, 20261120
+POSES, SEED = sized(2000), 20261120
 
 
 def judged(task: tuple[str, str]) -> str:

@@ -28,9 +28,11 @@ from er3a import forward, inverse_batch, jacobian, load_robot, solve
 from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.solutions import Solutions
+from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-POSES, FORWARD_POSES, NUMERICAL_POSES, PEER_POSES, SEED, ROUNDS = 100_000, 1_000_000, 10_000, 5_000, 20261120, 7
+POSES, FORWARD_POSES, NUMERICAL_POSES, PEER_POSES = (sized(n) for n in (100_000, 1_000_000, 10_000, 5_000))
+SEED, ROUNDS = 20261120, 7
 THREAD_ROUNDS = 40
 
 

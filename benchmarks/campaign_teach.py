@@ -16,12 +16,13 @@ from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import panel_data, write_teach_page
 from testing import chromium
 from testing.arms import joints_at_random, pose_errors
+from testing.evidence import sized
 from testing.teach_kinematics import NEAR, SOLVE
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 SCREENS = {"phone": (375, 800), "laptop": (1280, 900), "4K": (3840, 2160)}
 OPENINGS, SECONDS = 9, 5
-POSES, BATCH, SEED = 10_000, 1000, 20261120
+POSES, BATCH, SEED = sized(10_000, 1000), 1000, 20261120
 
 ANIMATE = """
 const [seconds, done] = arguments;

@@ -26,12 +26,13 @@ from er3a.workspace.lookup import SectionMap
 from er3a.workspace.proof import judge, prove
 from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
 from er3a.workspace.volume import POINT, estimate_volume
+from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 CELLS = {name: (6_000, 25_000, 60_000) for name in ROBOTS} | {"er3a_c60": (6_000, 60_000, 400_000)}
-SAMPLES, SEED, RUNS, POINTS = 1_000_000_000, 20261120, 12, 2000
+SAMPLES, SEED, RUNS, POINTS = sized(1_000_000_000), 20261120, sized(12, 2), 2000
 _BLOCK = 1 << 18
-_SPEED_SAMPLES, _MEMORY_SAMPLES = 100_000_000, 1_000_000_000
+_SPEED_SAMPLES, _MEMORY_SAMPLES = sized(100_000_000), sized(1_000_000_000)
 GENERAL_CELLS = (32_000, 200_000)  # of the default budget (`proof_cells: 8000`), and of `proof_cells: 50000`
 
 

@@ -1,22 +1,33 @@
-"""Evidence at full size: each campaign writes its page in docs/evidence/, or its part of another page of docs/, again.
+"""Evidence: each campaign writes its page in docs/evidence/, or its part of another page of docs/, again.
 
-make campaigns                       all of them
-make campaigns ARGS="kinematics"     one
+make campaigns                             those whose pages tell of other code than is here, two at a time
+make campaigns ARGS="kinematics --again"   one, in any case
+make campaigns ARGS="--share 0.01"         each with a hundredth of its cases, printed and not written
 """
 
 from __future__ import annotations
 
+import argparse
+import os
+import subprocess
 import sys
+import threading
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 
-from testing.evidence import CAMPAIGNS, PAGES, code_line, page_of
+from testing.evidence import CAMPAIGNS, PAGES, SHARE, evidence, is_of_this_code, made_from, page_of
 
 END = "<!-- end of {name} -->"
+ALONE = ("speed", "pages", "teach", "slurm")  # they measure times on the wall, or take all cores
+FIRST = ("fleet", "classes", "motion", "diagnosis", "kills", "hand_eye", "faults")  # the longest
+_WRITING = threading.Lock()  # several write parts of one page
 
 
-def write(name: str, text: str) -> None:
+def write(name: str, text: str, line: str) -> None:
     """Write a campaign's page, or replace its part of a page between the comments that mark it; name the code."""
-    page, text = page_of(name), f"{text.rstrip()}\n\n{code_line(name)}\n"
+    page, text = page_of(name), f"{text.rstrip()}\n\n{line}\n"
     if name in PAGES:
         page.write_text(text, encoding="utf-8")
         return
@@ -26,17 +37,59 @@ def write(name: str, text: str) -> None:
     page.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
 
 
-def main(names: list[str]) -> int:
-    unknown = [name for name in names if name not in CAMPAIGNS]
-    if unknown:
+def _carried_out(name: str, share: float) -> bool:
+    """Run one campaign in a process of its own, and write its page unless only a share of it was tried."""
+    start = time.monotonic()
+    line = "" if share < 1 else made_from(name, 0)
+    command = [sys.executable, "-m", "benchmarks.campaigns", "--table", name]
+    done = subprocess.run(
+        command, env=os.environ | {SHARE: f"{share:g}"}, capture_output=True, text=True, encoding="utf-8", check=False
+    )
+    seconds = time.monotonic() - start
+    told = "failed" if done.returncode else "done"
+    with _WRITING:
+        print(f"{name}: {told} in {seconds:.0f} s", flush=True)
+        if done.returncode:
+            print(done.stderr[-3000:], file=sys.stderr, flush=True)
+        elif line:
+            write(name, done.stdout, line.replace("in 0 s", f"in {seconds:.0f} s"))
+        else:
+            print(done.stdout, flush=True)
+    return done.returncode == 0
+
+
+def main(words: Sequence[str]) -> int:
+    """Carry out the campaigns that are named, or all."""
+    parser = argparse.ArgumentParser(prog="make campaigns")
+    parser.add_argument("names", nargs="*", help=", ".join(CAMPAIGNS))
+    parser.add_argument("--again", action="store_true", help="also those whose pages tell of the code that is here")
+    parser.add_argument("--share", type=float, default=1.0, help="of the cases; below 1 no page is written")
+    parser.add_argument("--jobs", type=int, default=2, help="campaigns at a time")
+    parser.add_argument("--table", metavar="NAME", help="print a campaign's text and nothing else")
+    asked = parser.parse_args(words)
+    if unknown := sorted({*asked.names, *([asked.table] if asked.table else [])} - {*CAMPAIGNS}):
         print(f"error: no campaign '{unknown[0]}'; known: {', '.join(CAMPAIGNS)}", file=sys.stderr)
         return 2
-    for name in names or CAMPAIGNS:
-        print(f"{name} ...", flush=True)
-        text = import_module(f"benchmarks.campaign_{name}").table()
-        write(name, text)
-        print(text)
-    return 0
+    if asked.table:
+        print(import_module(f"benchmarks.campaign_{asked.table}").table())
+        return 0
+    kept = {each.campaign for each in evidence() if is_of_this_code(each)} if asked.share == 1 else set()
+    names = [name for name in asked.names or CAMPAIGNS if asked.again or name not in kept]
+    try:
+        if asked.share == 1 and names:
+            made_from(names[0], 0)
+    except RuntimeError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    names.sort(key=lambda name: FIRST.index(name) if name in FIRST else len(FIRST))
+    start = time.monotonic()
+    with ThreadPoolExecutor(asked.jobs) as pool:
+        beside = [name for name in names if name not in ALONE]
+        ended = dict(zip(beside, pool.map(lambda name: _carried_out(name, asked.share), beside)))
+    ended |= {name: _carried_out(name, asked.share) for name in names if name in ALONE}
+    failed = [name for name, well in ended.items() if not well]
+    print(f"{len(ended)} campaigns in {time.monotonic() - start:.0f} s; failed: {', '.join(failed) or 'none'}")
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

@@ -1,25 +1,21 @@
-"""Which pages of evidence still rest on the code that stands here.
+"""Pages of evidence: which there are, how large their campaigns are, and which commit a page was made from.
 
-Each page that a campaign writes ends with a digest of the campaign's source and of every module of er3a and of its test
-tools that it imports, or that the commands use which it starts. Another digest means that the page tells of other code.
+A page tells of the code that it was made from, and says which that is: version, commit, date. It is not made again
+with every edit; ``make campaigns`` makes those pages again since whose commit code, data or studies have changed.
 
-make evidence                 lists the pages and what has become of them
-make release-check            the same, and ends with 1 if any is stale or the release's papers are not in order
+make release-check            an error if the papers of a release disagree; lists pages that tell of other code
 """
 
 from __future__ import annotations
 
-import argparse
+import os
 import re
-from collections.abc import Iterable
+import subprocess
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
-
-from er3a.pipeline.code_digest import digest_of, sources
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCS = ROOT / "docs"
 PAGES = (
     "kinematics",
     "classes",
@@ -36,64 +32,33 @@ PAGES = (
     "capability",
     "teach",
     "pages",
-    "estimate",
     "fleet",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md", "slurm": "cluster.md"}
 CAMPAIGNS = (*PAGES, *PARTS)
-STARTING_COMMANDS = {"pages", "estimate", "faults", "kills", "slurm"}
-DIGITS = 16
-LINE = "Code: `{digest}`, a digest of `benchmarks/campaign_{name}.py` and of {count} modules that it rests on."
-_NAMED = re.compile(r"^Code: `([0-9a-f]+)`, a digest of `benchmarks/campaign_(\w+)\.py`", re.MULTILINE)
+COUNTING = ("er3a", "testing", "benchmarks", "data", "config", "workflow", "profiles", "Snakefile", "requirements")
+SHARE = "CAMPAIGN_SHARE"
+LINE = "Made from er3a {version} at commit `{commit}` ({date}) by `make campaigns ARGS={name}`, in {seconds:.0f} s."
+_NAMED = re.compile(r"^Made from er3a \S+ at commit `([0-9a-f]+)` \([\d-]+\) by `make campaigns ARGS=(\w+)`", re.M)
 
-Standing = Literal["current", "stale", "not named"]
+
+def sized(count: int, least: int = 1) -> int:
+    """A campaign's number of cases, or the share of it that this process is to try (``CAMPAIGN_SHARE``)."""
+    return max(least, round(count * float(os.environ.get(SHARE, "1"))))
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """A page, or a part of one, that a campaign wrote; ``named`` is the digest that stands there, if any."""
+    """A page, or a part of one; ``commit`` that it says it was made from, None if it names none."""
 
     campaign: str
     page: Path
-    named: str | None
-    present: str
-
-    @property
-    def standing(self) -> Standing:
-        """Whether the page rests on the code that is here."""
-        if self.named is None:
-            return "not named"
-        return "current" if self.named == self.present else "stale"
+    commit: str | None
 
 
 def page_of(campaign: str, root: Path = ROOT) -> Path:
     """The page that a campaign writes, or writes a part of."""
     return root / "docs" / PARTS.get(campaign, f"evidence/{campaign}.md")
-
-
-def files_of(campaign: str, root: Path = ROOT) -> set[Path]:
-    """The sources that a campaign's page rests on."""
-    modules = [f"benchmarks.campaign_{campaign}"]
-    if campaign in STARTING_COMMANDS:
-        modules += ["er3a.pipeline.cli", *_verbs(root)]
-    return sources(modules, root)
-
-
-def _verbs(root: Path) -> Iterable[str]:
-    """Modules of stages, which the command line imports by name."""
-    for file in sorted((root / "er3a/pipeline/stages").glob("*/*.py")):
-        if file.stem in {"compute", "record", "report"}:
-            yield ".".join(file.relative_to(root).with_suffix("").parts)
-
-
-def digest(campaign: str, root: Path = ROOT) -> str:
-    """The digest of those sources."""
-    return digest_of(files_of(campaign, root), root)[:DIGITS]
-
-
-def code_line(campaign: str, root: Path = ROOT) -> str:
-    """The line that a page ends with."""
-    return LINE.format(digest=digest(campaign, root), name=campaign, count=len(files_of(campaign, root)) - 1)
 
 
 def evidence(root: Path = ROOT) -> tuple[Evidence, ...]:
@@ -102,16 +67,45 @@ def evidence(root: Path = ROOT) -> tuple[Evidence, ...]:
     for campaign in CAMPAIGNS:
         page = page_of(campaign, root)
         text = page.read_text(encoding="utf-8") if page.is_file() else ""
-        named = {name: digest for digest, name in _NAMED.findall(text)}
-        found.append(Evidence(campaign, page, named.get(campaign), digest(campaign, root)))
+        named = {name: commit for commit, name in _NAMED.findall(text)}
+        found.append(Evidence(campaign, page, named.get(campaign)))
     return tuple(found)
+
+
+def is_of_this_code(each: Evidence, root: Path = ROOT) -> bool:
+    """Whether nothing that a campaign could rest on has changed since the commit that a page names."""
+    if each.commit is None:
+        return False
+    return _git(root, "diff", "--quiet", each.commit, "--", *COUNTING).returncode == 0
+
+
+def made_from(campaign: str, seconds: float, root: Path = ROOT) -> str:
+    """The line that a page ends with.
+
+    Raises
+    ------
+    RuntimeError
+        if code that counts is not committed, so that no commit names it
+    """
+    if _git(root, "diff", "--quiet", "HEAD", "--", *COUNTING).returncode:
+        raise RuntimeError("the code has changes that are not committed, so no commit names it: commit them first")
+    commit = _git(root, "rev-parse", "--short=10", "HEAD").stdout.strip()
+    date = datetime.now(UTC).date().isoformat()
+    return LINE.format(version=_version(root), commit=commit, date=date, name=campaign, seconds=seconds)
+
+
+def _git(root: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=False)
+
+
+def _version(root: Path) -> str:
+    text = (root / "er3a/version.py").read_text(encoding="utf-8")
+    return str(re.findall(r'^__version__ = "(.+)"$', text, re.MULTILINE)[0])
 
 
 def papers_out_of_order(root: Path = ROOT) -> tuple[str, ...]:
     """What a release's papers say against each other."""
-    version = re.findall(
-        r'^__version__ = "(.+)"$', (root / "er3a/version.py").read_text(encoding="utf-8"), re.MULTILINE
-    )[0]
+    version = _version(root)
     stated = {
         "CITATION.cff": rf"^version: {re.escape(version)}$",
         "CHANGELOG.md": rf"^## \[{re.escape(version)}\] - \d{{4}}-\d\d-\d\d$",
@@ -127,20 +121,15 @@ def papers_out_of_order(root: Path = ROOT) -> tuple[str, ...]:
     return tuple(missing)
 
 
-def main(words: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description="Lists which pages of evidence rest on the code that is here.")
-    parser.add_argument("--release", action="store_true", help="end with 1 unless a release could be made of this")
-    release = parser.parse_args(words).release
-    every = evidence()
-    for each in every:
-        campaign = "" if each.standing == "current" else f"   make campaigns ARGS={each.campaign}"
-        print(f"{each.standing:<9}  {each.page.relative_to(ROOT)} ({each.campaign}){campaign}")
-    stale = sum(each.standing != "current" for each in every)
-    print(f"{stale} of {len(every)} rest on other code than is here")
-    problems = papers_out_of_order() if release else ()
+def main() -> int:
+    """Of a release: list the pages that tell of other code; 1 if its papers disagree."""
+    for each in evidence():
+        if not is_of_this_code(each):
+            print(f"{each.page.relative_to(ROOT)} ({each.campaign}) tells of {each.commit or 'code that it names not'}")
+    problems = papers_out_of_order()
     for problem in problems:
         print(problem)
-    return 1 if release and (stale or problems) else 0
+    return 1 if problems else 0
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ import pytest
 import er3a
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.pipeline.progress import TimeBudget, shown_work
 from er3a.pipeline.study import load_study
 from testing import processes
 from testing.small_study import STUDY
@@ -172,3 +173,19 @@ def test_diff_ends_with_1_if_anything_differs(small_study, tmp_path):
     done = called("diff", results, fewer, "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)[0]["stage"] == "inverse"
+
+
+def test_long_work_says_what_it_does_and_for_how_long(capsys, monkeypatch):
+    monkeypatch.setattr("er3a.pipeline.progress.EVERY_S", 0.01)
+    shown = ""
+    with shown_work("first") as at:
+        at("then")
+        while "then (0 s)" not in shown:
+            shown += capsys.readouterr().err
+    capsys.readouterr()
+
+
+def test_pieces_of_work_share_what_is_left_of_the_time():
+    budget = TimeBudget(100.0, 4)
+    parts = [end - start for start, end in (budget.next_piece() for _ in range(4))]
+    assert parts == pytest.approx([25, 33.3, 50, 100], rel=0.01), "what one does not use is the others'"

@@ -1,75 +1,91 @@
-"""Pages of evidence name the code that they rest on, and go stale with it; what documents quote of code holds."""
+"""Pages of evidence name the commit that they were made from; a release's papers agree; documents quote what holds."""
 
 from __future__ import annotations
 
 import re
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
 import er3a
+from benchmarks.campaigns import main as campaigns
+from benchmarks.campaigns import write
 from er3a.errors import ResultError
 from er3a.pipeline.results import FORMAT_VERSION
-from testing.evidence import CAMPAIGNS, ROOT, code_line, digest, evidence, files_of, main, papers_out_of_order
+from testing import evidence as pages
+from testing.evidence import CAMPAIGNS, PARTS, ROOT, evidence, is_of_this_code, made_from, papers_out_of_order, sized
 
-COPIED = ("er3a", "testing", "benchmarks", "docs")
 PAPERS = ("CITATION.cff", "CHANGELOG.md")
+FILES = ("er3a/version.py", "er3a/kinematics/forward.py", *PAPERS, "docs/reliability.md", "docs/evidence/motion.md")
+
+
+def git(folder: Path, *words: str) -> None:
+    named = ("-c", "user.name=nobody", "-c", "user.email=nobody@localhost")
+    subprocess.run(["git", *named, *words], cwd=folder, check=True, capture_output=True)
 
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    for name in COPIED:
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__", "_build"))
-    for name in PAPERS:
+    """A repository with a few of the project's files, all committed."""
+    for name in FILES:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "add", "-A")
+    git(tmp_path, "commit", "-qm", "all")
     return tmp_path
 
 
-def standings(root: Path) -> dict[str, str]:
-    return {each.campaign: each.standing for each in evidence(root)}
+def standing(root: Path, campaign: str) -> bool:
+    (each,) = (each for each in evidence(root) if each.campaign == campaign)
+    return is_of_this_code(each, root)
 
 
-def test_every_campaign_is_known_and_its_page_names_its_code():
+def test_every_campaign_is_known_and_has_its_page():
     assert {f"campaign_{name}" for name in CAMPAIGNS} == {
         path.stem for path in (ROOT / "benchmarks").glob("campaign_*")
     }
-    assert [each.campaign for each in evidence() if each.named is None] == []
+    for each in evidence():
+        text = each.page.read_text(encoding="utf-8")
+        assert each.campaign not in PARTS or f"<!-- written by: make campaigns ARGS={each.campaign} -->" in text
 
 
-@pytest.mark.long
-def test_a_page_goes_stale_with_the_code_it_rests_on_and_with_no_other(copy):
-    page = copy / "docs/evidence/kinematics.md"
-    page.write_text(page.read_text(encoding="utf-8") + code_line("kinematics", copy) + "\n", encoding="utf-8")
-    assert standings(copy)["kinematics"] == "current"
-    with (copy / "er3a/pipeline/cli.py").open("a") as file:
+def test_each_page_says_which_commit_it_tells_of():
+    for each in evidence():
+        text = each.page.read_text(encoding="utf-8")
+        assert re.search(rf"^Made (from|before) .*commit `[0-9a-f]+`.*ARGS={each.campaign}`", text, re.MULTILINE)
+
+
+@pytest.mark.parametrize("campaign", ["motion", "kills"])
+def test_a_page_is_made_again_when_code_has_changed_since_its_commit(campaign, copy, monkeypatch):
+    monkeypatch.setattr(pages, "ROOT", copy)
+    monkeypatch.setattr("benchmarks.campaigns.page_of", lambda name: pages.page_of(name, copy))
+    assert not standing(copy, campaign), "no commit of this repository is named"
+    write(campaign, "a new text", made_from(campaign, 12.3, copy))
+    text = pages.page_of(campaign, copy).read_text(encoding="utf-8")
+    assert "a new text" in text
+    assert re.search(rf"er3a {re.escape(er3a.__version__)} at commit `\w+` \(20.*ARGS={campaign}`, in 12 s\.", text)
+    assert standing(copy, campaign)
+    git(copy, "commit", "-qam", "the page")
+    assert standing(copy, campaign), "a page's own commit is no change of the code"
+    with (copy / "er3a/kinematics/forward.py").open("a") as file:
         file.write("# changed\n")
-    assert digest("kinematics", copy) == digest("kinematics")
-    changed = copy / "elsewhere"
-    shutil.copytree(copy, changed, ignore=shutil.ignore_patterns("elsewhere"))
-    with (changed / "er3a/kinematics/forward.py").open("a") as file:
-        file.write("# changed\n")
-    assert standings(changed)["kinematics"] == "stale"
+    assert not standing(copy, campaign)
+    with pytest.raises(RuntimeError, match="not committed"):
+        made_from(campaign, 1.0, copy)
 
 
-def test_public_names_count_by_the_modules_that_they_come_from():
-    names = {path.relative_to(ROOT).as_posix() for path in files_of("kinematics")}
-    assert {"benchmarks/campaign_kinematics.py", "er3a/kinematics/forward.py", "er3a/files/robot_library.py"} <= names
-    assert "er3a/selection/select.py" not in names
+def test_a_share_of_a_campaign_has_as_many_cases(monkeypatch):
+    assert sized(1000) == 1000
+    monkeypatch.setenv(pages.SHARE, "0.01")
+    assert (sized(1000), sized(10), sized(10, 3)) == (10, 1, 3)
 
 
-def test_campaigns_that_start_commands_rest_on_all_stages():
-    names = {path.relative_to(ROOT).as_posix() for path in files_of("faults")}
-    assert {"er3a/pipeline/cli.py", "er3a/pipeline/stages/validation/compute.py"} <= names
-
-
-@pytest.mark.long
-def test_the_list_is_no_failure_but_a_release_needs_current_pages(capsys):
-    stale = sum(each.standing != "current" for each in evidence())
-    assert main([]) == 0
-    listed = capsys.readouterr().out
-    assert f"{stale} of {len(CAMPAIGNS)} rest on other code" in listed
-    assert (main(["--release"]) == 0) == (stale == 0 and not papers_out_of_order())
+def test_a_campaign_that_is_not_there_is_one_line(capsys):
+    assert campaigns(["nothing"]) == 2
+    assert capsys.readouterr().err.startswith("error: no campaign 'nothing'; known: kinematics,")
 
 
 def test_a_release_needs_papers_that_agree(copy):

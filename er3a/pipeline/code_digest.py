@@ -26,23 +26,18 @@ def code_digest(*modules: str) -> str:
     """SHA-256 over the sources of modules, of all modules of er3a that they import (transitively), and of templates
     (``*.j2``, ``*.css``, ``*.js``) that stand beside those that are part of a view."""
     for module in modules:
-        if _file(module, _ROOT) is None:
+        if _file(module) is None:
             raise ModuleNotFoundError(f"er3a has no module '{module}'")
-    return digest_of(sources(modules), _PACKAGE)
-
-
-def digest_of(files: Iterable[Path], folder: Path) -> str:
-    """SHA-256 over files and their places in a folder."""
     digest = hashlib.sha256()
-    for path in sorted(files):
-        digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    for path in sorted(_sources(modules)):
+        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
-def sources(modules: Iterable[str], root: Path = _ROOT) -> set[Path]:
-    """The files of modules below ``root``, of those there that they import (transitively), and templates of views."""
+def _sources(modules: Iterable[str]) -> set[Path]:
+    """The files of modules, of those that they import (transitively), and templates of views."""
     found: set[Path] = set()
-    todo = [path for module in modules if (path := _file(module, root))]
+    todo = [path for module in modules if (path := _file(module))]
     while todo:
         path = todo.pop()
         if path in found:
@@ -50,17 +45,17 @@ def sources(modules: Iterable[str], root: Path = _ROOT) -> set[Path]:
         found.add(path)
         if path.name in VIEWS:
             found |= {file for kind in ("j2", "css", "js") for file in path.parent.glob(f"*.{kind}")}
-        todo += _imported(path, root)
+        todo += _imported(path)
     return found
 
 
 @cache
-def _imported(path: Path, root: Path) -> tuple[Path, ...]:
-    """The files below ``root`` that a file imports."""
-    return tuple(file for name in _imports(path, root) if (file := _file(name, root)))
+def _imported(path: Path) -> tuple[Path, ...]:
+    """The files that a file imports."""
+    return tuple(file for name in _imports(path) if (file := _file(name)))
 
 
-def _imports(path: Path, root: Path) -> tuple[str, ...]:
+def _imports(path: Path) -> tuple[str, ...]:
     """All names that a file imports, public names of er3a by the modules that they come from."""
     names: list[str] = []
     for found in _IMPORT.finditer(path.read_text(encoding="utf-8")):
@@ -71,16 +66,16 @@ def _imports(path: Path, root: Path) -> tuple[str, ...]:
         if module is None:
             names += listed
         elif module == "er3a":
-            names += [_public(root).get(name, f"er3a.{name}") for name in listed]
+            names += [_public().get(name, f"er3a.{name}") for name in listed]
         else:
             names += [module, *(f"{module}.{name}" for name in listed)]
     return tuple(names)
 
 
 @cache
-def _public(root: Path) -> dict[str, str]:
+def _public() -> dict[str, str]:
     """The public names of er3a, and their modules, as its ``__init__`` tells them."""
-    tree = ast.parse((root / "er3a" / "__init__.py").read_bytes())
+    tree = ast.parse((_PACKAGE / "__init__.py").read_bytes())
     for node in tree.body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_PUBLIC":
             public: dict[str, str] = ast.literal_eval(node.value)
@@ -88,6 +83,6 @@ def _public(root: Path) -> dict[str, str]:
     return {}
 
 
-def _file(module: str, root: Path) -> Path | None:
-    path = root.joinpath(*module.split(".")).with_suffix(".py")
+def _file(module: str) -> Path | None:
+    path = _ROOT.joinpath(*module.split(".")).with_suffix(".py")
     return path if path.is_file() else None

@@ -121,6 +121,32 @@ def cycle_line(checked: CheckedFile) -> str:
     return f"{shown(checked.file)}: {what} takes about {time}{more}{less}"
 
 
+def not_examined_line(checked: CheckedFile) -> str:
+    """Which lines were not examined, or not each time that they are carried out; empty if all were."""
+    if checked.check is None or not checked.check.not_examined:
+        return ""
+    words = {"motion": "motions of lines", "course": "the course from lines"}
+    lines: dict[tuple[Path | None, str], list[int]] = {}
+    for each in checked.check.not_examined:
+        lines.setdefault((each.place.file, words[each.what]), []).append(each.place.line)
+    parts = [
+        f"{what} {_line_ranges(found)}" + (f" of {shown(file)}" if file != checked.file else "")
+        for (file, what), found in lines.items()
+    ]
+    return f"{shown(checked.file)}: not examined, or not each time: {'; '.join(parts)}"
+
+
+def _line_ranges(lines: Iterable[int]) -> str:
+    """``12-14, 20`` of 12, 13, 14 and 20."""
+    ranges: list[list[int]] = []
+    for line in sorted(set(lines)):
+        if ranges and line == ranges[-1][1] + 1:
+            ranges[-1][1] = line
+        else:
+            ranges.append([line, line])
+    return ", ".join(f"{first}-{last}" if last > first else f"{first}" for first, last in ranges)
+
+
 def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
     """Everything that was found, as plain data."""
     found: list[dict[str, Any]] = []
@@ -138,6 +164,7 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                 "language": check.execution.program.language,
                 "level": check.level,
                 "complete": check.execution.complete,
+                "not_examined": [{**_place_record(one.place), "what": one.what} for one in check.not_examined],
                 "cycle": plain(check.cycle),
                 "findings": [_finding_record(one) for one in check.findings],
                 "motions": [_verdict_record(one) for one in check.verdicts],
@@ -208,8 +235,24 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
         "originalUriBaseIds": {BASE: {"description": {"text": "The folder that the command was run in."}}},
         "columnKind": "unicodeCodePoints",
         "results": results,
+        "invocations": [{"executionSuccessful": True, "toolExecutionNotifications": _notifications(checked)}],
     }
     return {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
+
+
+def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
+    """What was not examined, as the log's notifications."""
+    return [
+        {
+            "level": "warning",
+            "descriptor": {"id": "not_examined"},
+            "message": {"text": f"not examined, or not each time: {one.what}"},
+            "locations": [_location(one.place)],
+        }
+        for each in checked
+        if each.check is not None
+        for one in each.check.not_examined
+    ]
 
 
 def _message(one: LocatedFinding) -> str:

@@ -1,8 +1,9 @@
-"""Progress of long sampling on standard error: a bar on a terminal, a line now and then in a log."""
+"""Progress of long work on standard error: a bar or a line that changes on a terminal, a line now and then in a log."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -49,3 +50,46 @@ def _lines(total: int, what: str) -> Callable[[int], None]:
             last = now
 
     return advance
+
+
+@contextmanager
+def shown_work(what: str) -> Iterator[Callable[[str], None]]:
+    """Show that work whose length is not known goes on, and for how long it has, while the block runs.
+
+    Yields
+    ------
+    at : function of the words for what is done now
+    """
+    doing, over, start = [what], threading.Event(), time.monotonic()
+    if sys.stderr.isatty():
+        from rich.console import Console
+
+        with Console(stderr=True).status(what) as status:
+            yield status.update
+        return
+
+    def tell() -> None:
+        while not over.wait(EVERY_S):
+            print(f"{doing[-1]} ({time.monotonic() - start:.0f} s)", file=sys.stderr, flush=True)
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield doing.append
+    finally:
+        over.set()
+        teller.join()
+
+
+class TimeBudget:
+    """Seconds that some pieces of work may take together; each may take an equal part of what is left."""
+
+    def __init__(self, seconds: float, pieces: int):
+        self.pieces, self.end = pieces, time.monotonic() + seconds
+
+    def next_piece(self) -> tuple[float, float]:
+        """When the next piece begins and when it has to end, by :func:`time.monotonic`."""
+        now = time.monotonic()
+        part = max(self.end - now, 0.0) / max(self.pieces, 1)
+        self.pieces -= 1
+        return now, now + part

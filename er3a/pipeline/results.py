@@ -248,11 +248,6 @@ def _record(folder: Path) -> dict[str, Any]:
     return stored
 
 
-def read_provenance(folder: Path) -> Provenance:
-    """What a stage's results rest on, whatever they are."""
-    return _adapter(Provenance).validate_python(_record(folder)["provenance"])
-
-
 def read_verdict(folder: Path) -> tuple[Status, str, str]:
     """Status, code and English text of a stage's verdict; :class:`ResultError` as :func:`read_stage`."""
     verdict = _record(folder)["verdict"]

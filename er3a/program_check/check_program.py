@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from er3a.program_check.program_check_findings import (
 )
 from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles_of
 from er3a.program_check.ways import CheckRules
-from er3a.programs.execution import Ending, Execution, RunLimits
+from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
 from er3a.programs.instructions import ArmMotion, Decision, Pause, Place, Unknown
 from er3a.programs.program_findings import FormInferred, NameTwice, NotUnderstood
 from er3a.programs.run_program import execute
@@ -58,6 +59,7 @@ class CheckOptions(ByValue):
     measures : whether to look for collisions
     most_motions : that differ, and a multiple of them that are carried out; of those behind them only the targets are
         checked, which is said
+    keep_on : asked whether to go on, while the program is followed and while its motions are checked
     """
 
     start: Reals | None = None
@@ -71,6 +73,16 @@ class CheckOptions(ByValue):
     most_motions: int = MOST_MOTIONS
     assumed: AssumedRates = field(default_factory=AssumedRates)
     limits: RunLimits = field(default_factory=RunLimits)
+    keep_on: KeepOn | None = None
+
+
+@dataclass(frozen=True)
+class NotExamined:
+    """A motion instruction that was not checked each time that it is carried out, or where the program's course was
+    not followed on."""
+
+    place: Place
+    what: Literal["motion", "course"]
 
 
 @dataclass(frozen=True)
@@ -147,6 +159,7 @@ class ProgramCheck(ByValue):
     verdicts : of each motion instruction
     motions : as they were carried out, by the number of their step
     main : numbers of the steps of the way with the most motions
+    not_examined : in the order of the text; each has a finding of at least caution
     """
 
     execution: Execution
@@ -156,6 +169,7 @@ class ProgramCheck(ByValue):
     motions: Mapping[int, CheckedMotion]
     main: tuple[int, ...]
     cycle: CycleTime
+    not_examined: tuple[NotExamined, ...] = ()
 
 
 def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
@@ -174,33 +188,46 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
         for a start that has not an angle for each joint, and a frame that is no rigid transform
     """
     options = options or CheckOptions()
-    execution = execute(program, robot, options.start, options.frames, options.limits)
+    execution = execute(program, robot, options.start, options.frames, options.limits, options.keep_on)
     limits = assumed_limits(robot, options)
     obstacles = obstacles_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
     checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), obstacles, execution)
     checker.start = options.start
-    end = _checked_until(checker, options.most_motions)
+    end = _checked_until(checker, options)
     for ending in execution.endings:
         if end == len(execution.steps):
             checker.close_loop(ending)
     located = _located(execution, checker, end)
-    verdicts = _verdicts(program, execution, checker.motions, located)
+    missed = _not_examined(execution, located, end)
+    verdicts = _verdicts(program, execution, checker.motions, located, missed)
     level: Level = worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
     cycle = _cycle(execution, checker.motions, main, way)
-    return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle)
+    return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle, missed)
 
 
-def _checked_until(checker: StepChecker, most: int) -> int:
+def _checked_until(checker: StepChecker, options: CheckOptions) -> int:
     """Check step by step; the number of the first step that is not checked."""
-    steps = checker.execution.steps
+    steps, most, keep_on = checker.execution.steps, options.most_motions, options.keep_on
     for number, step in enumerate(steps):
-        full = checker.different >= most or len(checker.motions) >= MOST_ROUNDS * most
-        if full and isinstance(step.instruction, ArmMotion):
-            return number
+        if isinstance(step.instruction, ArmMotion):
+            full = checker.different >= most or len(checker.motions) >= MOST_ROUNDS * most
+            if full or (keep_on is not None and not keep_on("checking", number, len(steps))):
+                return number
         checker.check(number)
     return len(steps)
+
+
+def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end: int) -> tuple[NotExamined, ...]:
+    """``end``: number of the first step that was not checked."""
+    moves = (step.place for step in execution.steps[end:] if isinstance(step.instruction, ArmMotion))
+    found = [NotExamined(place, "motion") for place in moves]
+    found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, NotComeTo)]
+    found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, NotFollowedToEnd)]
+    files = {each.place.file: i for i, each in enumerate(located)}
+    order = dict.fromkeys(found)
+    return tuple(sorted(order, key=lambda each: (files.get(each.place.file, len(files)), each.place.line)))
 
 
 def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[LocatedFinding, ...]:
@@ -236,7 +263,7 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
     for ending in execution.endings:
         if ending.kind not in ("end", "repeats", "joins"):
-            stopped = NotFollowedToEnd(ending.kind)
+            stopped = NotFollowedToEnd(ending.kind, ending.limit)
             found.append(LocatedFinding(level_of(stopped), stopped, ending.place))
     for place in _unreached(execution):
         missed = NeverReached() if execution.complete else NotComeTo()
@@ -281,6 +308,7 @@ def _verdicts(
     execution: Execution,
     motions: Mapping[int, CheckedMotion],
     located: tuple[LocatedFinding, ...],
+    missed: tuple[NotExamined, ...],
 ) -> tuple[MotionVerdict, ...]:
     done: dict[Place, list[CheckedMotion]] = defaultdict(list)
     lines: dict[Place, int] = {}
@@ -291,6 +319,8 @@ def _verdicts(
     worst: dict[Place, Level] = {}
     for each in located:
         worst[each.place] = worst_of((worst.get(each.place, "pass"), each.level))
+    for missing in missed:
+        worst[missing.place] = worst_of((worst.get(missing.place, "pass"), "caution"))
     met = {step.place for step in execution.steps}
     found = []
     for place, text in _motion_texts(program):

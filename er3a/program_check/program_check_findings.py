@@ -335,9 +335,10 @@ class BothSidesChecked:
 
 @dataclass(frozen=True)
 class NotFollowedToEnd:
-    """A way through the program was not followed to its end."""
+    """A way through the program was not followed to its end; ``limit`` as of an ending."""
 
     kind: EndKind
+    limit: int = 0
     code: Literal["not_followed_to_end"] = "not_followed_to_end"
 
 

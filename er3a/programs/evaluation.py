@@ -149,7 +149,7 @@ class ProgramMemory:
         """Nothing of a variable is known from here."""
         self.kept.clear()
         for values in (self.local, self.shared):
-            for name in [each for each in values if root(each) == variable]:
+            for name in [each for each in values if each.startswith(variable) and root(each) == variable]:
                 values[name] = Unclear(name)
 
     def _set_field(self, target: Member, value: Value) -> bool:

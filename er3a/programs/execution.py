@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,7 +10,12 @@ from er3a.by_value import ByValue
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place, alike
 from er3a.programs.syntax import Program
 
-EndKind = Literal["end", "repeats", "joins", "drifts", "limit", "recursion"]
+EndKind = Literal["end", "repeats", "joins", "drifts", "operations", "branches", "stopped", "recursion"]
+
+Phase = Literal["following", "checking"]
+KeepOn = Callable[[Phase, int, int], bool]
+"""Asked again and again while a program is followed and while its motions are checked: the phase, how many steps are
+done, and of how many (0 where that is not known). It ends there if the answer is False."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +25,7 @@ class RunLimits:
     Attributes
     ----------
     operations : in all
-    ways : sides of branches on what only the cell knows
+    ways : sides of branches on what only the cell knows, without those that come into a state that was followed
     rounds : of a loop without end whose state does not repeat
     depth : of calls within calls
     """
@@ -54,16 +60,18 @@ class Ending:
     Attributes
     ----------
     kind : it is over; it ``repeats`` what it did, for ever; it ``joins`` another way, being in its state; it
-        ``drifts``, being a loop for ever whose state does not repeat; or a limit of the run was met, or of calls within
-        calls
+        ``drifts``, being a loop for ever whose state does not repeat; or a limit of the run was met (``operations``,
+        ``branches``: the other side of this one was not followed), or of calls within calls; or it was ``stopped``
     step : number of its last step; -1 if it has none
     repeats_from : number of the step that follows the last, where it repeats or joins; None if no step does
+    limit : that was met, as a number: of operations, sides of branches, rounds or calls; 0 if none was
     """
 
     kind: EndKind
     step: int
     place: Place
     repeats_from: int | None = None
+    limit: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,17 +2,19 @@
 
 A loop is followed until its state (place, variables that decide motions, position of the arm) repeats. Where a
 condition depends on what only the cell knows, both sides are followed; a way that comes into a state in which another
-was ends there.
+was ends there. Further rounds of a loop to an unknown end wait, when it had many, until all else was followed. Beyond
+the limit, the side that was taken less often is followed, and each such branch is named.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 from er3a.programs.dialect import Dialect
 from er3a.programs.evaluation import ProgramMemory, root
-from er3a.programs.execution import Ending, EndKind, Execution, RunLimits, Step
+from er3a.programs.execution import Ending, EndKind, Execution, KeepOn, RunLimits, Step
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Output, Pause, Place, Unknown
 from er3a.programs.position import Cell, Position
 from er3a.programs.quiet_branches import quiet_branches
@@ -37,6 +39,9 @@ from er3a.programs.syntax import (
     Waiting,
 )
 from er3a.programs.values import Unclear, Value, number, shown
+
+MANY_ROUNDS = 100  # of a loop to an unknown end, before more of them wait for all else
+ASKED_EVERY = 64  # operations
 
 
 @dataclass(slots=True)
@@ -78,18 +83,27 @@ class RunWay:
 class Machine:
     """One run of a program."""
 
-    def __init__(self, program: Program, dialect: Dialect, cell: Cell, limits: RunLimits):
+    def __init__(
+        self, program: Program, dialect: Dialect, cell: Cell, limits: RunLimits, keep_on: KeepOn | None = None
+    ):
         self.program, self.dialect, self.cell, self.limits = program, dialect, cell, limits
+        self.keep_on = keep_on
+        self.stopped = False
         self.steps: list[Step] = []
         self.endings: list[Ending] = []
         self.budget = limits.operations
         self.deciding = deciding(program, dialect.modal)
+        self.names_met: set[str] = set()
+        self.deciding_names: list[str] = []  # of those, whole
         self.quiet = quiet_branches(program, dialect)
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
+        self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, tuple[int, int, int]] = {}  # way, count, last step
         self.waiting: list[RunWay] = []
         self.ways = 1
-        self.cut = False
+        self.numbers = 1  # of ways that were begun, those that joined others too
+        self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
+        self.cut: set[Place] = set()
         self.first_behind: dict[int, int] = {}  # step by the one before it
 
     def run(self) -> Execution:
@@ -116,13 +130,17 @@ class Machine:
             operation = frame.routine.code[frame.at]
             self.budget -= 1
             if self.budget < 0:
-                self._end(way, "limit", operation.place)
+                self._end(way, "operations", operation.place, limit=self.limits.operations)
                 return
-            if (back or self.ways > 1) and frame.at in self.labels[frame.routine.name]:
+            if self._is_stopped():
+                self._end(way, "stopped", operation.place)
+                return
+            if (back or self.numbers > 1) and frame.at in self.labels[frame.routine.name]:
                 met = self._met(way)
                 if met is not None:
                     kind, step = met
                     self._end(way, kind, operation.place, step)
+                    self.ways -= kind == "joins"
                     return
             back = False
             at = frame.at
@@ -130,13 +148,13 @@ class Machine:
             if isinstance(operation, GoTo):
                 frame.at, back = operation.to, operation.to <= at
                 if operation.endless and back and self._drifts(way, frame.routine.name, at):
-                    self._end(way, "drifts", operation.place)
+                    self._end(way, "drifts", operation.place, limit=self.limits.rounds)
                     return
             elif isinstance(operation, Branch):
                 back = self._branch(way, frame, operation, at)
             elif isinstance(operation, Call):
                 if len(way.frames) > self.limits.depth:
-                    self._end(way, "recursion", operation.place)
+                    self._end(way, "recursion", operation.place, limit=self.limits.depth)
                     return
                 self._call(way, operation)
             elif isinstance(operation, (Return, Halt)):
@@ -177,10 +195,15 @@ class Machine:
         self.steps.append(Step(instruction, place, way.frames[-1].calls, way.step))
         way.step = len(self.steps) - 1
 
-    def _end(self, way: RunWay, kind: EndKind, place: Place, behind: int | None = None) -> None:
+    def _is_stopped(self) -> bool:
+        if self.keep_on is not None and not self.stopped and self.budget % ASKED_EVERY == 0:
+            self.stopped = not self.keep_on("following", len(self.steps), 0)
+        return self.stopped
+
+    def _end(self, way: RunWay, kind: EndKind, place: Place, behind: int | None = None, limit: int = 0) -> None:
         """``behind``: the step in front of the one that follows."""
         follows = None if behind is None else self.first_behind.get(behind)
-        self.endings.append(Ending(kind, way.step, place, follows))
+        self.endings.append(Ending(kind, way.step, place, follows, limit))
 
     def _assign(self, memory: ProgramMemory, each: Assign) -> Output | None:
         if each.type_name and isinstance(each.target, Variable):
@@ -227,19 +250,34 @@ class Machine:
                 way.memory.forget(name)
             frame.at = quiet.to
             return quiet.to <= at
+        yes, no = (frame.routine.name, at, True), (frame.routine.name, at, False)
         if self.ways < self.limits.ways:
-            other = way.fork(self.ways, len(self.seen))
+            other = way.fork(self.numbers, len(self.seen))
             self.ways += 1
-            other.frames[-1].at = branch.otherwise
-            self._note(way, branch.place, Decision(branch.text, True))
-            self._note(other, branch.place, Decision(branch.text, False))
+            self.numbers += 1
+            self.sides.update((yes, no))
+            if self.sides[yes] > MANY_ROUNDS and at in self.loops[frame.routine.name]:
+                self._take_sides(branch, holding=other, other=way)
+                self.waiting.insert(0, other)
+                return False
+            self._take_sides(branch, holding=way, other=other)
             self.waiting.append(other)
-        else:
-            if not self.cut:
-                self._end(way, "limit", branch.place)
-            self.cut = True
-            self._note(way, branch.place, Decision(branch.text, True))
-        return False
+            return False
+        if branch.place not in self.cut:
+            self._end(way, "branches", branch.place, limit=self.limits.ways)
+            self.cut.add(branch.place)
+        taken = self.sides[yes] <= self.sides[no]
+        self.sides[yes if taken else no] += 1
+        self._note(way, branch.place, Decision(branch.text, taken))
+        if not taken:
+            frame.at = branch.otherwise
+        return not taken and branch.otherwise <= at
+
+    def _take_sides(self, branch: Branch, holding: RunWay, other: RunWay) -> None:
+        """One way on the side of the condition, another on the other side."""
+        other.frames[-1].at = branch.otherwise
+        self._note(holding, branch.place, Decision(branch.text, True))
+        self._note(other, branch.place, Decision(branch.text, False))
 
     def _call(self, way: RunWay, call: Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
@@ -294,8 +332,10 @@ class Machine:
         return ("repeats" if own else "joins"), step
 
     def _kept(self, values: dict[str, Value]) -> frozenset[tuple[str, Value]]:
-        deciding = self.deciding
-        return frozenset((name, value) for name, value in values.items() if name[0] == "%" or root(name) in deciding)
+        new = values.keys() - self.names_met
+        self.names_met |= new
+        self.deciding_names += [name for name in new if name[0] == "%" or root(name) in self.deciding]
+        return frozenset((name, values[name]) for name in self.deciding_names if name in values)
 
 
 def _labels(routine: Routine) -> frozenset[int]:
@@ -303,3 +343,10 @@ def _labels(routine: Routine) -> frozenset[int]:
     jumps = (each.to for each in routine.code if isinstance(each, GoTo))
     branches = (each.otherwise for each in routine.code if isinstance(each, Branch))
     return frozenset((*jumps, *branches))
+
+
+def _loops(routine: Routine) -> frozenset[int]:
+    """Branches whose condition keeps a loop going: behind them, the code jumps back to before them."""
+    jumps = [(i, each.to) for i, each in enumerate(routine.code) if isinstance(each, GoTo) and each.to <= i]
+    branches = [(i, each.otherwise) for i, each in enumerate(routine.code) if isinstance(each, Branch)]
+    return frozenset(at for at, end in branches if any(to <= at < i < end for i, to in jumps))

@@ -13,7 +13,7 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.programs.arm_joints import not_expressed
 from er3a.programs.dialect import Dialect
-from er3a.programs.execution import Execution, RunLimits
+from er3a.programs.execution import Execution, KeepOn, RunLimits
 from er3a.programs.krl_dialect import KrlDialect
 from er3a.programs.machine import Machine
 from er3a.programs.position import Cell
@@ -37,6 +37,7 @@ def execute(
     start: Reals | None = None,
     frames: Mapping[str, Reals] | None = None,
     limits: RunLimits | None = None,
+    keep_on: KeepOn | None = None,
 ) -> Execution:
     """The instructions of a program in the order of their execution, on every way through it.
 
@@ -45,6 +46,7 @@ def execute(
     robot : the arm, for what the text gives by where the arm stands: partial and relative targets
     start : (n,), rad, joints where the program starts
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
+    keep_on : asked whether to go on; where it says no, each way ends as ``stopped``
 
     Raises
     ------
@@ -68,7 +70,7 @@ def execute(
     cell = Cell(flange, start, frames=known)
     if robot is not None:
         cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4))
-    return Machine(program, DIALECTS[program.language](), cell, limits or RunLimits()).run()
+    return Machine(program, DIALECTS[program.language](), cell, limits or RunLimits(), keep_on).run()
 
 
 def _not_meant(program: Program, robot: Robot) -> str:

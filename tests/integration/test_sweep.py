@@ -9,7 +9,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from er3a.pipeline.estimate.jobs import jobs_of
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
@@ -103,11 +102,3 @@ def test_a_sweep_s_section_can_be_translated(swept, tmp_path, monkeypatch):
     texts = [*PageTexts((tmp_path / "index.html").read_text(encoding="utf-8")).texts, *shown]
     own = texts_from_files(run.folder / "data") | texts_from_files(run.folder / "config") | {*ROBOTS, *VARIANTS}
     assert plain_words(texts, own) == []
-
-
-def test_the_plan_has_the_workflow_s_jobs(swept, monkeypatch):
-    run, _ = swept
-    told = run.snakemake("--dry-run", "--forceall", "--nocolor").stdout
-    jobs = re.findall(r"^Job \d+: (?!all results)", told, flags=re.MULTILINE)
-    monkeypatch.chdir(run.folder)
-    assert len(jobs_of(load_study("config/small.yaml"))) == len(jobs)

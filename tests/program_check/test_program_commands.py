@@ -77,6 +77,22 @@ def test_json_holds_verdicts_and_parameters():
     assert 0 < moments["configuration_changes"] < moments["above_limit"]
 
 
+def test_what_is_not_examined_is_named_in_text_json_and_sarif(tmp_path):
+    file, sarif = "data/programs/weld_seam.src", tmp_path / "found.sarif"
+    whole, part = check(file, "--json"), check(file, "--json", "--most-motions", "3", "--sarif", str(sarif))
+    assert json.loads(whole.stdout)[0]["not_examined"] == []
+    found = json.loads(part.stdout)[0]
+    lines = [each["line"] for each in found["not_examined"]]
+    moves = [each["line"] for each in found["motions"]]
+    assert found["level"] == "caution"
+    assert lines == moves[3:]
+    assert [each["level"] for each in found["motions"][3:]] == ["caution"] * len(lines)
+    (log,) = json.loads(sarif.read_text())["runs"]
+    notes = log["invocations"][0]["toolExecutionNotifications"]
+    assert [each["locations"][0]["physicalLocation"]["region"]["startLine"] for each in notes] == lines
+    assert "not examined, or not each time: motions of lines" in check(file, "--most-motions", "3").stderr
+
+
 def test_sarif_has_rules_places_and_fingerprints_that_stay(tmp_path):
     def log(file: Path) -> dict:
         output = tmp_path / "found.sarif"

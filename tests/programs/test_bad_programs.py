@@ -126,7 +126,10 @@ def test_many_branches_on_inputs_end_within_the_limits(tmp_path):
     body = "".join(f"IF $IN[{i}] THEN\nx[{i}]=1\nENDIF\n" for i in range(60))
     (tmp_path / "a.src").write_text(f"DEF a( )\n{body}PTP {{A1 x[1],A2 0,A3 0,A4 0,A5 0,A6 0}}\nEND\n")
     execution = execute(read_program(tmp_path / "a.src"), limits=LIMITS)
-    assert len(execution.endings) <= 2 * LIMITS.ways
+    kinds = [each.kind for each in execution.endings]
+    assert kinds.count("end") <= LIMITS.ways
+    cut = [each.place.line for each in execution.endings if each.kind == "branches"]
+    assert len(cut) == len(set(cut)) > 0, "each branch that was not followed to both sides is named once"
     assert not execution.complete
 
 

@@ -148,6 +148,58 @@ def test_motions_behind_the_last_step_that_is_followed_are_not_called_unreachabl
     assert "never_reached" not in codes
 
 
+def test_ways_that_come_into_one_state_again_use_up_no_branches(tmp_path):
+    """2^12 sequences of branches, but 13 states behind each: how many parts there are."""
+    taken = "".join(f"IF $IN[{i}] THEN\nn=n+1\nPTP {{A1 {i}}}\nPTP {{A1 0}}\nENDIF\n" for i in range(1, 13))
+    last = "IF n>6 THEN\nPTP {A1 33}\nENDIF\n"
+    text = f"DEF p( )\nDECL INT n\nn=0\nPTP {{A1 0,A2 0,A3 0,A4 0,A5 30,A6 0}}\n{taken}{last}END\n"
+    execution = execute(program_of(tmp_path, "p.src", text), ROBOT, limits=RunLimits(ways=20))
+    assert execution.complete
+    assert 33 in {target[0] for _, target in visited(execution)}
+
+
+def test_a_loop_to_an_unknown_end_leaves_branches_for_what_is_behind_it(tmp_path):
+    loop = "FOR i=1 TO n\n$ACC_AXIS[i]=50\nENDFOR\n"
+    rest = "IF $IN[1] THEN\nPTP {A1 5}\nELSE\nPTP {A1 6}\nENDIF\n"
+    text = f"DEF p( )\nINT i\nPTP {{A1 0,A2 0,A3 0,A4 0,A5 30,A6 0}}\n{loop}{rest}END\n"
+    execution = execute(program_of(tmp_path, "p.src", text), ROBOT, limits=RunLimits(operations=20_000, ways=400))
+    behind = [
+        step.before for step in execution.steps if isinstance(step.instruction, Decision) and step.place.line == 7
+    ]
+    assert len(behind) > len(set(behind)), "both sides were followed from one state"
+    assert {each.place.line for each in execution.endings if each.kind == "branches"} == {4, 7}
+    cut = execute(program_of(tmp_path, "p.src", text), ROBOT, limits=RunLimits(ways=1))
+    assert {each.kind for each in cut.endings} == {"branches", "end"}, "it leaves the loop"
+
+
+@pytest.mark.parametrize("phase", ["following", "checking"])
+@pytest.mark.parametrize("asks", [0, 1, 3])
+def test_what_a_stopped_check_left_out_is_named_and_does_not_pass(phase, asks, tmp_path):
+    moves = "".join(f"IF $IN[{i}] THEN\nPTP {{A1 {i}}}\nELSE\nPTP {{A1 {-i}}}\nENDIF\n" for i in range(1, 31))
+    text = f"DEF p( )\nPTP {{A1 0,A2 0,A3 0,A4 0,A5 30,A6 0}}\n{moves}END\n"
+    asked = []
+
+    def keep_on(at, done, of):
+        asked.append(at)
+        return asked.count(phase) <= asks
+
+    program = program_of(tmp_path, "p.src", text)
+    options = CheckOptions(start=np.zeros(6), measures=False, keep_on=keep_on)
+    check = check_program(program, ROBOT, options)
+    whole = check_program(program, ROBOT, CheckOptions(start=np.zeros(6), measures=False))
+    missed = {each.place.line for each in check.not_examined if each.what == "motion"}
+    assert whole.not_examined == ()
+    assert check.level == "caution"
+    assert {"following": "not_followed_to_end", "checking": "rest_not_checked"}[phase] in {
+        each.finding.code for each in check.findings
+    }
+    for now, then in zip(check.verdicts, whole.verdicts):
+        assert (now.times == then.times) or now.line in missed or phase == "following"
+        assert now.level == "caution" if now.line in missed or not now.times else now.level == then.level
+    if phase == "following":
+        assert {each.what for each in check.not_examined} == {"motion", "course"}
+
+
 def test_behind_what_may_move_the_arm_no_way_is_known(tmp_path):
     text = "DEF p( )\nPTP {A1 0,A2 0,A3 0,A4 0,A5 30,A6 0}\nother()\nPTP {A1 9,A2 0,A3 0,A4 0,A5 30,A6 0}\nEND\n"
     check = check_program(program_of(tmp_path, "p.src", text), ROBOT, CheckOptions(start=np.zeros(6), measures=False))

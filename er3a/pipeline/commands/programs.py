@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import time
+from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,7 +21,11 @@ from er3a.robots.shown import meant
 
 if TYPE_CHECKING:
     from er3a.pipeline.program_reports import CheckedFile
+    from er3a.pipeline.progress import TimeBudget
     from er3a.program_check.check_program import CheckOptions
+    from er3a.programs.execution import KeepOn, Phase
+
+SHARE_OF_FOLLOWING = 0.5  # of the time; the rest is for checking what was followed
 
 
 class ProgramLanguage(StrEnum):
@@ -52,6 +59,9 @@ def check_program(
     most_motions: Annotated[
         int, typer.Option(help="how many motions are checked; of the rest the targets", min=1)
     ] = 1_000,
+    seconds: Annotated[
+        float, typer.Option(help="time for all files; what is not examined then is named", min=1)
+    ] = 30.0,
     fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings from this level on")] = FailOn.fail,
     as_json: AsJson = False,
 ):
@@ -59,7 +69,15 @@ def check_program(
     from er3a.files.program_file import load_programs
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
-    from er3a.pipeline.program_reports import cycle_line, json_of, lines_of, sarif_of, summary_line
+    from er3a.pipeline.program_reports import (
+        cycle_line,
+        json_of,
+        lines_of,
+        not_examined_line,
+        sarif_of,
+        summary_line,
+    )
+    from er3a.pipeline.progress import TimeBudget, shown_work
     from er3a.program_check.check_program import CheckOptions
     from er3a.program_check.program_check_findings import RANKS
 
@@ -70,7 +88,9 @@ def check_program(
         scene=load_scene(scene) if scene else None,
         most_motions=most_motions,
     )
-    checked = [_checked(file, arm, options) for file in files]
+    budget = TimeBudget(seconds, len(files))
+    with shown_work("reading") as at:
+        checked = [_checked(file, arm, replace(options, keep_on=_until(budget, file, at))) for file in files]
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     if as_json:
@@ -80,8 +100,9 @@ def check_program(
             for line in lines_of(each, verdicts):
                 print(line)
         for each in checked:
-            if line := cycle_line(each):
-                print_note(line)
+            for line in (cycle_line(each), not_examined_line(each)):
+                if line:
+                    print_note(line)
         print_note(summary_line(checked))
     if any(each.check is None for each in checked):
         raise typer.Exit(2)
@@ -112,10 +133,13 @@ def write(
     from er3a.pipeline.messages.expectations import outcome_word
     from er3a.pipeline.messages.program_check import say
     from er3a.pipeline.path_programs import programs_of
+    from er3a.pipeline.progress import shown_work
 
     arm = load_robot(robot)
     refused = 0
-    for made in programs_of(paths, arm, language.value, load_scene(scene) if scene else None, only, unsafe):
+    with shown_work(f"{paths}: each path is judged"):
+        programs = list(programs_of(paths, arm, language.value, load_scene(scene) if scene else None, only, unsafe))
+    for made in programs:
         if made.files is None:
             refused += 1
             print_note(f"{made.name}: not written, because it is not safe: {outcome_word(made.verdict)}")
@@ -145,6 +169,19 @@ def _checked(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
         return CheckedFile(file, check(read_program(file), robot, options))
     except InputError as error:
         return CheckedFile(file, None, error)
+
+
+def _until(budget: TimeBudget, file: Path, at: Callable[[str], None]) -> KeepOn:
+    """Whether a file's part of the time is not over; ``at`` shows how far its check is."""
+    start, end = budget.next_piece()
+    ends = {"following": start + SHARE_OF_FOLLOWING * (end - start), "checking": end}
+
+    def keep_on(phase: Phase, done: int, of: int) -> bool:
+        of_all = f" of {of:,}" if of else ""
+        at(f"{file}: {phase}, step {done:,}{of_all}")
+        return time.monotonic() < ends[phase]
+
+    return keep_on
 
 
 def _joints(text: str | None, robot: Robot) -> Reals | None:

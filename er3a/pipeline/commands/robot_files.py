@@ -13,6 +13,7 @@ from er3a.errors import Er3aError
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.formats.mesh_file import Unit
 from er3a.pipeline.commands.options import ROBOT_FILES, AnyRobot, AsJson, app, print_json, print_note
+from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 
 
@@ -32,7 +33,8 @@ def import_urdf(
     from er3a.formats.urdf import import_urdf as read_urdf
     from er3a.formats.urdf import robot_name
 
-    imported = read_urdf(file, base=base, tip=tip, snap=snap, split=split)
+    with shown_work(f"{file}: the arm is read" + (", meshes are split into convex pieces" if split else "")):
+        imported = read_urdf(file, base=base, tip=tip, snap=snap, split=split)
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(imported.robot.replace(name=output.stem), output)
@@ -73,7 +75,8 @@ def mesh(
 
     if output.suffix != ".json":
         raise Er3aError(f"{output}: files of convex pieces end in .json; write --output {output.stem}.json")
-    found = import_mesh(file, output, unit, threshold, seed)
+    with shown_work(f"{file}: split into convex pieces"):
+        found = import_mesh(file, output, unit, threshold, seed)
     if as_json:
         print_json(found.model_dump(exclude={"pieces_mm"}) | {"output": str(output), "pieces": len(found.pieces_mm)})
         return
@@ -100,7 +103,8 @@ def calibrate(
 
     source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
     try:
-        found = calibrate_robot(load_robot(robot), source)
+        with shown_work(f"{robot}: corrections are estimated"):
+            found = calibrate_robot(load_robot(robot), source)
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
     write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, calibrated"), output)
@@ -129,13 +133,16 @@ def hand_eye(
     from er3a.vision.vision_findings import HandEyeError
 
     arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
-    samples, offset, images = read_calibration(file, arm)
-    open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
-    try:
-        found = calibrate_hand_eye(samples)
-    except HandEyeError as error:
-        raise Er3aError(f"{file}: {say(error.finding)}") from None
-    table = correct_table(found, arm, asked) if arm and asked else None
+    with shown_work(f"{file}: the samples are read") as at:
+        samples, offset, images = read_calibration(file, arm)
+        open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
+        at(f"{file}: the camera's pose is estimated")
+        try:
+            found = calibrate_hand_eye(samples)
+        except HandEyeError as error:
+            raise Er3aError(f"{file}: {say(error.finding)}") from None
+        at(f"{file}: the table's corrections are estimated")
+        table = correct_table(found, arm, asked) if arm and asked else None
     if as_json:
         print_json(hand_eye_record(found, offset, table))
         return

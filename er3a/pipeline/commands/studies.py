@@ -29,6 +29,7 @@ from er3a.pipeline.commands.options import (
     print_note,
 )
 from er3a.pipeline.messages import language
+from er3a.pipeline.progress import shown_work
 from er3a.pipeline.study import load_study
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 
@@ -49,10 +50,13 @@ def new(
     from er3a.pipeline.new_study.brought_arm import arm_of
     from er3a.pipeline.new_study.write import write_study
 
-    arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=(base, tip))
+    with shown_work(f"{folder}: the arm is read") as at:
+        arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=(base, tip))
+        at(f"{folder}: targets and paths that the arm can do are looked for")
+        files = write_study(arm, folder)
     for note in arm.notes:
         print_note(note)
-    for file in write_study(arm, folder):
+    for file in files:
         print(f"{file}: written")
     print(f"Next: cd {shlex.quote(str(folder))} && er3a run")
 
@@ -162,34 +166,6 @@ def view(
     with without_statistics() as environment:
         done = subprocess.run(viewer_command(recordings), env=environment, check=False)
     raise typer.Exit(done.returncode)
-
-
-@app.command(rich_help_panel=FIRST)
-def estimate(
-    cores: Annotated[str, typer.Option(help="numbers of cores, of one machine or of nodes together")] = "1,2,8,64",
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
-    reports: Reports = DEFAULT_REPORTS,
-    logs: Annotated[Path, typer.Option(help="folder of a run's timings")] = Path("logs"),
-    as_json: AsJson = False,
-):
-    """Say what the study will take: samples/s, wall time, memory and disk, from a short calibration on this machine."""
-    from rich.console import Console
-
-    from er3a.pipeline.estimate.cost import measured_here
-    from er3a.pipeline.estimate.terminal import estimate_record, print_estimate
-
-    numbers = cores.split(",")
-    if not all(number.strip().isdigit() and int(number) > 0 for number in numbers):
-        raise Er3aError(f"--cores is '{cores}'; expected numbers such as 1,2,8,64")
-    loaded = load_study(study)
-    with Console(stderr=True).status("Measuring on this machine ..."):
-        measured = measured_here(loaded, results, reports, logs)
-    counts = sorted({int(number) for number in numbers})
-    if as_json:
-        print_json(estimate_record(loaded, measured, counts))
-    else:
-        print_estimate(loaded, measured, counts)
 
 
 @app.command(rich_help_panel=FIRST)

@@ -29,8 +29,12 @@ REASONS: dict[Unresolved, str] = {
     "too_many_joints": N_("it refers to axes that the arm does not have"),
 }
 ENDS: dict[EndKind, str] = {
-    "drifts": N_("the loop never comes back to a state that it was in; it was followed for a limited number of rounds"),
-    "limit": N_("the program was followed for a limited number of steps and branches"),
+    "drifts": N_("the loop never comes back to a state that it was in; it was followed for {limit} rounds"),
+    "operations": N_("the program was followed for {limit} instructions, and no further than here"),
+    "branches": N_(
+        "not each side of this branch was followed: the program has more than {limit} sequences of its branches"
+    ),
+    "stopped": N_("the program was followed no further than here: the time for it was over"),
     "recursion": N_("routines call themselves or each other without end"),
 }
 
@@ -348,7 +352,7 @@ def _(found: found_in.BothSidesChecked) -> str:
 
 @say.register
 def _(found: found_in.NotFollowedToEnd) -> str:
-    return word("not_followed_to_end", ENDS, found.kind)
+    return sentence("not_followed_to_end", ENDS[found.kind], limit=found.limit)
 
 
 @say.register

@@ -27,7 +27,7 @@ OTHER_SOLUTION = N_(
     "the joint away from its limit."
 )
 BY_HAND = N_("Watch this line at low speed on the controller, or replace it by an instruction that is understood.")
-FURTHER = N_("Raise most_steps, most_branches or loop_rounds of programs in the study.")
+FURTHER = N_("Give the check more time, or in a study raise most_steps, most_branches or loop_rounds of programs.")
 REMEDIES: dict[str, str] = {
     "above_limit": OTHER_SOLUTION,
     "below_limit": OTHER_SOLUTION,
@@ -67,7 +67,7 @@ REMEDIES: dict[str, str] = {
     ),
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
-    "rest_not_checked": N_("Split the program and check its parts."),
+    "rest_not_checked": N_("Give the check more time or motions, or split the program and check its parts."),
     "loop_comes_back_otherwise": N_("Begin the loop with a joint move to fixed angles."),
     "program_data_file_missing": N_("Put the data file beside the program."),
     "program_name_twice": N_("Remove one of the two definitions."),
@@ -84,7 +84,9 @@ SINGULAR: dict[EventType, str] = {
 }
 STOPPED: dict[EndKind, str] = {
     "drifts": N_("Let the loop come back to where it began, or give it a fixed number of rounds."),
-    "limit": FURTHER,
+    "operations": FURTHER,
+    "branches": FURTHER,
+    "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
 }
 

@@ -22,7 +22,9 @@ def _(found: ProgramCounts) -> str:
     for outcome, names in unsound.items():
         parts = {"count": len(names), "word": outcome_word(outcome), "names": ", ".join(names)}
         others.append(sentence("programs.fault", "{count} {word} ({names})", **parts) if names else "")
-    told = [passed if found.programs else "", joined(others, ", "), demonstrated(found.demonstrations)]
+    missed = ", ".join(found.not_examined)
+    open_parts = sentence("programs.not_examined", "not all examined ({names})", names=missed) if missed else ""
+    told = [passed if found.programs else "", joined(others, ", "), open_parts, demonstrated(found.demonstrations)]
     return sentence("programs.verdict", "{finding}.", finding=joined(told))
 
 

@@ -118,6 +118,7 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         cycle=check.cycle,
         least_clearance_mm=min(clear, default=None),
         findings=tuple(_finding_at(each, starts) for each in check.findings),
+        not_examined=tuple(sorted({each.place.line for each in check.not_examined})),
     )
 
 
@@ -229,7 +230,8 @@ def _verdict(
     finding = SomeProgramsFail if failed else SomeProgramsCaution if caution else AllProgramsPass
     status: Status = "fail" if failed else "caution" if caution else "pass"
     passed = len(asked) - len(caution) - len(failed)
-    return Verdict(status, finding(len(asked), passed, caution, failed, demonstrations(programs, "pass")))
+    missed = tuple(each.name for each in asked if each.not_examined)
+    return Verdict(status, finding(len(asked), passed, caution, failed, demonstrations(programs, "pass"), missed))
 
 
 def _figures(programs: list[ProgramSummary]) -> tuple[Figure, ...]:

@@ -19,7 +19,8 @@ from er3a.programs.syntax import Language
 class ProgramCounts:
     """How many programs there are, how many pass, and the names of the others.
 
-    ``demonstrations``, programs that fail as they are meant to, count for none of these.
+    ``demonstrations``, programs that fail as they are meant to, count for none of these. ``not_examined``: names of
+    those of which something was not examined.
     """
 
     programs: int
@@ -27,6 +28,7 @@ class ProgramCounts:
     caution: tuple[str, ...]
     failed: tuple[str, ...]
     demonstrations: tuple[Demonstration, ...]
+    not_examined: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ class ProgramSummary:
     complete : whether every way through it was followed to its end, or until it repeats
     ways : through the program, by the sides of its branches
     motions : instructions of the text; passed, caution, failed : of these
+    not_examined : lines of motions that were not checked each time, or from which the course was not followed on
     """
 
     name: str
@@ -105,6 +108,7 @@ class ProgramSummary:
     cycle: CycleTime
     least_clearance_mm: float | None
     findings: tuple[FindingAt, ...]
+    not_examined: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
