@@ -144,5 +144,3 @@ def _verdict(robot: str, stage: str) -> str:
         return str(summary["verdict"]["status"])
     except (OSError, ValueError, KeyError):
         return "no result"
-
-
