@@ -1,9 +1,9 @@
 """Jobs without start-up: a process with all libraries loaded forks one child for each job of a run.
 
-A study is some fifty short jobs, and loading NumPy, pandas, Matplotlib, numba and the others takes each longer than many
-of them take to do their work. While a study runs on this machine, ``er3a compute``, ``er3a report`` and the like, as
-Snakemake's rules call them, therefore only hand their words, working folder, environment and standard streams to this
-server, which forks a child that does the job in their name. Without a server (on a cluster, by hand, where forking is
+A study is some fifty short jobs, and loading NumPy, pandas, Matplotlib, numba and the others takes longer than many of
+them do their work. While a study runs on this machine, ``er3a compute``, ``er3a report`` and the like, as Snakemake's
+rules call them, therefore only hand their words, working folder, environment and standard streams to this server, which
+forks a child that does the job in their name. Without a server (on a cluster, by hand, where forking is
 not safe) they do the job themselves; results are the same bytes.
 
 A child ends when the command that asked for it does, and the server when the run that started it does, however those

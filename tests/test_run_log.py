@@ -1,0 +1,57 @@
+"""What a person sees of a run."""
+
+from __future__ import annotations
+
+import json
+import logging
+from types import SimpleNamespace
+
+import pytest
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from er3a.pipeline.run_log import RunLog, RunLogSettings
+
+
+@pytest.fixture
+def log(tmp_path, monkeypatch):
+    """Sends records to the log of a run in an empty folder, in which one verdict stands."""
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "results/arm/workspace"
+    folder.mkdir(parents=True)
+    (folder / "summary.json").write_text(json.dumps({"verdict": {"status": "fail"}}), encoding="utf-8")
+    handler = RunLog(SimpleNamespace(nocolor=True), RunLogSettings())
+
+    def send(event: LogEvent | None, text: str = "", level: int = logging.INFO, **fields: object) -> None:
+        record = logging.LogRecord("snakemake", level, __file__, 1, text, (), None)
+        record.__dict__.update(fields, **({"event": event} if event else {}))
+        handler.emit(record)
+
+    send(LogEvent.RUN_INFO, stats={"compute_workspace": 1, "report": 2, "total": 3})
+    return send
+
+
+def test_a_line_for_each_verdict_with_its_seconds_and_what_is_left(log, capsys):
+    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute_workspace", wildcards={"robot": "arm"})
+    log(LogEvent.JOB_FINISHED, job_id=1)
+    line = capsys.readouterr().err
+    assert line.startswith("✗ arm  workspace   fail  0 s  (2 jobs left, about ")
+
+
+def test_expected_verdicts_say_so(log, capsys, monkeypatch):
+    monkeypatch.setattr(RunLog, "expected", {("arm", "workspace"): "fail"})
+    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute_workspace", wildcards={"robot": "arm"})
+    log(LogEvent.JOB_FINISHED, job_id=1)
+    assert "fail, as expected" in capsys.readouterr().err
+
+
+def test_pages_and_snakemakes_own_words_stay_out_errors_do_not(log, capsys):
+    log(LogEvent.JOB_INFO, jobid=2, rule_name="report", wildcards={"robot": "arm", "stage": "workspace"})
+    log(LogEvent.JOB_FINISHED, job_id=2)
+    log(None, "Building DAG of jobs...")
+    assert capsys.readouterr().err == ""
+    log(None, "a rule is missing", level=logging.ERROR)
+    log(LogEvent.JOB_ERROR, rule_msg="arm: report workspace", log=["logs/arm/workspace.report.log"])
+    assert capsys.readouterr().err.splitlines() == [
+        "a rule is missing",
+        "✗ arm: report workspace: ended with an error; see logs/arm/workspace.report.log",
+    ]
