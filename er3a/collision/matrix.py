@@ -27,6 +27,7 @@ import numpy as np
 
 from er3a.collision.core_distance import ROOM, pair_distance
 from er3a.collision.distance_kernels import FREE, MEETS, Layout, measure, place, search_boxes
+from er3a.collision.envelopes import arm_shapes
 from er3a.collision.shapes import Body, arm_bodies, layout_of
 from er3a.collision.trimming import beside_axis, girth, trimmed
 from er3a.kinematics.forward import frames
@@ -170,7 +171,8 @@ def _guide(robot: Robot, pair: tuple[Body, Body]) -> tuple[Reals, Reals, float] 
     """
     inner, outer = pair
     between = range(inner.link, outer.link)
-    if robot.envelopes or robot.hulls or robot.coupling is not None or not any(robot.sliding[k] for k in between):
+    given = arm_shapes(robot).given
+    if given or robot.coupling is not None or not any(robot.sliding[k] for k in between):
         return None
     poses = frames(robot, np.zeros(robot.joints))
     start = robot.base if inner.link == 0 else poses[inner.link - 1]

@@ -10,7 +10,7 @@ import pytest
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
-from er3a.collision.envelopes import envelopes_of
+from er3a.collision.envelopes import arm_shapes
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.pairs import CarriedAndLink, CarriedAndSolid, LinkPair
 from er3a.collision.scene import Scene
@@ -28,7 +28,7 @@ BENT = ((0.0, 0.0, 0.1), (0.16, 0.0, 0.1), (0.16, 0.0, -0.12))  # m, in the fram
 def bent_tool(robot: Robot) -> Robot:
     """The arm with a tool that leads back over the flange: capsules of 15 mm."""
     tool = tuple(Envelope(6, start, end, 0.015) for start, end in pairwise(BENT))
-    return robot.replace(envelopes=(*envelopes_of(robot), *tool))
+    return robot.replace(envelopes=(*arm_shapes(robot).capsules, *tool))
 
 
 def rows_of(robot: Robot):
@@ -54,7 +54,7 @@ def coal_distance(robot: Robot, q: np.ndarray, first: str, second: str) -> float
     """Least distance of two links' capsules by Coal."""
     T, least = link_poses(robot, q), np.inf
     placed: dict[str, list] = {first: [], second: []}
-    for capsule in envelopes_of(robot):
+    for capsule in arm_shapes(robot).capsules:
         name = f"link_{capsule.link}" if capsule.link else "base"
         if name in placed:
             start, end = (T[capsule.link][:3, :3] @ p + T[capsule.link][:3, 3] for p in (capsule.start, capsule.end))
@@ -78,7 +78,7 @@ def test_every_pair_of_links_stands_in_it_with_what_dense_sampling_finds(robot, 
     """No pair that is said never to meet does, and witnesses overlap; by Coal on frames worked out apart."""
     robot = bent_tool(robot).replace(pair_rules=())
     rows = rows_of(robot)
-    links = sorted({capsule.link for capsule in envelopes_of(robot)})
+    links = sorted({capsule.link for capsule in arm_shapes(robot).capsules})
     assert len(rows) == len(links) * (len(links) - 1) / 2
     watched = {(a.name, b.name) for a, b in collision_matrix(robot).watched}
     q = random.uniform(robot.lower, robot.upper, (SAMPLES, 6))
@@ -124,7 +124,7 @@ def test_overlap_in_the_region_of_the_joint_is_all_that_is_left_out():
     robot = load_robot("er3_600")
     row = rows_of(robot)["link_2", "link_4"]
     radius = row.left_out
-    upper, forearm = (next(c for c in envelopes_of(robot) if c.link == k) for k in (2, 4))
+    upper, forearm = (next(c for c in arm_shapes(robot).capsules if c.link == k) for k in (2, 4))
     assert radius == pytest.approx(upper.radius + forearm.radius)
     bodies = Bodies(robot, None)
     cut = {body.link: body.points for pair in collision_matrix(robot).watched for body in pair if body.link in (2, 4)}
@@ -139,7 +139,7 @@ class TestFaultsOfOthers:
         """moveit2#2772: off because it collides in the default state."""
         robot = load_robot("er3a_c60")
         folded = Envelope(6, (0.0, 0.0, -0.3), (0.0, 0.0, -0.2), 0.05)  # lies in the forearm at J5 = 0
-        robot = robot.replace(envelopes=(*envelopes_of(robot), folded))
+        robot = robot.replace(envelopes=(*arm_shapes(robot).capsules, folded))
         assert coal_distance(robot, np.zeros(6), "link_4", "link_6") < 0
         assert clearance(robot, np.zeros((1, 6)), None).distance[0] < 0
 
@@ -229,6 +229,6 @@ def test_a_default_shape_that_slides_in_its_guide_is_joined_to_it():
     raised = np.array([[0.4, 0.2, slide, turn] for slide in (0.0, 0.03, 0.2) for turn in (0.0, 3.0)])
     assert Bodies(scara, None).free(raised).all()
     assert not Bodies(scara, None).free(np.array([[0.0, 2.39, 0.0, 0.0]])).any()  # the outer arm folds onto the inner
-    stated = scara.replace(envelopes=envelopes_of(scara))
+    stated = scara.replace(envelopes=arm_shapes(scara).capsules)
     assert rows_of(stated)["link_2", "link_4"].state == "meets"
     assert not Bodies(stated, None).free(raised[:2]).any()
