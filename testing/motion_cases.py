@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.envelopes import envelopes_of
+from er3a.collision.envelopes import arm_shapes
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.scene import Box, Cylinder, Plane, Sphere
 from er3a.files.path_file import PathFile
@@ -254,7 +254,7 @@ def _crossings(arm, spec, seen, found, tally, wrong):
 
 def contacts_of(robot, scene) -> Contacts:
     """An arm in a scene, for distances that rest on nothing of er3a but what the arm and the scene are."""
-    capsules = [(part.link, part.start, part.end, part.radius) for part in envelopes_of(robot)]
+    capsules = [(part.link, part.start, part.end, part.radius) for part in arm_shapes(robot).capsules]
     solids = []
     for solid in scene.solids:
         match solid:
@@ -267,6 +267,6 @@ def contacts_of(robot, scene) -> Contacts:
             case Plane():
                 solids.append(("plane", (solid.normal, solid.offset), None))
     met = {(row.first, row.second) for row in collision_matrix(robot).rows if row.state == "meets"}
-    named = ["base" if capsule.link == 0 else f"link_{capsule.link}" for capsule in envelopes_of(robot)]
+    named = ["base" if capsule.link == 0 else f"link_{capsule.link}" for capsule in arm_shapes(robot).capsules]
     pairs = [(i, j) for i, first in enumerate(named) for j, second in enumerate(named) if (first, second) in met]
     return Contacts(table_of(robot), capsules, tuple(pairs), solids)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.collision.envelopes import default_envelopes, envelopes_of
+from er3a.collision.envelopes import arm_shapes, default_envelopes
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
@@ -107,9 +107,9 @@ def test_a_varied_tool_keeps_the_rest_of_the_study_s_tool(study_with, own):
 def test_capsules_of_the_file_do_not_outlive_its_lengths(study_with):
     limit = {"robot": "er3a_c60", "vary": "joints.2.upper_deg", "values": [80]}
     study = study_with(a3=A3, limit=limit)
-    assert envelopes_of(study.robot("er3a_c60-limit-01")) == load_robot("er3a_c60").envelopes
+    assert arm_shapes(study.robot("er3a_c60-limit-01")).capsules == load_robot("er3a_c60").envelopes
     variant = study.robot("er3a_c60-a3-04")
-    assert envelopes_of(variant) == default_envelopes(variant)
+    assert arm_shapes(variant).capsules == default_envelopes(variant)
 
 
 def test_a_variant_has_its_base_s_inputs_and_settings_of_its_own(study_with):

@@ -9,7 +9,7 @@ import numpy as np
 
 from er3a.collision.core_distance import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.distance_kernels import WORLD, Layout
-from er3a.collision.envelopes import envelopes_of
+from er3a.collision.envelopes import arm_shapes
 from er3a.collision.overlap_depth import cylinder_points
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
@@ -45,11 +45,12 @@ class Body:
 
 def arm_bodies(robot: Robot) -> tuple[Body, ...]:
     """Capsules and convex pieces of the arm, link by link."""
+    shapes = arm_shapes(robot)
     capsules = [
-        Body(link_label(c.link), c.link, np.unique([c.start, c.end], axis=0), c.radius) for c in envelopes_of(robot)
+        Body(link_label(c.link), c.link, np.unique([c.start, c.end], axis=0), c.radius) for c in shapes.capsules
     ]
-    hulls = [Body(link_label(h.link), h.link, np.array(h.points), h.margin) for h in robot.hulls]
-    return tuple(sorted([*capsules, *hulls], key=lambda body: body.link))
+    pieces = [Body(link_label(h.link), h.link, np.array(h.points), h.margin) for h in shapes.pieces]
+    return tuple(sorted([*capsules, *pieces], key=lambda body: body.link))
 
 
 def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:

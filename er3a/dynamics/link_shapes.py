@@ -1,16 +1,16 @@
-"""What is known of the links' shapes, for judging masses: convex pieces of meshes, capsules of the file, or a guess."""
+"""The links' shapes (:mod:`er3a.collision.envelopes`) filled evenly: to judge masses by, and to guess them from."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from er3a.collision.envelopes import envelopes_of
-from er3a.dynamics.estimate import capsule_body
+from er3a.collision.envelopes import arm_shapes
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import MassBody, six_moments, together
+from er3a.robots.masses import LinkMass, MassBody, moved, six_moments, together
 from er3a.robots.robot import Envelope, Robot
 
 WATER = 1000.0
@@ -40,25 +40,49 @@ class LinkShape:
 
 
 def link_shapes(robot: Robot) -> dict[int, LinkShape]:
-    """Shapes of links from 0: of the pieces where there are any, else of capsules."""
-    found: dict[int, LinkShape] = {}
-    for link in range(robot.rows + 1):
-        pieces = [np.array(piece.points) for piece in robot.hulls if piece.link == link]
-        pieces = [points for points in pieces if len(points) > 3 and np.linalg.matrix_rank(points - points[0]) == 3]
-        if pieces:
-            found[link] = LinkShape(together([filled(points) for points in pieces]), np.concatenate(pieces), False)
-    capsules: dict[int, list[Envelope]] = {}
-    for capsule in envelopes_of(robot):
-        capsules.setdefault(capsule.link, []).append(capsule)
-    for link, own in capsules.items():
-        points = [np.array(end) + each.radius * AROUND for each in own for end in (each.start, each.end)]
-        water = together([capsule_body(each, WATER) for each in own])
-        found.setdefault(link, LinkShape(water, np.concatenate(points), not robot.envelopes))
+    """Shapes of links from 0 that have any."""
+    guessed = not arm_shapes(robot).given
+    found = {}
+    for link, parts in _link_parts(robot).items():
+        points = np.concatenate([_outline(part) for part in parts])
+        found[link] = LinkShape(together([_body(part, WATER) for part in parts]), points, guessed)
     return found
 
 
-def filled(points: Reals) -> MassBody:
-    """The hull of points (k, 3) filled with water, as tetrahedra about its middle [1]_.
+def estimated_links(robot: Robot, density: float) -> tuple[LinkMass, ...]:
+    """A body for each link that has shapes, filled evenly at ``density`` (kg/m^3); overlaps count twice.
+
+    Whoever uses them grades them ``inferred``.
+    """
+    parts = sorted(_link_parts(robot).items())
+    return tuple(LinkMass(link, together([_body(part, density) for part in own])) for link, own in parts)
+
+
+def _link_parts(robot: Robot) -> dict[int, Sequence[Envelope] | Sequence[Reals]]:
+    """What fills each link: its convex pieces (k, 3), m, that have a volume; of a link without any its capsules."""
+    shapes, pieces, capsules = arm_shapes(robot), dict[int, list[Reals]](), dict[int, list[Envelope]]()
+    for piece in shapes.pieces:
+        points = np.array(piece.points)
+        if len(points) > 3 and np.linalg.matrix_rank(points - points[0]) == 3:
+            pieces.setdefault(piece.link, []).append(points)
+    for capsule in shapes.capsules:
+        capsules.setdefault(capsule.link, []).append(capsule)
+    return {**capsules, **pieces}
+
+
+def _body(part: Envelope | Reals, density: float) -> MassBody:
+    return capsule_body(part, density) if isinstance(part, Envelope) else filled(part, density)
+
+
+def _outline(part: Envelope | Reals) -> Reals:
+    """Points (k, 3), m, whose hull is around a part."""
+    if isinstance(part, Envelope):
+        return np.concatenate([np.array(end) + part.radius * AROUND for end in (part.start, part.end)])
+    return part
+
+
+def filled(points: Reals, density: float = WATER) -> MassBody:
+    """The hull of points (k, 3), m, filled at ``density`` (kg/m^3), as tetrahedra about its middle [1]_.
 
     References
     ----------
@@ -66,10 +90,28 @@ def filled(points: Reals) -> MassBody:
     """
     hull, middle = scipy.spatial.ConvexHull(points), points.mean(axis=0)
     corners = points[hull.simplices] - middle
-    mass = WATER * np.abs(np.linalg.det(corners)) / 6
+    mass = density * np.abs(np.linalg.det(corners)) / 6
     sums = corners.sum(axis=1)
     second = np.einsum("t,ti,tj->ij", mass, sums, sums) + np.einsum("t,tki,tkj->ij", mass, corners, corners)
     whole, centre = float(mass.sum()), mass @ sums / 4 / mass.sum()
     second = second / 20 - whole * np.outer(centre, centre)
     x, y, z = (middle + centre).tolist()
     return MassBody(whole, (x, y, z), six_moments(np.trace(second) * np.eye(3) - second))
+
+
+def capsule_body(capsule: Envelope, density: float) -> MassBody:
+    """A solid capsule: a cylinder and two half balls."""
+    start, end, r = np.array(capsule.start), np.array(capsule.end), capsule.radius
+    length = float(np.linalg.norm(end - start))
+    cylinder, ball = density * np.pi * r**2 * length, density * 4 / 3 * np.pi * r**3
+    across = cylinder * (length**2 / 12 + r**2 / 4) + ball * (0.4 * r**2 + length**2 / 4 + 0.375 * length * r)
+    round_ = cylinder * r**2 / 2 + 0.4 * ball * r**2
+    body = MassBody(cylinder + ball, (0.0, 0.0, 0.0), (across, across, round_, 0.0, 0.0, 0.0))
+    T = np.eye(4)
+    T[:3, 3] = (start + end) / 2
+    if length > 0:
+        z = (end - start) / length
+        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+        x /= np.linalg.norm(x)
+        T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    return moved(body, T)

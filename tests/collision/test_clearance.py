@@ -8,15 +8,17 @@ import yaml
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
-from er3a.collision.envelopes import capsule_poses, default_envelopes, envelopes_of
+from er3a.collision.envelopes import arm_shapes, capsule_poses, default_envelopes
 from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import arm_bodies
+from er3a.dynamics.link_shapes import estimated_links
 from er3a.errors import InputError, InputWarning
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile, load_scene
 from er3a.kinematics.forward import forward
-from er3a.robots.robot import Envelope
+from er3a.robots.robot import ConvexPiece, Envelope
 from testing.arms import joints_at_random, placement
 
 
@@ -42,7 +44,7 @@ def test_capsules_follow_the_arm(robot, random):
 
 def test_distances_from_solids_are_those_of_geometry(robot, random):
     q = joints_at_random(robot, random, 20)
-    capsules = [c for c in envelopes_of(robot) if c.link > 0]
+    capsules = [c for c in arm_shapes(robot).capsules if c.link > 0]
     solids = {
         "spheres": ({"name": "ball", "xyz_mm": [2500, 0, 500], "radius_mm": 100}, None),
         "planes": ({"name": "floor", "normal": [0, 0, 2], "offset_mm": -6000}, None),
@@ -104,7 +106,7 @@ def test_envelopes_of_the_file_replace_the_default(tmp_path):
     write_robot(arm, tmp_path / "arm.yaml")
     again = load_robot(tmp_path / "arm.yaml")
     assert again.envelopes == (capsule,)
-    assert envelopes_of(again) == (capsule,)
+    assert arm_shapes(again).capsules == (capsule,)
 
 
 @pytest.mark.parametrize(
@@ -144,3 +146,17 @@ def test_turns_of_an_arm_are_measured_once(random, monkeypatch):
     np.testing.assert_allclose(once[0], each[0], atol=1e-9)
     np.testing.assert_array_equal(once[1], each[1])
     assert measured == [30]
+
+
+def test_hulls_of_the_file_are_all_shapes_that_an_arm_has():
+    """What import-urdf writes for meshes: no guessed capsule beside them; links without a shape are named."""
+    corners = tuple((x, y, z) for x in (-0.03, 0.03) for y in (-0.03, 0.03) for z in (0.0, 0.2))
+    plain = load_robot("er3_600")
+    arm = plain.replace(envelopes=(), hulls=(ConvexPiece(0, corners, 0.0), ConvexPiece(2, corners, 0.001)))
+    shapes = arm_shapes(arm)
+    assert (shapes.capsules, shapes.pieces, shapes.given, shapes.bare) == ((), arm.hulls, True, (1, 3, 4, 5, 6))
+    assert [(body.link, len(body.points)) for body in arm_bodies(arm)] == [(0, 8), (2, 8)]
+    assert [each.link for each in estimated_links(arm, 2700.0)] == [0, 2]
+    guessed = arm_shapes(plain.replace(envelopes=()))
+    assert (guessed.given, guessed.grade) == (False, "inferred")
+    assert guessed.capsules == default_envelopes(plain)

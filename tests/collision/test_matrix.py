@@ -10,7 +10,7 @@ import pytest
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
-from er3a.collision.envelopes import envelopes_of
+from er3a.collision.envelopes import arm_shapes
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.pairs import CarriedAndLink, CarriedAndSolid, LinkPair
 from er3a.collision.scene import Scene
@@ -18,8 +18,8 @@ from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile
-from er3a.robots.robot import Envelope, PairRule, Robot
-from testing.arms import OTHERS_LONG, make_arm
+from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot
+from testing.arms import OTHERS_LONG, made_of, make_arm
 
 SAMPLES = 500
 BENT = ((0.0, 0.0, 0.1), (0.16, 0.0, 0.1), (0.16, 0.0, -0.12))  # m, in the frame of link 6
@@ -28,7 +28,7 @@ BENT = ((0.0, 0.0, 0.1), (0.16, 0.0, 0.1), (0.16, 0.0, -0.12))  # m, in the fram
 def bent_tool(robot: Robot) -> Robot:
     """The arm with a tool that leads back over the flange: capsules of 15 mm."""
     tool = tuple(Envelope(6, start, end, 0.015) for start, end in pairwise(BENT))
-    return robot.replace(envelopes=(*envelopes_of(robot), *tool))
+    return robot.replace(envelopes=(*arm_shapes(robot).capsules, *tool))
 
 
 def rows_of(robot: Robot):
@@ -54,7 +54,7 @@ def coal_distance(robot: Robot, q: np.ndarray, first: str, second: str) -> float
     """Least distance of two links' capsules by Coal."""
     T, least = link_poses(robot, q), np.inf
     placed: dict[str, list] = {first: [], second: []}
-    for capsule in envelopes_of(robot):
+    for capsule in arm_shapes(robot).capsules:
         name = f"link_{capsule.link}" if capsule.link else "base"
         if name in placed:
             start, end = (T[capsule.link][:3, :3] @ p + T[capsule.link][:3, 3] for p in (capsule.start, capsule.end))
@@ -78,7 +78,7 @@ def test_every_pair_of_links_stands_in_it_with_what_dense_sampling_finds(robot, 
     """No pair that is said never to meet does, and witnesses overlap; by Coal on frames worked out apart."""
     robot = bent_tool(robot).replace(pair_rules=())
     rows = rows_of(robot)
-    links = sorted({capsule.link for capsule in envelopes_of(robot)})
+    links = sorted({capsule.link for capsule in arm_shapes(robot).capsules})
     assert len(rows) == len(links) * (len(links) - 1) / 2
     watched = {(a.name, b.name) for a, b in collision_matrix(robot).watched}
     q = random.uniform(robot.lower, robot.upper, (SAMPLES, 6))
@@ -124,7 +124,7 @@ def test_overlap_in_the_region_of_the_joint_is_all_that_is_left_out():
     robot = load_robot("er3_600")
     row = rows_of(robot)["link_2", "link_4"]
     radius = row.left_out
-    upper, forearm = (next(c for c in envelopes_of(robot) if c.link == k) for k in (2, 4))
+    upper, forearm = (next(c for c in arm_shapes(robot).capsules if c.link == k) for k in (2, 4))
     assert radius == pytest.approx(upper.radius + forearm.radius)
     bodies = Bodies(robot, None)
     cut = {body.link: body.points for pair in collision_matrix(robot).watched for body in pair if body.link in (2, 4)}
@@ -139,7 +139,7 @@ class TestFaultsOfOthers:
         """moveit2#2772: off because it collides in the default state."""
         robot = load_robot("er3a_c60")
         folded = Envelope(6, (0.0, 0.0, -0.3), (0.0, 0.0, -0.2), 0.05)  # lies in the forearm at J5 = 0
-        robot = robot.replace(envelopes=(*envelopes_of(robot), folded))
+        robot = robot.replace(envelopes=(*arm_shapes(robot).capsules, folded))
         assert coal_distance(robot, np.zeros(6), "link_4", "link_6") < 0
         assert clearance(robot, np.zeros((1, 6)), None).distance[0] < 0
 
@@ -229,6 +229,58 @@ def test_a_default_shape_that_slides_in_its_guide_is_joined_to_it():
     raised = np.array([[0.4, 0.2, slide, turn] for slide in (0.0, 0.03, 0.2) for turn in (0.0, 3.0)])
     assert Bodies(scara, None).free(raised).all()
     assert not Bodies(scara, None).free(np.array([[0.0, 2.39, 0.0, 0.0]])).any()  # the outer arm folds onto the inner
-    stated = scara.replace(envelopes=envelopes_of(scara))
+    stated = scara.replace(envelopes=arm_shapes(scara).capsules)
     assert rows_of(stated)["link_2", "link_4"].state == "meets"
     assert not Bodies(stated, None).free(raised[:2]).any()
+
+
+def box_around(link: int, low: tuple[float, float, float], high: tuple[float, float, float]) -> ConvexPiece:
+    return ConvexPiece(
+        link, tuple((x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])), 0.0
+    )
+
+
+def wrist_of_boxes() -> Robot:
+    """A spherical wrist of boxes without a margin: the last one reaches through the middle one into the first."""
+    boxes = (
+        box_around(1, (-0.04, -0.04, -0.3), (0.04, 0.04, 0.05)),
+        box_around(2, (-0.03, -0.03, -0.03), (0.03, 0.03, 0.03)),
+        box_around(3, (-0.02, -0.02, -0.02), (0.02, 0.02, 0.3)),
+    )
+    rows = [("R", 0, -90, 0, -180, 180), ("R", 0, 90, 0, -120, 120), ("R", 0, 0, 100, -180, 180)]
+    return made_of(rows).replace(hulls=boxes)
+
+
+def test_boxes_of_a_wrist_are_held_by_their_joints_also_across_two_of_them():
+    """Cores that overlap measure 0 without a margin: that is overlap, and no reason to forbid all poses."""
+    robot = wrist_of_boxes()
+    states = {names: row.state for names, row in rows_of(robot).items()}
+    assert states["link_1", "link_2"] == states["link_2", "link_3"] == states["link_1", "link_3"] == "joined"
+    bodies = Bodies(robot, None)
+    assert bodies.unexamined == ()
+    assert bodies.free(np.zeros((1, 3))).all()
+
+
+def test_neighbours_with_little_play_are_joined_though_they_are_apart_in_some_poses():
+    """A square bar that turns beside a wall: its corners enter the wall, its sides are a little away from it."""
+    wall = box_around(0, (-0.1, 0.02, -0.1), (0.1, 0.06, 0.1))
+    for half, state in ((0.0185, "joined"), (0.015, "meets")):
+        bar = box_around(1, (-half, -half, -0.05), (half, half, 0.05))
+        robot = made_of([("R", 0, 0, 0, -180, 180)]).replace(hulls=(wall, bar))
+        assert rows_of(robot)["base", "link_1"].state == state
+
+
+def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes():
+    """A base in the wrong unit, as a ball of 3 m: the rest of the arm is checked as before."""
+    robot = load_robot("er3_600").replace(pair_rules=())
+    swollen = robot.replace(envelopes=(Envelope(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 3.0), *robot.envelopes[1:]))
+    rows, bodies = rows_of(swollen), Bodies(swollen, None)
+    assert {names[1] for names, row in rows.items() if row.state == "overlaps"} == {"link_3", "link_4", "link_6"}
+    assert bodies.unexamined == (LinkPair(0, 3), LinkPair(0, 4), LinkPair(0, 6))
+    assert not {pair for pair in bodies.pairs if pair in bodies.unexamined}
+    q = np.random.default_rng(1).uniform(robot.lower, robot.upper, (200, 6))
+    alone = Bodies(robot.replace(envelopes=robot.envelopes[1:]), None)
+    np.testing.assert_array_equal(bodies.free(q), alone.free(q))
+    assert 0.05 < bodies.free(q).mean() < 1
+    allowed = tuple(PairRule("base", f"link_{k}", "allow", "made so") for k in (3, 4, 6))
+    assert Bodies(swollen.replace(pair_rules=allowed), None).unexamined == ()

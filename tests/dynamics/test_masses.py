@@ -12,8 +12,7 @@ import trimesh
 import yaml
 
 import er3a
-from er3a.dynamics.estimate import capsule_body, estimated_links
-from er3a.dynamics.link_shapes import filled
+from er3a.dynamics.link_shapes import capsule_body, estimated_links, filled
 from er3a.dynamics.plausibility import (
     AboutOrigin,
     CentreOutside,

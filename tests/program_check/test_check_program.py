@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from er3a.collision.envelopes import envelopes_of
+from er3a.collision.envelopes import arm_shapes
 from er3a.collision.scene import Plane, Scene, Sphere
 from er3a.errors import ShapeError
 from er3a.files.program_file import load_programs
@@ -214,7 +214,7 @@ def test_a_zone_that_allows_a_collision_is_a_caution(tmp_path):
     assert min(motion.clearance for motion in free.motions.values()) > 0.05
     # The capsule of the last link meets a ball inside the corner, but not on the lines.
     cut = first[:3, 3] + 0.25 * (T[:3, 3] + second[:3, 3] - 2 * first[:3, 3])
-    radius = max(each.radius for each in envelopes_of(ROBOT) if each.link == 6)
+    radius = max(each.radius for each in arm_shapes(ROBOT).capsules if each.link == 6)
     place = np.eye(4)
     place[:3, 3] = cut - [0.0, 0.0, radius + 0.012]
     scene = Scene("ball", (Sphere("ball", place, 0.015),))

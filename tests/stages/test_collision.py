@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from er3a.collision.clearance import clearance
 from er3a.files.robot_library import load_robot
@@ -116,6 +117,38 @@ def test_scenes_that_leave_nothing_have_one_verdict(case, tmp_path):
     study = study_with(scene_file(tmp_path, **shapes), samples=1000, rounds=0)
     verdict = compute(study, NAME).summary.verdict
     assert (verdict.status, verdict.finding.code) == expected
+
+
+@pytest.mark.long
+def test_shapes_in_error_are_named_and_end_no_other_stage(tmp_path):
+    """A base of 3 m: the stage says that the shapes are wrong; targets are judged without these pairs."""
+    content = yaml.safe_load(Path(f"data/robots/{NAME}.yaml").read_text(encoding="utf-8"))
+    content["envelopes"]["capsules"][0] |= {"from_mm": [0, 0, 0], "to_mm": [0, 0, 0], "radius_mm": 3000}
+    file = tmp_path / "arm.yaml"
+    file.write_text(yaml.safe_dump(content | {"name": "arm"}), encoding="utf-8")
+    study = study_with(None, samples=1000, rounds=0).model_dump()
+    targets = tmp_path / "targets.yaml"
+    target = {"name": "a", "q_deg": [20, -30, 10, 35, 40, -20]}
+    targets.write_text(json.dumps({"kind": "targets", "targets": [target]}), encoding="utf-8")
+    study["robots"] = {"arm": {"file": str(file), "targets": str(targets), "paths": study["robots"][NAME]["paths"]}}
+    study["inverse"] |= {"scene": None, "round_trips": 10, "map_cells": 8}
+    study = Study.model_validate(study)
+    stored = {}
+    for stage in ("collision", "inverse"):
+        run.compute(stage, study, "arm", tmp_path / stage)
+        stored[stage] = json.loads((tmp_path / stage / "summary.json").read_text(encoding="utf-8"))["verdict"]
+    wrong = stored["collision"]
+    assert (wrong["status"], wrong["code"]) == ("fail", "collision.shapes_overlap")
+    assert "base and link 4" in wrong["text"]
+    assert "an error of the shapes, not of the arm" in wrong["text"]
+    assert stored["inverse"]["status"] == "caution"
+    assert [pair["second"] for pair in stored["inverse"]["unexamined"]] == [3, 4, 6]
+    assert stored["inverse"]["text"].endswith(
+        "Collisions not examined, because the shapes overlap in every joint vector tried: "
+        "base and link 3, base and link 4, base and link 6."
+    )
+    run.show("report", "inverse", study, "arm", tmp_path / "inverse", tmp_path / "page.html")
+    assert "Collisions not examined" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.long

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.collision.envelopes import envelopes_of
+from er3a.collision.envelopes import arm_shapes
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import within
@@ -85,8 +85,9 @@ def scenes(robot: Robot, reach: SampledReach) -> list[dict[str, Any]]:
 
 def _foot_of(robot: Robot) -> float:
     """Height (m) on which the arm stands: of the base's frame, or where the base goes deeper."""
-    lines = [point for each in envelopes_of(robot) if each.link == 0 for point in (each.start, each.end)]
-    points = [(0.0, 0.0, 0.0), *lines, *(point for each in robot.hulls if each.link == 0 for point in each.points)]
+    shapes = arm_shapes(robot)
+    lines = [point for each in shapes.capsules if each.link == 0 for point in (each.start, each.end)]
+    points = [(0.0, 0.0, 0.0), *lines, *(point for each in shapes.pieces if each.link == 0 for point in each.points)]
     heights: Reals = np.array(points) @ robot.base[2, :3] + robot.base[2, 3]
     return float(heights.min())
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.dynamics.arm_model import drives_of
-from er3a.dynamics.estimate import estimated_links
 from er3a.dynamics.holding import worst_holding
+from er3a.dynamics.link_shapes import estimated_links
 from er3a.dynamics.plausibility import mass_findings
 from er3a.dynamics.uncertainty import ASSUMED
 from er3a.files.load_file import load_of

@@ -1,0 +1,34 @@
+"""Shapes that a URDF gives, against its own meshes as Pinocchio reads them and Coal measures them."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from er3a.collision.envelopes import arm_shapes
+from er3a.formats.urdf import import_urdf
+from testing.mesh_peers import held_against_meshes
+
+SHARED = Path(str(find_spec("pinocchio").origin)).parents[4] / "share" / "example-robot-data" / "robots"
+ARMS = {
+    "ur5": (SHARED / "ur_description/urdf/ur5_robot.urdf", 0.1),
+    "ur10": (SHARED / "ur_description/urdf/ur10_robot.urdf", 0.1),
+    "panda": (SHARED / "panda_description/urdf/panda.urdf", 0.5),
+    "kinova": (SHARED / "kinova_description/robots/kinova.urdf", 0.5),
+}
+POSES = 200
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ARMS)
+def test_what_is_said_of_shapes_holds_of_the_meshes(name):
+    """Never meet, always overlap, clearance as a lower bound; and an arm by its maker moves without hitting itself."""
+    path, least_free = ARMS[name]
+    imported = import_urdf(path, snap=True)
+    assert arm_shapes(imported.robot).given
+    found = held_against_meshes(path, imported, POSES, 5)
+    assert found.wrong == []
+    assert found.errors_apart == found.errors_crossing == []
+    assert found.free > least_free
