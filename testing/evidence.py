@@ -76,7 +76,7 @@ def files_of(campaign: str, root: Path = ROOT) -> set[Path]:
     modules = [f"benchmarks.campaign_{campaign}"]
     if campaign in STARTING_COMMANDS:
         modules += ["er3a.pipeline.cli", *_verbs(root)]
-    return sources(modules, root)
+    return sources(modules, root, ("er3a", "testing", "benchmarks"))
 
 
 def _verbs(root: Path) -> Iterable[str]:

@@ -1,7 +1,8 @@
 """A digest of just the modules that a module uses, so that an edit reruns what depends on it and nothing else.
 
-Imports are read from the source text and followed inside this package. The packages' ``__init__`` files hold no code
-that computes, so only the modules that are named count.
+Imports are read from the source text and followed inside this package, by its name: where it is installed, other
+packages stand beside it. The packages' ``__init__`` files hold no code that computes, so only the modules that are
+named count.
 """
 
 from __future__ import annotations
@@ -9,12 +10,13 @@ from __future__ import annotations
 import ast
 import hashlib
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from functools import cache
 from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGE = _ROOT / "er3a"
+_OWN = (_PACKAGE.name,)
 # Every process asks for a digest, and a parser would take a second for it; a line of prose that looks like this names
 # no module. One line (a comment left off), or a bracket of lines.
 _IMPORT = re.compile(r"^[ \t]*(?:from (?P<module>[\w.]+) )?import (?P<names>\([^)]*\)|[\w., \t]+)", flags=re.MULTILINE)
@@ -26,7 +28,7 @@ def code_digest(*modules: str) -> str:
     """SHA-256 over the sources of modules, of all modules of er3a that they import (transitively), and of templates
     (``*.j2``, ``*.css``, ``*.js``) that stand beside those that are part of a view."""
     for module in modules:
-        if _file(module, _ROOT) is None:
+        if _file(module, _ROOT, _OWN) is None:
             raise ModuleNotFoundError(f"er3a has no module '{module}'")
     return digest_of(sources(modules), _PACKAGE)
 
@@ -39,10 +41,16 @@ def digest_of(files: Iterable[Path], folder: Path) -> str:
     return digest.hexdigest()
 
 
-def sources(modules: Iterable[str], root: Path = _ROOT) -> set[Path]:
-    """The files of modules below ``root``, of those there that they import (transitively), and templates of views."""
+def sources(modules: Iterable[str], root: Path = _ROOT, packages: Collection[str] = _OWN) -> set[Path]:
+    """The files of modules, of those that they import (transitively), and templates of views.
+
+    Parameters
+    ----------
+    root : the folder that the packages stand in
+    packages : names of packages that imports are followed in; whatever else stands in ``root`` is not looked at
+    """
     found: set[Path] = set()
-    todo = [path for module in modules if (path := _file(module, root))]
+    todo = [path for module in modules if (path := _file(module, root, packages))]
     while todo:
         path = todo.pop()
         if path in found:
@@ -50,14 +58,14 @@ def sources(modules: Iterable[str], root: Path = _ROOT) -> set[Path]:
         found.add(path)
         if path.name in VIEWS:
             found |= {file for kind in ("j2", "css", "js") for file in path.parent.glob(f"*.{kind}")}
-        todo += _imported(path, root)
+        todo += _imported(path, root, tuple(packages))
     return found
 
 
 @cache
-def _imported(path: Path, root: Path) -> tuple[Path, ...]:
-    """The files below ``root`` that a file imports."""
-    return tuple(file for name in _imports(path, root) if (file := _file(name, root)))
+def _imported(path: Path, root: Path, packages: tuple[str, ...]) -> tuple[Path, ...]:
+    """The files of these packages that a file imports."""
+    return tuple(file for name in _imports(path, root) if (file := _file(name, root, packages)))
 
 
 def _imports(path: Path, root: Path) -> tuple[str, ...]:
@@ -88,6 +96,7 @@ def _public(root: Path) -> dict[str, str]:
     return {}
 
 
-def _file(module: str, root: Path) -> Path | None:
-    path = root.joinpath(*module.split(".")).with_suffix(".py")
-    return path if path.is_file() else None
+def _file(module: str, root: Path, packages: Collection[str]) -> Path | None:
+    package, *parts = module.split(".")
+    path = root.joinpath(package, *parts).with_suffix(".py")
+    return path if package in packages and path.is_file() else None
