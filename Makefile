@@ -65,8 +65,9 @@ words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeli
 campaigns: $(VENV)/dev.stamp  ## full-size evidence: writes the tables in docs/evidence/ again
 	$(BIN)/python -m benchmarks.campaigns $(ARGS)
 
-docs: $(VENV)/docs.stamp  ## build the documentation site in docs/_build/html, warnings as errors
+docs: $(VENV)/docs.stamp  ## build the documentation site in docs/_build/html; warnings and broken links are errors
 	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@$(BIN)/python -m testing.links docs/_build/html
 	@echo "docs/_build/html/index.html"
 
 pictures: $(VENV)/dev.stamp  ## pictures of the documentation again, from finished studies (config.yaml and gallery.yaml)
