@@ -22,10 +22,10 @@ run: $(VENV)/run.stamp  ## set up, run the study, write reports/index.html (ARGS
 	@$(BIN)/er3a run --study "$$STUDY" -- $(ARGS)
 
 test: $(VENV)/dev.stamp  ## set up and run the fast tests (ARGS="-k workspace")
-	@$(BIN)/python -m pytest $(ARGS)
+	@$(UV_SETTINGS) $(BIN)/python -m pytest $(ARGS)
 
 test-all: $(VENV)/dev.stamp  ## set up and run all tests, the long ones too
-	@$(BIN)/python -m pytest -m "" $(ARGS)
+	@$(UV_SETTINGS) $(BIN)/python -m pytest -m "" $(ARGS)
 
 view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
 	@$(BIN)/er3a view $(ROBOT)
@@ -99,10 +99,11 @@ distclean: clean  ## also remove the environment
 
 # uv does not read what pip was told: certificate, proxy and index of pip's settings are handed on to it, unless its own
 # variables name others; and it takes the system's certificates, as pip does.
-of_pip = $$($(BIN)/python -m pip config list 2>/dev/null | sed -En "s/^(global|install)\.$(1)=.(.*).$$/\2/p" | tail -n 1)
-as_pip = value=$${$(1):-$${$(2):-$(call of_pip,$(3))}}; [ -z "$$value" ] || export $(1)="$$value";
-UV = $(call as_pip,SSL_CERT_FILE,PIP_CERT,cert) $(call as_pip,HTTPS_PROXY,PIP_PROXY,proxy) \
-	$(call as_pip,UV_DEFAULT_INDEX,PIP_INDEX_URL,index-url) UV_SYSTEM_CERTS=1 $(BIN)/uv
+pip_setting = $$($(BIN)/python -m pip config list 2>/dev/null | sed -En "s/^(global|install)\.$(1)=.(.*).$$/\2/p" | tail -n 1)
+export_setting = value=$${$(1):-$${$(2):-$(call pip_setting,$(3))}}; [ -z "$$value" ] || export $(1)="$$value";
+UV_SETTINGS = $(call export_setting,SSL_CERT_FILE,PIP_CERT,cert) $(call export_setting,HTTPS_PROXY,PIP_PROXY,proxy) \
+	$(call export_setting,UV_DEFAULT_INDEX,PIP_INDEX_URL,index-url) export UV_SYSTEM_CERTS=1;
+UV = $(UV_SETTINGS) $(BIN)/uv
 
 # The environment: a venv, a hash-checked uv in it, then the hash-checked lock.
 $(VENV)/uv.stamp: requirements/uv.txt

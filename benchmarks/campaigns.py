@@ -6,6 +6,7 @@ make campaigns ARGS="kinematics"     one
 
 from __future__ import annotations
 
+import argparse
 import sys
 from importlib import import_module
 
@@ -26,7 +27,10 @@ def write(name: str, text: str) -> None:
     page.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
 
 
-def main(names: list[str]) -> int:
+def main(words: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="make campaigns", description="Writes pages of evidence again.")
+    parser.add_argument("names", nargs="*", help=f"all if absent: {', '.join(CAMPAIGNS)}")
+    names = parser.parse_args(words).names
     unknown = [name for name in names if name not in CAMPAIGNS]
     if unknown:
         print(f"error: no campaign '{unknown[0]}'; known: {', '.join(CAMPAIGNS)}", file=sys.stderr)
@@ -40,4 +44,4 @@ def main(names: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+    raise SystemExit(main())

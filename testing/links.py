@@ -40,10 +40,8 @@ def broken_links(folder: Path) -> list[tuple[str, str]]:
     """The pages below a folder and their links to files and parts of pages that are not there; others' sites are not
     looked at, nor is what follows ``#q=``, a state of the teach panel."""
     folder = folder.resolve()
-    pages = sorted(folder.rglob("*.html"))
-    return [
-        (page.relative_to(folder).as_posix(), link) for page in pages for link in _read(page).links if _broken(page, link)
-    ]
+    links = [(page, link) for page in sorted(folder.rglob("*.html")) for link in _read(page).links]
+    return [(page.relative_to(folder).as_posix(), link) for page, link in links if _broken(page, link)]
 
 
 def _broken(page: Path, link: str) -> bool:
