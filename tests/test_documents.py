@@ -31,6 +31,7 @@ from er3a.pipeline.messages.glossary import GLOSSARY
 from er3a.pipeline.study import Study
 from testing.documents import PAGES, ROOT, blocks, commands, name_of, prose
 from testing.evidence import CAMPAIGNS
+from testing.links import broken_links
 
 NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("*.md"))
 SETTING = re.compile(r"`([a-z_]+: [^`]+)`")
@@ -252,3 +253,14 @@ def test_the_glossary_has_the_terms_that_pages_explain():
     table = (ROOT / "docs/glossary.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| ([^|]+?) (?:\([^|]*\) )?\| ([^|]+) \|", table, re.MULTILINE)
     assert set(GLOSSARY.items()) <= set(rows)
+
+
+def test_links_that_lead_nowhere_are_found(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "index.html").write_text('<p id="a"><a href="sub/b.html#b">b</a> <a href="sub/c.html">c</a>', "utf-8")
+    (tmp_path / "sub/b.html").write_text(
+        '<h1 id="b"><a href="../index.html#a">a</a><a href="#none">n</a><a href="https://example.org/x">x</a>'
+        '<img src="data:,"><img src="no.webp"><a href="..">up</a><a href="b.html#q=1,2">q</a>',
+        "utf-8",
+    )
+    assert broken_links(tmp_path) == [("index.html", "sub/c.html"), ("sub/b.html", "#none"), ("sub/b.html", "no.webp")]
