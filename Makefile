@@ -81,11 +81,11 @@ release-check: $(VENV)/run.stamp  ## the same; an error unless a release could b
 	@$(BIN)/python -m testing.evidence --release
 
 lock: $(VENV)/uv.stamp  ## resolve the locked requirements again
-	$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
-	$(UV) pip compile pyproject.toml --extra build -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
-	$(UV) pip compile pyproject.toml --extra build --extra docs -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/docs.txt
-	echo uv >$(VENV)/uv.in
-	$(UV) pip compile $(VENV)/uv.in $(LOCK_FLAGS) -o requirements/uv.txt
+	@$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
+	@$(UV) pip compile pyproject.toml --extra build -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
+	@$(UV) pip compile pyproject.toml --extra build --extra docs -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/docs.txt
+	@echo uv >$(VENV)/uv.in
+	@$(UV) pip compile $(VENV)/uv.in $(LOCK_FLAGS) -o requirements/uv.txt
 
 LOCK_FLAGS := --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-header --no-annotate --no-emit-index-url --no-emit-find-links
