@@ -47,7 +47,7 @@ STANDS_FOR = {
     "check-program": {"FILE": "data/programs/pick_place.src", "R": "er3a_c60"},
     "program": {},
     "calibrate": {"ROBOT": "er3a_c60", "MEASUREMENTS.csv": "measured.csv", "FILE.csv": "measured.csv"},
-    "hand-eye": {"FILE": "data/vision/fixed_camera.yaml"},
+    "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
     "--help": {},
 }
 # Those of a study: test_wheel.py runs them, and .ci/targets what runs long.
