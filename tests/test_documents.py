@@ -50,7 +50,7 @@ STANDS_FOR = {
     "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
     "--help": {},
 }
-# Those of a study: test_wheel.py runs them, and .ci/targets what runs long.
+# Those of a study: tests/integration/test_wheel.py runs them, but for what a terminal or a desktop is needed.
 OF_A_STUDY = {"new", "run", "verdicts", "view", "diff", "estimate", "--install-completion"}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -16,6 +17,7 @@ import pytest
 from er3a import __version__
 from er3a.files.robot_library import load_robot
 from er3a.formats.urdf import export_urdf
+from testing.documents import PAGES, commands
 from testing.processes import run
 from testing.small_study import ROOT
 
@@ -147,6 +149,17 @@ def test_a_study_from_nothing_to_its_reports(er3a, new_cell):
     assert "er3a run --study config/config.yaml reports/odd_arm/validation.html" in foot
     assert str(cell) not in foot
     assert "Nothing to be done" in er3a(cell, "run").stderr
+    for words in lines_on_a_finished_study():
+        expected = int("--fail-on" in words and "fail" in verdicts.values())
+        assert er3a(cell, *words).returncode == expected, words
+
+
+def lines_on_a_finished_study() -> set[tuple[str, ...]]:
+    """What guides print of `er3a run`, `verdicts` and `diff`, studies of a checkout left out."""
+    printed = {tuple(shlex.split(line)[1:]) for page in PAGES for line in commands(page) if line.startswith("er3a ")}
+    of_this = {words for words in printed if words[0] in {"run", "verdicts", "diff"} and "--study" not in words}
+    stands_for = dict.fromkeys(("OLD", "NEW", "旧", "新"), "results")
+    return {tuple(stands_for.get(word, word) for word in words) for words in of_this} - {("run",), ("diff",)}
 
 
 @pytest.mark.parametrize(
