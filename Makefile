@@ -22,10 +22,10 @@ run: $(VENV)/run.stamp  ## set up, run the study, write reports/index.html (ARGS
 	@$(BIN)/er3a run --study "$$STUDY" -- $(ARGS)
 
 test: $(VENV)/dev.stamp  ## set up and run the fast tests (ARGS="-k workspace")
-	@$(BIN)/python -m pytest $(ARGS)
+	@$(UV_SETTINGS) $(BIN)/python -m pytest $(ARGS)
 
 test-all: $(VENV)/dev.stamp  ## set up and run all tests, the long ones too
-	@$(BIN)/python -m pytest -m "" $(ARGS)
+	@$(UV_SETTINGS) $(BIN)/python -m pytest -m "" $(ARGS)
 
 view: $(VENV)/run.stamp  ## open the recordings in the Rerun viewer (ROBOT=er3a_c60 for one arm)
 	@$(BIN)/er3a view $(ROBOT)
@@ -62,8 +62,9 @@ words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeli
 campaigns: $(VENV)/dev.stamp  ## evidence whose code has changed, again (ARGS="motion --again", ARGS="--share 0.01")
 	$(BIN)/python -m benchmarks.campaigns $(ARGS)
 
-docs: $(VENV)/docs.stamp  ## build the documentation site in docs/_build/html, warnings as errors
+docs: $(VENV)/docs.stamp  ## build the documentation site in docs/_build/html; warnings and broken links are errors
 	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@$(BIN)/python -m testing.links docs/_build/html
 	@echo "docs/_build/html/index.html"
 
 pictures: $(VENV)/dev.stamp  ## pictures of the documentation again, from finished studies (config.yaml and gallery.yaml)
@@ -74,11 +75,11 @@ release-check: $(VENV)/run.stamp  ## an error unless the papers of a release agr
 	@$(BIN)/python -m testing.evidence
 
 lock: $(VENV)/uv.stamp  ## resolve the locked requirements again
-	$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
-	$(UV) pip compile pyproject.toml --extra build -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
-	$(UV) pip compile pyproject.toml --extra docs -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/docs.txt
-	echo uv >$(VENV)/uv.in
-	$(UV) pip compile $(VENV)/uv.in $(LOCK_FLAGS) -o requirements/uv.txt
+	@$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
+	@$(UV) pip compile pyproject.toml --extra build -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
+	@$(UV) pip compile pyproject.toml --extra build --extra docs -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/docs.txt
+	@echo uv >$(VENV)/uv.in
+	@$(UV) pip compile $(VENV)/uv.in $(LOCK_FLAGS) -o requirements/uv.txt
 
 LOCK_FLAGS := --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-header --no-annotate --no-emit-index-url --no-emit-find-links
@@ -92,10 +93,11 @@ distclean: clean  ## also remove the environment
 
 # uv does not read what pip was told: certificate, proxy and index of pip's settings are handed on to it, unless its own
 # variables name others; and it takes the system's certificates, as pip does.
-of_pip = $$($(BIN)/python -m pip config list 2>/dev/null | sed -En "s/^(global|install)\.$(1)=.(.*).$$/\2/p" | tail -n 1)
-as_pip = value=$${$(1):-$${$(2):-$(call of_pip,$(3))}}; [ -z "$$value" ] || export $(1)="$$value";
-UV = $(call as_pip,SSL_CERT_FILE,PIP_CERT,cert) $(call as_pip,HTTPS_PROXY,PIP_PROXY,proxy) \
-	$(call as_pip,UV_DEFAULT_INDEX,PIP_INDEX_URL,index-url) UV_SYSTEM_CERTS=1 $(BIN)/uv
+pip_setting = $$($(BIN)/python -m pip config list 2>/dev/null | sed -En "s/^(global|install)\.$(1)=.(.*).$$/\2/p" | tail -n 1)
+export_setting = value=$${$(1):-$${$(2):-$(call pip_setting,$(3))}}; [ -z "$$value" ] || export $(1)="$$value";
+UV_SETTINGS = $(call export_setting,SSL_CERT_FILE,PIP_CERT,cert) $(call export_setting,HTTPS_PROXY,PIP_PROXY,proxy) \
+	$(call export_setting,UV_DEFAULT_INDEX,PIP_INDEX_URL,index-url) export UV_SYSTEM_CERTS=1;
+UV = $(UV_SETTINGS) $(BIN)/uv
 
 # The environment: a venv, a hash-checked uv in it, then the hash-checked lock.
 $(VENV)/uv.stamp: requirements/uv.txt

@@ -60,7 +60,7 @@ def _carried_out(name: str, share: float) -> bool:
 
 def main(words: Sequence[str]) -> int:
     """Carry out the campaigns that are named, or all."""
-    parser = argparse.ArgumentParser(prog="make campaigns")
+    parser = argparse.ArgumentParser(prog="make campaigns", description="Writes pages of evidence again.")
     parser.add_argument("names", nargs="*", help=", ".join(CAMPAIGNS))
     parser.add_argument("--again", action="store_true", help="also those whose pages tell of the code that is here")
     parser.add_argument("--share", type=float, default=1.0, help="of the cases; below 1 no page is written")
@@ -93,4 +93,4 @@ def main(words: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+    raise SystemExit(main())

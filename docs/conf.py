@@ -42,6 +42,7 @@ nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 
+viewcode_follow_imported_members = False  # a constant's type would lead to the module of that type
 autodoc_typehints = "none"  # the docstrings tell shapes and units
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": False}
@@ -114,32 +115,31 @@ def write_public() -> None:
 
 
 def write_gallery(app: Sphinx) -> None:
-    """The pages of the study that was run last, copied into the site."""
+    """The pages of the study that was run last, copied into the site as they stand: they link to each other."""
     reports, gallery = ROOT / "reports", Path(app.outdir) / "gallery"
     shutil.rmtree(gallery, ignore_errors=True)
     parts = ["# Gallery of pages\n"]
-    robots = sorted(path.parent.name for path in reports.glob("*/validation.html"))
-    if not robots:
+    if not (reports / "index.html").is_file():
         parts.append("The pages of a study are shown here if one was run first: `make run`, then `make docs`.")
     else:
+        shutil.copytree(reports, gallery, ignore=shutil.ignore_patterns("*.rrd", "*.xml", "*.md", ".*"))
+        robots = sorted(path.parent.name for path in gallery.glob("*/validation.html"))
         parts += ["What `make run` writes, as it is: each page is one file that works offline.\n"]
         parts += [f"| | {' | '.join(robots)} |", f"|---{'|---' * len(robots)}|"]
         for stage in (*STAGES, "teach"):
-            pages = {robot: reports / robot / f"{stage}.html" for robot in robots}
-            links = [_copied(page, gallery / robot) if page.is_file() else "" for robot, page in pages.items()]
+            links = [_linked(gallery / robot / f"{stage}.html") for robot in robots]
             parts.append(f"| {stage} | {' | '.join(links)} |")
     (GENERATED / "gallery.md").write_text("\n".join(parts) + "\n", encoding="utf-8")
 
 
-def _copied(page: Path, folder: Path) -> str:
-    """Copy a page into the site, with its preview; the link to it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    shutil.copy(page, folder)
+def _linked(page: Path) -> str:
+    """The link to a page of the gallery, with its preview; nothing if there is no such page."""
+    if not page.is_file():
+        return ""
     preview, shown = page.with_suffix(".webp"), page.stem
     if preview.is_file() and preview.stat().st_size:
-        shutil.copy(preview, folder)
-        shown = f'<img src="../gallery/{folder.name}/{preview.name}" width="150" alt=""><br>{page.stem}'
-    return f'<a href="../gallery/{folder.name}/{page.name}">{shown}</a>'
+        shown = f'<img src="../gallery/{page.parent.name}/{preview.name}" width="150" alt=""><br>{page.stem}'
+    return f'<a href="../gallery/{page.parent.name}/{page.name}">{shown}</a>'
 
 
 def write_generated(app: Sphinx) -> None:

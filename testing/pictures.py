@@ -26,6 +26,7 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 ROBOT, MOTION = "er3a_c60", "line_collides"
 FRAMES, FRAME_MS, WIDTH = 60, 80, 640
 ARM_WIDTH = 420
+GALLERY = "config/gallery.yaml"
 
 
 def main() -> None:
@@ -40,15 +41,22 @@ def main() -> None:
             if options.what == "playing":
                 write_playing(browser, options.folder / "reports")
             else:
-                write_arms(browser, load_study(Path("config/gallery.yaml")), options.folder)
+                write_arms(browser, load_study(Path(GALLERY)), options.folder)
         finally:
             browser.quit()
+
+
+def _there(page: Path, study: str) -> Path:
+    """A page of a finished study, or the end of this with what to do."""
+    if not page.is_file():
+        raise SystemExit(f"error: {page}: there is no such page; first: .venv/bin/er3a run --study {study}")
+    return page.resolve()
 
 
 def write_playing(browser: WebDriver, reports: Path) -> None:
     """The moving picture of the README: a motion as its page plays it, with what the page says of it."""
     with chromium.emulating(browser, 900, 900, prefers_color_scheme="light"):
-        browser.get((reports / ROBOT / "trajectory.html").resolve().as_uri())
+        browser.get(_there(reports / ROBOT / "trajectory.html", "config/config.yaml").as_uri())
         stand = browser.find_element(By.CSS_SELECTOR, ".player .stand")
         browser.execute_script("arguments[0].scrollIntoView()", stand)
         frames = []
@@ -72,9 +80,9 @@ def write_arms(browser: WebDriver, study: Study, folder: Path) -> None:
     ]
     for name in study.robots:
         pictures = {"playing": "the arm at the start of a path, as its page plays it", "reach": "what its tool reaches"}
-        page = (folder / "reports" / name).resolve()
-        _save(_canvas(browser, page / "trajectory.html"), name, "playing")
-        _save(_reach(browser, page / "workspace.html"), name, "reach")
+        page = folder / "reports" / name
+        _save(_canvas(browser, _there(page / "trajectory.html", GALLERY)), name, "playing")
+        _save(_reach(browser, _there(page / "workspace.html", GALLERY)), name, "reach")
         shown = "\n".join(f"![{name}: {what}](images/arms/{name}_{kind}.webp)" for kind, what in pictures.items())
         rows = [_verdict(folder / "results" / name / stage) for stage in study.stages(name)]
         title = f"## {own_title(study.robot(name).title)}"

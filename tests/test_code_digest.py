@@ -112,6 +112,18 @@ def test_digest_is_that_of_the_content_not_of_the_place(package):
     ]
 
 
+def test_packages_that_stand_beside_the_package_do_not_count(package, before):
+    """As where it is installed: every library that it imports has a folder or file there."""
+    package.write("../neighbour.py", "from odd import *\n")
+    package.write("../neighbours/inner.py", "import neighbour\n")
+    package.append("pipeline/stages/made/compute.py", "import neighbour\nfrom neighbours import inner\n")
+    importing = package.digests(*MADE)
+    package.append("../neighbour.py")
+    package.append("../neighbours/inner.py")
+    assert package.digests(*MADE) == importing
+    assert importing[0] != before[0]
+
+
 def test_a_new_template_changes_the_report_only(package, before):
     package.write("pipeline/stages/made/extra.html.j2", "more")
     after = package.digests(*MADE)

@@ -5,18 +5,22 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from textwrap import dedent
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
+import trimesh
 import typer
 import yaml
 
+import er3a
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile
 from er3a.files.program_file import ProgramsFile
@@ -25,43 +29,29 @@ from er3a.files.yaml_file import parse, read_yaml
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.glossary import GLOSSARY
 from er3a.pipeline.study import Study
+from testing.documents import PAGES, ROOT, blocks, commands, name_of, prose
 from testing.evidence import CAMPAIGNS
+from testing.links import broken_links
 
-ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted(
-    page
-    for page in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "data/manual_refs/README.md")
-    if page.name != "CHANGELOG.md" and not {"_build", "generated"} & set(page.parts)
-)
 NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("*.md"))
-FENCED = re.compile(r"^( *)```(\S*)[^\n]*\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 SETTING = re.compile(r"`([a-z_]+: [^`]+)`")
 DOTTED = re.compile(r"`(validation|workspace|capability|inverse|trajectory|report)\.([a-z_]+)`")
 MODULES = {"report.py"}
-COMMAND = re.compile(r"`((?:er3a|make) [^`]+)`")
 PLACEHOLDERS = {"NAME", "FILE", "ROBOT", "OLD", "NEW", "..."}
+# Lines that need no study are run below, in this order, each with what stands there for a name that the page gives.
 STANDS_FOR = {
-    "FILE": str(ROOT / "data/robots/er3_600.yaml"),
-    "文件": str(ROOT / "data/robots/er3_600.yaml"),  # README.zh-CN.md
-    "data/robots/my_arm.yaml": "my_arm.yaml",
-    "my_arm": "er3_600",
+    "export-urdf": {"my_arm": "er3_600"},
+    "import-urdf": {},
+    "mesh": {},
+    "check": {"FILE": "data/paths/er3a_c60.yaml", "文件": "data/paths/er3a_c60.yaml"},
+    "check-program": {"FILE": "data/programs/pick_place.src", "R": "er3a_c60"},
+    "program": {},
+    "calibrate": {"ROBOT": "er3a_c60", "MEASUREMENTS.csv": "measured.csv", "FILE.csv": "measured.csv"},
+    "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
+    "--help": {},
 }
-RUN = ("export-urdf", "import-urdf", "check")  # what is exported is imported, and what is imported is checked
-
-
-def name_of(page: Path) -> str:
-    return page.relative_to(ROOT).as_posix()
-
-
-def blocks(page: Path, *languages: str) -> list[str]:
-    """The fenced blocks of a page in some languages."""
-    text = page.read_text(encoding="utf-8")
-    return [dedent(found[3]) for found in FENCED.finditer(text) if found[2] in languages]
-
-
-def prose(page: Path) -> str:
-    """A page without its fenced blocks."""
-    return FENCED.sub("", page.read_text(encoding="utf-8"))
+# Those of a study: tests/integration/test_wheel.py runs them, but for what a terminal or a desktop is needed.
+OF_A_STUDY = {"new", "run", "verdicts", "view", "diff", "estimate", "--install-completion"}
 
 
 def all_blocks(*languages: str) -> list[Any]:
@@ -189,15 +179,6 @@ def test_settings_named_with_their_section_exist(page):
     assert [each for each in named if each.split(".")[1] not in known(each.split(".")[0])] == []
 
 
-def commands(page: Path) -> list[str]:
-    """The commands of er3a and make that a page names, within its text and in blocks of their own."""
-    lines = [
-        line.split("  #")[0].strip() for block in blocks(page, "", "console", "bash") for line in block.splitlines()
-    ]
-    own = [line.removeprefix(".venv/bin/") for line in lines]
-    return COMMAND.findall(prose(page)) + [line for line in own if line.startswith(("er3a ", "make "))]
-
-
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_commands_of_documents_exist(page):
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
@@ -232,16 +213,33 @@ def assert_make_words(target: str, words: list[str]) -> None:
 @pytest.mark.long
 def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(tmp_path):
     found = {command for page in PAGES for command in commands(page) if command.startswith("er3a ")}
-    lines = sorted((RUN.index(line.split()[1]), line) for line in found if line.split()[1] in RUN)
-    assert {RUN[place] for place, _ in lines} == set(RUN)
-    for _, line in lines:
-        if len(line.split()) == 2:  # the name alone
-            continue
-        words = [STANDS_FOR.get(word, word) for word in shlex.split(line)[1:]]
-        done = subprocess.run(
-            [sys.executable, "-m", "er3a", *words], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, (line, done.stderr)
+    lines = [shlex.split(line)[1:] for line in sorted(found)]
+    assert {verb for verb, *_ in lines} <= STANDS_FOR.keys() | OF_A_STUDY
+    shutil.copytree(ROOT / "data", tmp_path / "data")
+    trimesh.creation.box((80, 60, 200)).export(tmp_path / "upper_arm.stl")
+    write_measured(tmp_path / "measured.csv")
+    for verb, stands_for in STANDS_FOR.items():
+        named_only = 2 if verb == "program" else 1  # words of a line that is no more than the command's name
+        of_verb = [words for own, *words in lines if own == verb and (len(words) >= named_only or verb == "--help")]
+        assert of_verb, verb
+        for words in of_verb:
+            command = [sys.executable, "-m", "er3a", verb, *(stands_for.get(word, word) for word in words)]
+            done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+            unsafe = verb == "program"  # one of those paths is, on purpose, and is refused
+            assert done.returncode == int(unsafe), (verb, words, done.stderr)
+    assert list((tmp_path / "programs").glob("*.src"))
+
+
+def write_measured(file: Path) -> None:
+    """Positions of an er3a_c60 whose upper arm is 1 mm longer than its table says."""
+    robot = er3a.load_robot("er3a_c60")
+    q = np.random.default_rng(1).uniform(-0.7, 0.7, (30, 6))
+    longer = replace(robot, a=robot.a + np.array([0, 1e-3, 0, 0, 0, 0]))
+    T = er3a.forward(longer.without_tool(), q)
+    rows = [(*np.degrees(joints), *1000 * pose[:3, 3]) for joints, pose in zip(q, T, strict=True)]
+    lines = [f"{','.join(map(str, row[:6]))},flange,{','.join(map(str, row[6:]))},0.05" for row in rows]
+    head = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,point,x_mm,y_mm,z_mm,standard_deviation_mm"
+    file.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
 
 
 def test_links_between_documents_lead_somewhere():
@@ -257,3 +255,14 @@ def test_the_glossary_has_the_terms_that_pages_explain():
     table = (ROOT / "docs/glossary.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| ([^|]+?) (?:\([^|]*\) )?\| ([^|]+) \|", table, re.MULTILINE)
     assert set(GLOSSARY.items()) <= set(rows)
+
+
+def test_links_that_lead_nowhere_are_found(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "index.html").write_text('<p id="a"><a href="sub/b.html#b">b</a> <a href="sub/c.html">c</a>', "utf-8")
+    (tmp_path / "sub/b.html").write_text(
+        '<h1 id="b"><a href="../index.html#a">a</a><a href="#none">n</a><a href="https://example.org/x">x</a>'
+        '<img src="data:,"><img src="no.webp"><a href="..">up</a><a href="b.html#q=1,2">q</a>',
+        "utf-8",
+    )
+    assert broken_links(tmp_path) == [("index.html", "sub/c.html"), ("sub/b.html", "#none"), ("sub/b.html", "no.webp")]

@@ -1,7 +1,8 @@
 """A digest of just the modules that a module uses, so that an edit reruns what depends on it and nothing else.
 
-Imports are read from the source text and followed inside this package. The packages' ``__init__`` files hold no code
-that computes, so only the modules that are named count.
+Imports are read from the source text and followed inside this package, by its name: where it is installed, other
+packages stand beside it. The packages' ``__init__`` files hold no code that computes, so only the modules that are
+named count.
 """
 
 from __future__ import annotations
@@ -85,4 +86,4 @@ def _public() -> dict[str, str]:
 
 def _file(module: str) -> Path | None:
     path = _ROOT.joinpath(*module.split(".")).with_suffix(".py")
-    return path if path.is_file() else None
+    return path if module.partition(".")[0] == _PACKAGE.name and path.is_file() else None
