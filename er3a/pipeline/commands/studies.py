@@ -22,7 +22,9 @@ from er3a.pipeline.commands.options import (
     Reports,
     Results,
     SomeRobot,
+    Split,
     StudyFile,
+    Xacro,
     app,
     print_error,
     print_json,
@@ -37,9 +39,11 @@ from er3a.pipeline.verdicts import StageVerdict, read_verdicts
 def new(
     folder: Annotated[Path, typer.Argument(help="where the study is written; no file that is there is touched")],
     *,
-    urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF")] = None,
+    urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF or xacro")] = None,
+    xacro: Xacro = None,
     base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
+    split: Split = False,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, by the name or the file of a robot of er3a")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
@@ -49,12 +53,19 @@ def new(
     from er3a.pipeline.new_study.brought_arm import arm_of
     from er3a.pipeline.new_study.write import write_study
 
-    arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=(base, tip))
+    arm = arm_of(
+        urdf, dh, robot, name=name, modified=modified, ends=(base, tip), xacro=tuple(xacro or ()), split=split
+    )
     for note in arm.notes:
         print_note(note)
-    for file in write_study(arm, folder):
+    written = write_study(arm, folder)
+    for note in written.missing:
+        print_note(note)
+    for file in written.files:
         print(f"{file}: written")
     print(f"Next: cd {shlex.quote(str(folder))} && er3a run")
+    for shortcoming in written.shortcomings:
+        typer.secho(f"WARNING: {shortcoming}", fg="red", bold=True, err=True)
 
 
 @app.command(rich_help_panel=FIRST)
