@@ -53,9 +53,7 @@ def new(
     from er3a.pipeline.new_study.brought_arm import arm_of
     from er3a.pipeline.new_study.write import write_study
 
-    arm = arm_of(
-        urdf, dh, robot, name=name, modified=modified, ends=(base, tip), xacro=tuple(xacro or ()), split=split
-    )
+    arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=(base, tip), xacro=tuple(xacro or ()), split=split)
     for note in arm.notes:
         print_note(note)
     written = write_study(arm, folder)

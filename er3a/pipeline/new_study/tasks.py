@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import chain, islice
+from itertools import chain, combinations, islice, product
 from typing import Any
 
 import numpy as np
@@ -46,10 +46,11 @@ from er3a.robots.shown import shown
 from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
 
-MOST_TARGETS, LEAST_TARGETS, CHOICE = 5, 2, 30
+MOST_TARGETS, LEAST_TARGETS = 5, 2
 NAMED_PAIRS = 3
 APART = 0.1  # of the reach
-TRIES, TRIES_SLOW = 150, 20  # of poses above the ground and of drawn ones each
+TRIES, CHOICE = 150, 30  # of poses above the ground and of drawn ones each; solved ones to choose from
+TRIES_SLOW, CHOICE_SLOW = 20, 10  # of arms that are solved slowly
 DRAWN = 1000  # joint vectors that are judged at once
 LIMIT_MARGIN_RAD = np.radians(8.0)
 FULL_POSE = 6  # joints that it takes to hold any pose
@@ -146,18 +147,18 @@ class TaskSearch:
         touching = Counter({pair.label: 0 for pair in self.bodies.pairs})
         for pair, count in zip(self.bodies.pairs, self.bodies.overlaps(q).sum(axis=0).tolist()):
             touching[pair.label] = max(touching[pair.label], count)
-        failed = (int(np.count_nonzero(~each)) for each in (roomy, regular, free))
+        near_limit, near_singular, colliding = (int(np.count_nonzero(~each)) for each in (roomy, regular, free))
         often = tuple((label, count) for label, count in touching.most_common(NAMED_PAIRS) if count)
-        self.counts = DrawnCounts(len(q), len(self.fit), *failed, often)
+        self.counts = DrawnCounts(len(q), len(self.fit), near_limit, near_singular, colliding, often)
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
         if not len(self.fit):
             return []
         slow = self.robot.joints > FULL_POSE or isinstance(arm_solver(self.robot).chain, Unsolved)
-        tries = TRIES_SLOW if slow else TRIES
+        tries, most = (TRIES_SLOW, CHOICE_SLOW) if slow else (TRIES, CHOICE)
         written = chain(islice(self._above_ground(), tries), islice(self._drawn(), tries))
-        choice = list(islice(filter(None, map(self._spot, written)), CHOICE))
+        choice = list(islice(filter(None, map(self._spot, written)), most))
         found = choice[:1]
         while choice and len(found) < MOST_TARGETS:
             away = [min(_distance(spot, other) for other in found) for spot in choice]
@@ -176,14 +177,18 @@ class TaskSearch:
 
     def any_path(self, spots: list[Spot]) -> list[dict[str, Any]]:
         """A slow joint move between two of them, whatever is in the way."""
-        return list(islice(self._joint_moves(spots), len(DURATIONS_S) - 1, len(DURATIONS_S)))
+        return [
+            entry | {"duration_s": DURATIONS_S[-1], "samples": SAMPLES} for entry in islice(self._joint_moves(spots), 1)
+        ]
 
     def paths(self, spots: list[Spot]) -> list[dict[str, Any]]:
         """Entries of a path file, each safe and away from singular poses: a joint move and, where the arm has branches,
         a line and an arc.
         """
-        kinds = [self._joint_moves, self._lines, self._arcs] if self.follows_tool else [self._joint_moves]
-        return [found for kind in kinds if (found := self._first_safe(kind(spots)))]
+        kinds = {"joint": self._joint_moves}
+        if self.follows_tool:
+            kinds |= {"line": self._lines, "arc": self._arcs}
+        return [found for kind, entries in kinds.items() if (found := self._first_safe(kind, entries(spots)))]
 
     def _above_ground(self) -> Iterator[dict[str, list[float]]]:
         """Poses above the ground on the side where the arm works, tool down, for arms that can hold any pose."""
@@ -263,44 +268,49 @@ class TaskSearch:
         return np.asarray(self.near.margin(self.robot, q) > SINGULAR_MARGIN)
 
     def _joint_moves(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
-        for first, start in enumerate(spots):
-            for end in spots[first + 1 :]:
-                degrees = [self._written(spot.q) for spot in (start, end)]
-                for duration in DURATIONS_S:
-                    yield {
-                        "name": "joint_move",
-                        "kind": "joint",
-                        "title": "All joints together, from one target to another",
-                        "title_zh": "各关节同时运动，从一个目标到另一个",
-                        "start_deg": degrees[0],
-                        "end_deg": degrees[1],
-                        "duration_s": duration,
-                        "samples": SAMPLES,
-                    }
+        for start, end in combinations(spots, 2):
+            yield {
+                "name": "joint_move",
+                "kind": "joint",
+                "title": "All joints together, from one target to another",
+                "title_zh": "各关节同时运动，从一个目标到另一个",
+                "start_deg": self._written(start.q),
+                "end_deg": self._written(end.q),
+            }
 
     def _lines(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
-        for length in LENGTHS:
-            for spot in spots:
-                for step in STEPS:
-                    end = _shifted(spot, length * self.reach.radius * np.array(step))
-                    titles = {"title": "A straight line, the tool held as it is", "title_zh": "直线，工具姿态不变"}
-                    yield from _moves("line", titles, spot, {"end": end})
+        titles = {"title": "A straight line, the tool held as it is", "title_zh": "直线，工具姿态不变"}
+        for length, spot, step in product(LENGTHS, spots, STEPS):
+            end = _shifted(spot, length * self.reach.radius * np.array(step))
+            if self._reached(spot, end):
+                yield _move("line", titles, spot, {"end": end})
 
     def _arcs(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
         titles = {"title": "Half a circle, the tool held as it is", "title_zh": "半圆，工具姿态不变"}
-        for length in LENGTHS:
-            for spot in spots:
-                for step, side in zip(STEPS, (*STEPS[2:], *STEPS[:2])):
-                    way, bulge = (length * self.reach.radius * np.array(each) for each in (step, side))
-                    via = _shifted(spot, way / 2 + bulge / 2)["xyz_mm"]
-                    yield from _moves("arc", titles, spot, {"via_mm": via, "end": _shifted(spot, way)})
+        for length, spot, (step, side) in product(LENGTHS, spots, zip(STEPS, (*STEPS[2:], *STEPS[:2]))):
+            way, bulge = (length * self.reach.radius * np.array(each) for each in (step, side))
+            via, end = _shifted(spot, way / 2 + bulge / 2), _shifted(spot, way)
+            if self._reached(spot, via) and self._reached(spot, end):
+                yield _move("arc", titles, spot, {"via_mm": via["xyz_mm"], "end": end})
 
-    def _first_safe(self, entries: Iterator[dict[str, Any]]) -> dict[str, Any] | None:
+    def _reached(self, spot: Spot, pose: dict[str, list[float]]) -> bool:
+        """Whether the arm reaches another pose on a target's branch, with room and clear of everything."""
+        solutions = self._solutions(pose)[0]
+        same = np.array([str(label) == spot.label for label in solutions.label], bool)
+        rows = np.flatnonzero(solutions.solved & same)
+        return bool(self._fits(solutions.q[rows]).any())
+
+    def _first_safe(self, kind: str, entries: Iterator[dict[str, Any]]) -> dict[str, Any] | None:
+        """The first entry that is safe, with the shortest of ``DURATIONS_S`` in which it is."""
+        rejected = self.rejected[kind] = Counter()
         for entry in entries:
-            fault = self._fault(entry)
-            if fault is None:
-                return entry
-            self.rejected.setdefault(entry["kind"], Counter())[fault] += 1
+            for duration in DURATIONS_S:
+                timed = entry | {"duration_s": duration, "samples": SAMPLES}
+                if (fault := self._fault(timed)) is None:
+                    return timed
+                if not fault.startswith("too fast"):
+                    break
+            rejected[fault or ""] += 1
         return None
 
     def _fault(self, written: dict[str, Any]) -> str | None:
@@ -322,19 +332,10 @@ class TaskSearch:
         return "collides" if measured(around, motion).contacts else None
 
 
-def _moves(kind: str, titles: dict[str, str], spot: Spot, rest: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _move(kind: str, titles: dict[str, str], spot: Spot, rest: dict[str, Any]) -> dict[str, Any]:
+    """A path of the tool, without its duration."""
     branch = spot.label.replace("_elbow", ", elbow").replace("_no_flip", ", no flip").replace("_flip", ", flip")
-    for duration in DURATIONS_S:
-        yield {
-            "name": kind,
-            "kind": kind,
-            **titles,
-            "start": spot.pose,
-            "start_branch": branch.replace("_", " "),
-            **rest,
-            "duration_s": duration,
-            "samples": SAMPLES,
-        }
+    return {"name": kind, "kind": kind, **titles, "start": spot.pose, "start_branch": branch.replace("_", " "), **rest}
 
 
 def _distance(spot: Spot, other: Spot) -> float:

@@ -98,7 +98,9 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
     texts |= {place: (ROOT / place).read_text(encoding="utf-8") for place in aids}
     for place, text in texts.items():
         write_atomically(folder / place, partial(Path.write_text, data=text, encoding="utf-8"))
-    return WrittenStudy(tuple(folder / place for place in texts if place not in aids), found.shortcomings, found.missing)
+    return WrittenStudy(
+        tuple(folder / place for place in texts if place not in aids), found.shortcomings, found.missing
+    )
 
 
 def _found(arm: Arm) -> FoundTasks:
@@ -132,7 +134,8 @@ def _without_path(kind: str, search: TaskSearch) -> str:
     """Why there is no path of a kind."""
     faults = search.rejected[kind]
     counts = ", ".join(f"{fault}: {count}" for fault, count in faults.most_common())
-    return f"{PATH_WORDS[kind]} among the paths; of {faults.total()} tried none could be done ({counts})"
+    tried = f"of {faults.total()} tried none is safe ({counts})" if faults else "none begins and ends in reach"
+    return f"{PATH_WORDS[kind]} among the paths: {tried}"
 
 
 def _without_targets(arm: Arm, search: TaskSearch, found: int) -> str:
