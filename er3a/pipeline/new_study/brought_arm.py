@@ -28,11 +28,13 @@ class Arm:
     ----------
     text : of the robot file
     notes : what was assumed about it, in words
+    of_hulls : whether links have the hulls of meshes as shapes, which pieces could take the place of
     """
 
     robot: Robot
     text: str
     notes: tuple[str, ...] = ()
+    of_hulls: bool = False
 
 
 def arm_of(
@@ -86,7 +88,7 @@ def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None], split
     robot = imported.robot.replace(name=name)
     content = robot_file(robot, path)
     misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"
-    return Arm(robot_of(content), _text(content), (*imported.notes, misfit))
+    return Arm(robot_of(content), _text(content), (*imported.notes, misfit), bool(robot.hulls) and not split)
 
 
 def _known(robot: str, name: str | None) -> Arm:

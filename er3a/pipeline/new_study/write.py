@@ -158,6 +158,11 @@ def _without_targets(arm: Arm, search: TaskSearch, found: int) -> str:
             f". {', '.join(always)} overlap in all of them, which no arm can do: correct their shapes, or allow the "
             f"contact, in data/robots/{arm.robot.name}.yaml"
         )
+    if arm.of_hulls and counts.colliding:
+        text += (
+            ". The links have the hulls of their meshes as shapes, which fill what is bent or hollow: --split takes "
+            "convex pieces instead (minutes for fine meshes)"
+        )
     return f"{text}."
 
 
