@@ -33,6 +33,7 @@ class Bodies:
     second : (P,) int, number of the other link's body, -1 for a solid
     pairs : P, what meets what
     matrix : what was found of each pair of links
+    unexamined : pairs whose shapes overlap in every pose for no reason, so that what overlaps is left out
     joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """
@@ -57,6 +58,14 @@ class Bodies:
         around = [(b, s) for s in solids for b in moving if frozenset((b.name, s.name)) not in allowed]
         kept = [frozenset((a.name, b.name)) not in allowed for a, b in watched]
         watched, joined = list(compress(watched, kept)), list(compress(joined, kept)) + [False] * len(around)
+        numbers = {link_label(k): k for k in range(robot.rows + 1)}
+        self.unexamined: tuple[Pair, ...] = tuple(
+            LinkPair(numbers[row.first], numbers[row.second])
+            if row.second in numbers
+            else CarriedAndLink(row.second, numbers[row.first])
+            for row in self.matrix
+            if row.state == "overlaps" and frozenset((row.first, row.second)) not in allowed
+        )
         number: dict[int, int] = {}
         bodies: list[Body] = []
         for body in (*(body for pair in watched for body in pair), *moving, *solids):

@@ -5,11 +5,17 @@ harmless:
 
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
-- *joined*: they overlap in all of them, proven likewise, because a joint joins them. Then only the region around that
-  joint is left out: what lies within the two bodies' girths of where they overlap in the pose that holds them farthest
-  apart. What is left of them is judged again, so that an arm that folds onto itself is seen;
+- *joined*: they overlap in all of them because a joint joins them. Either no link with a shape is between the two, and
+  they overlap in all joint vectors drawn (of neighbours, being less than ``TOUCH`` apart counts as overlap if it is
+  proven). Or there are two joints between them (more if their axes meet), and a ball in the outer link about a point of
+  its joint's axis, or in its middle, is proven to touch the inner link in all joint vectors, as in a wrist. Only the
+  region around that joint is left out: what lies within the two bodies' girths of where they overlap in the pose that
+  holds them farthest apart. What is left of them is judged again, so that an arm that folds onto itself is seen;
   A default shape that slides in a thicker one is joined to it likewise: of the guide only what lies along the sliding
   axis is left out, and of what slides nothing;
+- *overlaps*: they overlap in all joint vectors drawn, none in which they don't was found in the boxes, and no joint
+  explains it. No arm is built like that, so the shapes are
+  wrong: what overlaps is left out, and has to be named wherever it is not examined;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: watched;
 - *undecided*: none of this within the number of boxes: watched.
 
@@ -19,7 +25,7 @@ What a person decided (``Robot.pair_rules``) goes first: *allowed* pairs are not
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Literal
 
@@ -27,22 +33,25 @@ import numpy as np
 
 from er3a.collision.core_distance import ROOM, pair_distance
 from er3a.collision.distance_kernels import FREE, MEETS, Layout, measure, place, search_boxes
-from er3a.collision.envelopes import arm_shapes
+from er3a.collision.envelopes import arm_shapes, link_frames
 from er3a.collision.shapes import Body, arm_bodies, layout_of
-from er3a.collision.trimming import beside_axis, girth, trimmed
+from er3a.collision.trimming import ball_inside, beside_axis, girth, trimmed
 from er3a.kinematics.forward import frames
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.derived import derived
 from er3a.robots.robot import PairRule, Robot
 
-PairState = Literal["never", "joined", "meets", "undecided", "allowed", "watched"]
+PairState = Literal["never", "joined", "overlaps", "meets", "undecided", "allowed", "watched"]
 
 SAMPLES = 1024
 BOXES = 50_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
 GOAL = 0.5  # of the least distance sampled, to be proven at first
 COAXIAL = 1e-9  # m
+TOUCH = 2e-3  # m
+MEETING = 0.05  # of the arm's length: axes that pass a point within that meet there
+HUBS = 9  # points looked at on an axis
 AROUND_GUIDE = 1.05  # of the radii of a guide and of what slides in it
 GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
 
@@ -126,15 +135,18 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
     """Judge pairs of bodies, the second on the link that is farther out."""
     flat = [body for pair in pairs for body in pair]
     layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
-    q, distance = _sampled(robot, layout)
+    q, distance, overlap = _sampled(robot, layout)
     box = np.stack([robot.lower, robot.upper])
-    meets = (distance.min(axis=0) < 0) & (distance.max(axis=0) >= 0)
+    always: Flags = np.asarray(overlap.all(axis=0))
+    meets: Flags = np.asarray(overlap.any(axis=0)) & ~always
     if meets.any():
         boxes = min(boxes, BOXES_MORE)
     found = []
     for k, pair in enumerate(pairs):
         at, least = np.empty(robot.joints), distance[:, k]
-        overlapping = bool(least[0] < 0)
+        if always[k]:
+            found.append(_overlapping(robot, pair, q, least, boxes))
+            continue
         if meets[k] and (guide := _guide(robot, pair)):
             rest = [(part, pair[1]) for part in beside_axis(pair[0], *guide)]
             parts = judged_pairs(robot, rest, boxes) if rest else []
@@ -144,23 +156,77 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
             found.append(JudgedPair("joined", watched, witness, left_out=guide[2], boxes=boxes_looked_at))
             continue
         if meets[k]:
-            found.append(JudgedPair("meets", (pair,), q[least.argmin()]))
+            grown = (pair[0], replace(pair[1], radius=pair[1].radius + TOUCH))
+            if _neighbours(robot, pair) and least.max() < TOUCH and (looked := _held(robot, grown, boxes)):
+                found.append(_joined(robot, pair, q[least.argmax()], looked, boxes))
+            else:
+                witness = q[np.where(overlap[:, k], least, np.inf).argmin()]
+                found.append(JudgedPair("meets", (pair,), witness))
             continue
-        goal = 0.0 if overlapping else GOAL * float(least.min())
-        outcome, looked, bound = search_boxes(layout, k, box, (overlapping, goal), boxes // 2, at)
+        outcome, looked, bound = search_boxes(layout, k, box, (False, GOAL * float(least.min())), boxes // 2, at)
         if outcome not in (FREE, MEETS):
-            outcome, more, bound = search_boxes(layout, k, box, (overlapping, 0.0), boxes, at)
+            outcome, more, bound = search_boxes(layout, k, box, (False, 0.0), boxes, at)
             looked += more
         if outcome == MEETS:
-            witness = q[least.argmin()] if overlapping else at
-            found.append(JudgedPair("meets", (pair,), witness, boxes=looked))
-        elif outcome == FREE and overlapping:
-            found.append(_joined(robot, pair, q[least.argmax()], looked, boxes))
+            found.append(JudgedPair("meets", (pair,), at, boxes=looked))
         elif outcome == FREE:
             found.append(JudgedPair("never", least=bound, boxes=looked))
         else:
-            found.append(JudgedPair("undecided", (pair,), q[0] if overlapping else None, boxes=looked))
+            found.append(JudgedPair("undecided", (pair,), boxes=looked))
     return found
+
+
+def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Reals, boxes: int) -> JudgedPair:
+    """A pair that overlaps in all joint vectors drawn (N, n); of these, ``distance`` (N,), negative or 0."""
+    held, neighbours = _held(robot, pair, boxes), _neighbours(robot, pair)
+    looked = held
+    if not held or all(len(body.points) <= 2 for body in pair):
+        layout, box, at = layout_of(robot, pair, [(0, 1)]), np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
+        outcome, looked, _ = search_boxes(layout, 0, box, (True, 0.0), boxes // 2, at)
+        if outcome not in (FREE, MEETS):
+            outcome, more, _ = search_boxes(layout, 0, box, (True, 0.0), boxes, at)
+            looked += more
+        if outcome == MEETS:
+            return JudgedPair("meets", (pair,), q[distance.argmin()], boxes=looked)
+    if neighbours or held:
+        return _joined(robot, pair, q[distance.argmax()], looked, boxes)
+    return JudgedPair("overlaps", witness=q[0], boxes=looked)
+
+
+def _neighbours(robot: Robot, pair: tuple[Body, Body]) -> bool:
+    """Whether no link with a shape is between the two bodies' links."""
+    shapes = arm_shapes(robot)
+    links = {capsule.link for capsule in shapes.capsules} | {piece.link for piece in shapes.pieces}
+    return links.isdisjoint(range(pair[0].link + 1, pair[1].link))
+
+
+def _held(robot: Robot, pair: tuple[Body, Body], boxes: int) -> int:
+    """Whether a joint holds two bodies together, proven: the boxes of joint vectors looked at for it, or 0.
+
+    A ball inside the outer body, about a point of its joint's axis or in its middle, overlaps the inner body in all
+    joint vectors; it moves only as its centre does.
+    """
+    inner, outer = pair
+    T = link_frames(robot, quasi_random_points(robot.lower, robot.upper, SAMPLES))
+    seen = np.linalg.inv(T[:, inner.link]) @ T[:, outer.link]  # the outer link's frame in the inner's
+    centre = outer.points.mean(axis=0)
+    heights = np.linspace(outer.points[:, 2].min() - outer.radius, outer.points[:, 2].max() + outer.radius, HUBS)
+    hubs = np.concatenate([np.c_[np.zeros((HUBS, 2)), heights], centre[None]])
+    balls = [ball for hub in hubs if (ball := ball_inside(outer, hub)) is not None]
+    if outer.link - inner.link > 2:
+        length = MEETING * float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
+        ways = [np.ptp(seen[:, :3, :3] @ ball.points[0] + seen[:, :3, 3], axis=0) for ball in balls]
+        balls = [ball for ball, way in zip(balls, ways) if np.linalg.norm(way) <= 2 * length]
+    if not balls:
+        return 0
+    layout = layout_of(robot, [inner, *balls], [(0, 1 + k) for k in range(len(balls))])
+    distance = _sampled(robot, layout)[1].max(axis=0)
+    best = int(distance.argmin())
+    if distance[best] >= 0:
+        return 0
+    box = np.stack([robot.lower, robot.upper])
+    outcome, looked, _ = search_boxes(layout, best, box, (True, 0.0), boxes, np.empty(robot.joints))
+    return looked if outcome == FREE else 0
 
 
 def _guide(robot: Robot, pair: tuple[Body, Body]) -> tuple[Reals, Reals, float] | None:
@@ -221,16 +287,19 @@ def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: in
     layout = layout_of(
         robot, [body for pair in pairs for body in pair], [(2 * k, 2 * k + 1) for k in range(len(pairs))]
     )
-    _, distance = _sampled(robot, layout)
-    return None if (distance.max(axis=0) < 0).any() else judged_pairs(robot, pairs, boxes)
+    _, _, overlap = _sampled(robot, layout)
+    return None if overlap.all(axis=0).any() else judged_pairs(robot, pairs, boxes)
 
 
-def _sampled(robot: Robot, layout: Layout) -> tuple[Reals, Reals]:
-    """Joint vectors (SAMPLES, n) spread over the limits, and the distances (SAMPLES, K) of all pairs."""
+def _sampled(robot: Robot, layout: Layout) -> tuple[Reals, Reals, Flags]:
+    """Joint vectors (SAMPLES, n) spread over the limits; of all pairs the distances (SAMPLES, K), and who overlaps.
+
+    Of cores that overlap the distance is only a bound, 0 for bodies without a margin.
+    """
     q = quasi_random_points(robot.lower, robot.upper, SAMPLES)
     found, none = np.empty((SAMPLES, len(layout.first))), np.empty(SAMPLES)
     measure(layout, q, found, none, np.empty(SAMPLES, np.int64), np.empty(SAMPLES, bool))
-    return q, found
+    return q, found, found <= 0
 
 
 def _nearest_points(robot: Robot, pair: tuple[Body, Body], q: Reals) -> list[Reals]:
@@ -248,8 +317,8 @@ def _nearest_points(robot: Robot, pair: tuple[Body, Body], q: Reals) -> list[Rea
 
 def _row(first: str, second: str, found: Sequence[JudgedPair], reason: str) -> MatrixRow:
     """One row over all pairs of bodies of two links; the gravest of what watched ones are."""
-    watched = [each for each in found if each.bodies]
-    grave = ("meets", "undecided", "joined", "watched", "allowed", "never")
+    watched = [each for each in found if each.bodies or each.state == "overlaps"]
+    grave = ("overlaps", "meets", "undecided", "joined", "watched", "allowed", "never")
     state = min((each.state for each in watched or found), key=grave.index)
     witness = next((each.witness for each in found if each.witness is not None), None)
     bounds = [each.least for each in found if each.state == "never"]

@@ -76,6 +76,14 @@ class PairOverlaps:
     code: Literal["pair_overlaps"] = "pair_overlaps"
 
 
+@dataclass(frozen=True)
+class PairsUnexamined:
+    """Pairs whose collisions were not looked at, because their shapes overlap in every pose and so can't be right."""
+
+    pairs: tuple[Pair, ...]
+    code: Literal["pairs_unexamined"] = "pairs_unexamined"
+
+
 def link_label(number: int) -> str:
     """A link's name in columns of text."""
     return "base" if number == BASE else f"link_{number}"

@@ -1,4 +1,4 @@
-"""Bodies without the region around a joint in which they touch the next link by construction."""
+"""Parts of bodies: without the region around a joint in which they touch the next link, and balls inside."""
 
 from __future__ import annotations
 
@@ -21,6 +21,22 @@ def girth(body: Body, centre: Reals) -> float:
     if length > SHORTEST:
         away = away - np.outer(away @ along, along) / length**2
     return float(np.linalg.norm(away, axis=1).max()) + body.radius + body.disc
+
+
+def ball_inside(body: Body, point: Reals) -> Body | None:
+    """The largest ball about a point (3,), m, that is inside a body; None where the point is not inside its surface."""
+    if len(body.points) > 2:
+        try:
+            faces = scipy.spatial.ConvexHull(body.points).equations
+        except scipy.spatial.QhullError:  # flat
+            return None
+        depth = -float((faces @ np.append(point, 1.0)).max())
+        depth = depth + body.radius if depth >= 0 else 0.0
+    else:
+        start, along = body.points[0], body.points[-1] - body.points[0]
+        share = np.clip((point - start) @ along / max(float(along @ along), SHORTEST**2), 0.0, 1.0)
+        depth = body.radius - float(np.linalg.norm(point - start - share * along))
+    return replace(body, points=point[None], radius=depth) if depth > 0 else None
 
 
 def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:

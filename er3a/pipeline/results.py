@@ -28,6 +28,7 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from er3a.collision.pairs import Pair, PairsUnexamined
 from er3a.errors import ResultError
 from er3a.files.grades import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
@@ -46,10 +47,24 @@ FindingT = TypeVar("FindingT", bound=Finding)
 
 @dataclass(frozen=True)
 class Verdict(Generic[FindingT]):
-    """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found."""
+    """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
+
+    ``unexamined``: pairs of bodies whose collisions were not looked at because their shapes can't be right.
+    """
 
     status: Status
     finding: FindingT
+    unexamined: tuple[Pair, ...] = ()
+
+    @property
+    def findings(self) -> tuple[FindingT | PairsUnexamined, ...]:
+        """What it found, then what was not looked at, each a sentence."""
+        return (self.finding, PairsUnexamined(self.unexamined)) if self.unexamined else (self.finding,)
+
+    def without(self, unexamined: tuple[Pair, ...]) -> Verdict[FindingT]:
+        """The verdict where collisions of some pairs were not looked at: no pass, if there are any."""
+        status: Status = "caution" if unexamined and self.status == "pass" else self.status
+        return Verdict(status, self.finding, unexamined)
 
 
 @dataclass(frozen=True)
@@ -151,7 +166,7 @@ def write_results(
 
     Parameters
     ----------
-    sentence : the verdict's text in English
+    sentence : a finding's text in English
     """
     kind = AbsentResults if isinstance(results, AbsentResults) else type(results)
     for name, table in table_types(stage.module("model").RESULTS).items():
@@ -159,7 +174,7 @@ def write_results(
         write_atomically(folder / f"{name}.parquet", rows.write)
     summary = results.summary
     own = {part.name: plain(getattr(summary, part.name)) for part in fields(summary)}
-    own["verdict"] = _verdict_record(summary.verdict, sentence(summary.verdict.finding))
+    own["verdict"] = _verdict_record(summary.verdict, " ".join(map(sentence, summary.verdict.findings)))
     origin = Provenance(
         inputs=input_records(study.inputs(robot, stage.name)),
         config=study.computed_from(robot, stage.name),
@@ -326,7 +341,8 @@ def plain(value: Any) -> Any:
 
 def _verdict_record(verdict: Verdict[Any], text: str) -> dict[str, Any]:
     params = plain(verdict.finding)
-    return {"status": verdict.status, "code": params.pop("code"), "params": params, "text": text}
+    left_out = {"unexamined": plain(verdict.unexamined)} if verdict.unexamined else {}
+    return {"status": verdict.status, "code": params.pop("code"), "params": params, "text": text, **left_out}
 
 
 def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tuple[Any, Provenance]:
@@ -334,7 +350,9 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
     verdict = own.get("verdict")
     try:
         if isinstance(verdict, dict):
-            own["verdict"] = {"status": verdict["status"], "finding": verdict["params"] | {"code": verdict["code"]}}
+            finding = verdict["params"] | {"code": verdict["code"]}
+            left_out = {key: verdict[key] for key in ("unexamined",) if key in verdict}
+            own["verdict"] = {"status": verdict["status"], "finding": finding, **left_out}
         of_stage: Any = summary_type(kind)
         return _adapter(of_stage).validate_python(own), _adapter(Provenance).validate_python(stored.get("provenance"))
     except ValidationError as error:

@@ -12,6 +12,7 @@ import yaml
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.clearance import clearance
+from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import capsule_around, hull_of, uncovered
 from er3a.errors import InputError
 from er3a.files.mesh_import import import_mesh
@@ -20,7 +21,7 @@ from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
 from er3a.formats.mesh_file import read_mesh
 from er3a.formats.urdf import import_urdf
-from er3a.robots.robot import ConvexPiece
+from er3a.robots.robot import ConvexPiece, PairRule
 from testing.arms import made_of
 
 
@@ -207,10 +208,13 @@ def test_hulls_without_margin_that_overlap_are_found_by_every_search():
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     box = ConvexPiece(1, tuple(map(tuple, (0.25 * corners).tolist())), 0.0)
     pole = ConvexPiece(2, tuple(map(tuple, (corners * [0.02, 0.5, 0.02] + [0, 0.5, 0]).tolist())), 0.0)
-    robot = made_of([("P", 0, 90, 0, -1000, 1000), ("R", 0, 0, 0, -180, 180)]).replace(hulls=(box, pole))
+    rule = PairRule("link_1", "link_2", "watch", "else the two are neighbours, and their joint is left out")
+    robot = made_of([("P", 0, 90, 0, -1000, 1000), ("R", 0, 0, 0, -180, 180)])
+    robot = robot.replace(hulls=(box, pole), pair_rules=(rule,))
     bodies = Bodies(robot, None)
     q = np.random.default_rng(4).uniform(robot.lower, robot.upper, (50, 2))
     assert bodies.overlaps(q).all()
     assert not bodies.free(q).any()
     assert (bodies.least(q)[0] < 0).all()
-    assert [row.state for row in bodies.matrix] == ["meets"]
+    assert [row.state for row in bodies.matrix] == ["watched"]
+    assert [row.state for row in collision_matrix(robot.replace(pair_rules=())).rows] == ["joined"]

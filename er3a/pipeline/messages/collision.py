@@ -20,6 +20,7 @@ FIGURES = {
 STATES: dict[PairState, str] = {
     "never": N_("never collide"),
     "joined": N_("adjacent"),
+    "overlaps": N_("shapes in error"),
     "meets": N_("can collide"),
     "undecided": N_("undecided"),
     "allowed": N_("allowed"),
@@ -56,6 +57,11 @@ def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witne
             return tr("Decided in the robot or scene file: {reason}", reason=reason)
         case "undecided":
             return tr("Neither proven apart nor found to collide, in {boxes} boxes; checked.", boxes=boxes)
+        case "overlaps":
+            return tr(
+                "Their shapes overlap in every joint vector tried, and no joint explains it: correct the shapes. What "
+                "overlaps is not checked."
+            )
     if not left_out_mm:
         return tr("They collide at joint values ({witness}).", witness=witness)
     joined = tr(

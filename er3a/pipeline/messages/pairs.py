@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
-from er3a.collision.pairs import BASE, CarriedAndLink, CarriedAndSolid, LinkAndSolid, LinkPair, PairOverlaps
-from er3a.pipeline.messages.say import say, sentence
+from er3a.collision.pairs import (
+    BASE,
+    CarriedAndLink,
+    CarriedAndSolid,
+    LinkAndSolid,
+    LinkPair,
+    PairOverlaps,
+    PairsUnexamined,
+)
+from er3a.pipeline.messages.say import joined, listed, say, sentence
+
+NAMED = 3
 
 
 @say.register
@@ -29,6 +39,18 @@ def _(found: CarriedAndSolid) -> str:
 @say.register
 def _(found: PairOverlaps) -> str:
     return sentence(found.code, "{pair} overlap by {depth:.1f} mm", pair=say(found.pair), depth=found.depth_mm)
+
+
+@say.register
+def _(found: PairsUnexamined) -> str:
+    named = listed(found.pairs[:NAMED])
+    if len(found.pairs) > NAMED:
+        named.append(sentence("none_for", "{count} more", count=len(found.pairs) - NAMED))
+    return sentence(
+        found.code,
+        "Collisions not examined, because the shapes overlap in every joint vector tried: {pairs}.",
+        pairs=joined(named, ", "),
+    )
 
 
 def _link(number: int) -> str:

@@ -53,6 +53,11 @@ def listed(findings: Iterable[Finding]) -> list[str]:
     return [say(finding) for finding in findings]
 
 
+def say_all(findings: Iterable[Finding]) -> str:
+    """Findings, each a sentence, one after the other."""
+    return joined(listed(findings), " ")
+
+
 def joined(texts: Iterable[str], separator: str = "; ") -> str:
     """Texts as one: apart by ``"; "``, ``", "`` or ``" "`` (whole sentences); empty ones are left out."""
     told = [text for text in texts if text]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.say import counted, joined, say, sentence
 from er3a.pipeline.stages.trajectory.model import PathCounts

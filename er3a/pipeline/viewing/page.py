@@ -24,7 +24,7 @@ from er3a.pipeline.messages import language
 from er3a.pipeline.messages.foundations import Caveat, caveat
 from er3a.pipeline.messages.glossary import glossary
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import say_all
 from er3a.pipeline.results import Provenance, Stored
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -154,7 +154,7 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     )
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     meant = len(getattr(verdict.finding, "demonstrations", ()))
-    text = say(verdict.finding)
+    text = say_all(verdict.findings)
     return Head(stored.robot, stage, verdict.status, text, shown, stored.provenance, caveats, meant, verdict.finding)
 
 

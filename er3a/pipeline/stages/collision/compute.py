@@ -33,6 +33,7 @@ from er3a.pipeline.stages.collision.model import (
     PairShares,
     PlaceRows,
     PlacesSummary,
+    ShapesOverlap,
 )
 from er3a.pipeline.stages.trajectory.listed_motions import study_motions
 from er3a.pipeline.study import Study
@@ -66,11 +67,12 @@ def compute(study: Study, name: str) -> CollisionResults:
     )
     matrix = _matrix(bodies)
     places_found = _places_summary(places)
+    wrong = ShapesOverlap(bodies.unexamined, space.whole.value) if bodies.unexamined else None
     undecided = int((matrix.state == "undecided").sum())
     home_found = None if at_home is None else HomeCollides(at_home, float(-least[0] * 1000), space.whole.value)
     return CollisionResults(
         summary=CollisionSummary(
-            verdict=_verdict(pairs, mounting, home_found, _free_space(space, places_found, undecided)),
+            verdict=_verdict(pairs, mounting, wrong or home_found, _free_space(space, places_found, undecided)),
             figures=_figures(space, places_found, matrix),
             scene=scene.title if scene else None,
             samples=settings.samples,
@@ -154,14 +156,14 @@ def _free_space(space: JointSpace, places: PlacesSummary, undecided: int) -> Fre
 
 
 def _verdict(
-    pairs: PairShares, mounting: tuple[Mounting, ...], home: HomeCollides | None, found: FreeSpace
-) -> Verdict[NeverFree | BaseInSolid | HomeCollides | FreeSpace]:
+    pairs: PairShares, mounting: tuple[Mounting, ...], known: ShapesOverlap | HomeCollides | None, found: FreeSpace
+) -> Verdict[NeverFree | ShapesOverlap | BaseInSolid | HomeCollides | FreeSpace]:
     if pairs.always.any():
         return Verdict("fail", NeverFree(tuple(pairs.between[pairs.always])))
     if inside := tuple(contact.solid for contact in mounting if contact.inside):
         return Verdict("fail", BaseInSolid(inside))
-    if home:
-        return Verdict("caution", home)
+    if known:
+        return Verdict("fail" if isinstance(known, ShapesOverlap) else "caution", known)
     return Verdict("caution" if found.undecided or not found.clear else "pass", found)
 
 

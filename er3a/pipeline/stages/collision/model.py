@@ -23,6 +23,15 @@ class NeverFree:
 
 
 @dataclass(frozen=True)
+class ShapesOverlap:
+    """Pairs whose shapes overlap in every joint vector for no reason; ``free_ratio``: of joint space, without them."""
+
+    pairs: tuple[Pair, ...]
+    free_ratio: float
+    code: Literal["collision.shapes_overlap"] = "collision.shapes_overlap"
+
+
+@dataclass(frozen=True)
 class BaseInSolid:
     """The base stands inside solids, in every pose."""
 
@@ -115,7 +124,7 @@ class CollisionSummary(Summary):
     proven_m : cells' witnesses are joined by moves that are proven free but for overlaps less deep than this
     """
 
-    verdict: Verdict[NeverFree | BaseInSolid | HomeCollides | FreeSpace]
+    verdict: Verdict[NeverFree | ShapesOverlap | BaseInSolid | HomeCollides | FreeSpace]
     scene: str | None
     samples: int
     of_itself: FreeShare
@@ -135,7 +144,7 @@ class MatrixRows(Table):
 
     first: Texts = column("the body nearer to the base", dtype=object)
     second: Texts = column("the body farther out", dtype=object)
-    state: Texts = column("never, joined, meets, undecided, allowed or watched", dtype=object)
+    state: Texts = column("never, joined, overlaps, meets, undecided, allowed or watched", dtype=object)
     watched: Flags = column("whether distances of the pair are measured", dtype=bool)
     least_mm: Reals = column("of pairs that never meet, a proven lower bound of their distance", "mm")
     left_out_mm: Reals = column("radius of the region around the joint that is left out; 0 where none is", "mm")
@@ -204,4 +213,4 @@ class CollisionResults(Results[CollisionSummary]):
 
 
 RESULTS = CollisionResults
-STATES: tuple[PairState, ...] = ("meets", "undecided", "watched", "joined", "allowed", "never")
+STATES: tuple[PairState, ...] = ("overlaps", "meets", "undecided", "watched", "joined", "allowed", "never")

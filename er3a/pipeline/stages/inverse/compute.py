@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from er3a.collision.clearance import bodies_of
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.kinematics.by_class import arm_solver
@@ -70,7 +71,7 @@ def compute(study: Study, name: str) -> InverseResults:
     trips = batch_round_trips(robot, random, wanted) if complete else None
     worst = _worst_residuals(solutions, trips)
     summary = InverseSummary(
-        verdict=_verdict(results, worst, trips, scene is not None),
+        verdict=_verdict(results, worst, trips, scene is not None).without(bodies_of(robot, scene).unexamined),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from er3a.collision.clearance import bodies_of
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
@@ -67,7 +68,7 @@ def compute(study: Study, name: str) -> ProgramsResults:
         motions.append(motion)
     return ProgramsResults(
         summary=ProgramsSummary(
-            verdict=_verdict(summaries),
+            verdict=_verdict(summaries).without(bodies_of(robot, scene).unexamined),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
             assumed_speed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),

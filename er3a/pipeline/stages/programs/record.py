@@ -14,7 +14,7 @@ from er3a.numerics.arrays import Integers
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.program_check import level_word
 from er3a.pipeline.messages.programs import LANGUAGES, cycle_text
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.study import Study
@@ -177,7 +177,7 @@ def _note(robot: Robot, results: ProgramsResults, starts: list[tuple[ProgramSumm
     return "\n".join(
         [
             f"# {escaped(robot.title)}: programs",
-            say(results.summary.verdict.finding),
+            say_all(results.summary.verdict.findings),
             "",
             "**Look first** at the red stretches of the tool's path. Press play: the arm carries out one program after "
             "another, and the text beside it shows the line that it is at.",

@@ -93,7 +93,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         jerk_deg_s3=None if limits.jerk is None else _shown(robot, limits.jerk),
     )
     summary = TrajectorySummary(
-        verdict=_verdict(paths, skipped),
+        verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined),
         figures=_figures(paths, length, used),
         characteristic_length_m=length,
         near=thresholds,

@@ -13,7 +13,7 @@ from matplotlib.colors import LogNorm
 
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.messages.trajectory import advice, event_word, path_text
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import (
@@ -273,7 +273,7 @@ def _note(robot: Robot, summary: TrajectorySummary) -> str:
     return "\n".join(
         [
             f"# {escaped(robot.title)}: paths",
-            say(summary.verdict.finding),
+            say_all(summary.verdict.findings),
             "",
             "**Look first** at the velocity curves where an event is logged: a spike is the price of passing near a "
             "singular pose. Press play: the arm runs along one path after another.",

@@ -11,6 +11,7 @@ from typing import get_args
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.clearance import bodies_of
 from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile, read_calibration
@@ -125,8 +126,9 @@ def compute(study: Study, name: str) -> VisionResults:
         limits = (limits_of(robot, motions), study.seed)
         planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
+    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects, settings)
     summary = VisionSummary(
-        verdict=Verdict("fail", doubt) if doubt else _verdict(calibration, objects, settings),
+        verdict=judged.without(bodies_of(robot, scene).unexamined),
         figures=_figures(calibration, objects),
         title=task_file.title,
         scene=title,
