@@ -13,6 +13,7 @@ import trimesh
 from typer.testing import CliRunner
 
 import er3a
+from er3a.collision.clearance import clearance
 from er3a.errors import Er3aError, InputError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.robot_library import load_robot, robot_of
@@ -116,7 +117,7 @@ def check_promise(study: Study, name: str) -> set[str]:
     assert (q > robot.lower).all()
     assert (q < robot.upper).all()
     assert np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[:, -1].min() > REGULAR
-    assert (er3a.clearance(robot, q, load_scene(study.scene(name, "inverse"))).distance > 0).all()
+    assert (clearance(robot, q, load_scene(study.scene(name, "inverse"))).distance > 0).all()
     found = compute_trajectory(study, name)
     assert {path.name: path.verdict for path in found.summary.paths if path.verdict != "safe"} == {}
     assert found.checks.within_limits.all()
