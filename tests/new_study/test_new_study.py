@@ -135,7 +135,7 @@ def test_its_targets_are_reached_and_its_paths_are_safe(written, monkeypatch):
     assert kinds == ({"joint_move"} if name == "lbr_iiwa_14" else {"joint_move", "line", "arc"})
     text = " ".join(Path("README.md").read_text(encoding="utf-8").split())
     assert "poses that the arm reaches within its limits, away from singular poses and clear of collisions" in text
-    assert "Not tasks yet" not in text
+    assert "Read this first" not in text
 
 
 @pytest.mark.long
@@ -271,7 +271,7 @@ def test_an_arm_without_a_clear_pose_says_so_and_why(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "cell")
     check_study(Path("config/config.yaml"))
     text = Path("README.md").read_text(encoding="utf-8")
-    assert "## Not tasks yet" in text
+    assert "## Read this first" in text
     assert "joint vectors drawn within the limits none are" in text
     assert "poses of random joint values" in text
     assert "that the arm reaches" not in text
@@ -285,7 +285,17 @@ def test_shapes_that_always_overlap_are_named(tmp_path):
     text = found.shortcomings[0]
     assert "1000 collide" in text
     assert re.search(r"link_3\S* in 1000", text)
-    assert "overlap in all of them, which no arm can do: correct their shapes" in text
+    assert "overlap in all of them, which no arm can do. Correct the shapes, or allow the contact" in text
+
+
+def test_collisions_that_were_not_examined_are_named(tmp_path):
+    arm = arm_of(None, None, "er3_600")
+    ball = Envelope(0, (0.0, 0.0, 0.3), (0.0, 0.0, 0.3), 2.0)
+    robot = arm.robot.replace(envelopes=(*arm.robot.envelopes, ball))
+    found = write_study(replace(arm, robot=robot), tmp_path)
+    assert [text for text in found.shortcomings if re.match(r"Collisions of .*base/link_4.* were not examined", text)]
+    text = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert found.shortcomings[0] in text
 
 
 @pytest.fixture

@@ -39,7 +39,7 @@ class WrittenStudy:
     Attributes
     ----------
     files : apart from schemas and the description of reference tables
-    shortcomings : why targets or paths are none that the arm can do, in words; () where they are
+    shortcomings : why targets or paths are none that the arm can do, or were not examined for, in words
     missing : kinds of path of which none was found beside others, in words
     """
 
@@ -54,7 +54,8 @@ class FoundTasks:
 
     Attributes
     ----------
-    clear : whether the targets were found by solving; else they are drawn joint values
+    clear, safe : whether the targets, the paths are within limits, away from singular poses and clear of collisions;
+        else the targets are drawn joint values, the path is a move between two
     shortcomings, missing : see :class:`WrittenStudy`
     """
 
@@ -62,7 +63,8 @@ class FoundTasks:
     spots: list[Spot]
     paths: list[dict[str, Any]]
     clear: bool
-    shortcomings: tuple[str, ...] = ()
+    safe: bool
+    shortcomings: tuple[str, ...]
     missing: tuple[str, ...] = ()
 
 
@@ -113,17 +115,41 @@ def _found(arm: Arm) -> FoundTasks:
         spots = search.spots()
         if len(spots) >= LEAST_TARGETS and (paths := search.paths(spots)):
             missing = (f"No {_without_path(kind, search)}" for kind in search.rejected if kind not in _kinds(paths))
-            return FoundTasks(scene, spots, paths, True, missing=tuple(missing))
+            return FoundTasks(scene, spots, paths, True, True, tuple(_unexamined(arm, search)), tuple(missing))
         if best is None or len(spots) >= len(best[2]):
             best = scene, search, spots
     assert best is not None
     scene, search, spots = best
-    if len(spots) >= LEAST_TARGETS:
+    clear = len(spots) >= LEAST_TARGETS
+    if clear:
         why = " ".join(f"No {_without_path(kind, search)}." for kind in search.rejected)
         shortcoming = f"The path is a move of the joints between two targets that the arm can't be said to do. {why}"
-        return FoundTasks(scene, spots, search.any_path(spots), True, (shortcoming,))
-    spots = search.any_spots()
-    return FoundTasks(scene, spots, search.any_path(spots), False, (_without_targets(arm, search, len(best[2])),))
+    else:
+        shortcoming = _without_targets(arm, search, len(spots))
+        spots = search.any_spots()
+    return FoundTasks(scene, spots, search.any_path(spots), clear, False, (shortcoming, *_unexamined(arm, search)))
+
+
+def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
+    """Which collisions were not looked at, if any."""
+    if not search.bodies.unexamined:
+        return []
+    pairs = ", ".join(pair.label for pair in search.bodies.unexamined)
+    return [
+        f"Collisions of {pairs} were not examined: these shapes overlap in every joint vector tried, which no arm can "
+        f"do. {_remedy(arm)}"
+    ]
+
+
+def _remedy(arm: Arm) -> str:
+    """What to do about shapes that overlap always."""
+    text = f"Correct the shapes, or allow the contact, in data/robots/{arm.robot.name}.yaml."
+    if arm.of_hulls:
+        text += (
+            " The links have the hulls of their meshes as shapes, which fill what is bent or hollow: --split takes "
+            "convex pieces instead (minutes for fine meshes)."
+        )
+    return text
 
 
 def _kinds(paths: list[dict[str, Any]]) -> set[str]:
@@ -154,16 +180,8 @@ def _without_targets(arm: Arm, search: TaskSearch, found: int) -> str:
         text += f"; of {search.tried} poses tried {found or 'none'} could be solved so, and {LEAST_TARGETS} are needed"
     always = [pair for pair, count in counts.overlaps if count == counts.drawn]
     if always:
-        text += (
-            f". {', '.join(always)} overlap in all of them, which no arm can do: correct their shapes, or allow the "
-            f"contact, in data/robots/{arm.robot.name}.yaml"
-        )
-    if arm.of_hulls and counts.colliding:
-        text += (
-            ". The links have the hulls of their meshes as shapes, which fill what is bent or hollow: --split takes "
-            "convex pieces instead (minutes for fine meshes)"
-        )
-    return f"{text}."
+        text += f". {', '.join(always)} overlap in all of them, which no arm can do"
+    return f"{text}. {_remedy(arm)}" if counts.colliding else f"{text}."
 
 
 def _targets(found: FoundTasks) -> list[dict[str, Any]]:
