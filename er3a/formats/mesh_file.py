@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -63,6 +64,8 @@ def _loaded(path: Path) -> Any:
     if not path.is_file():
         raise InputError(path, None, "there is no such file", "Check the path")
     _refuse_large(path)
+    if path.suffix.lower() == ".dae" and find_spec("collada") is None:
+        raise InputError(path, None, "can't be read without pycollada", "Install it: pip install 'er3a[meshes]'")
     import trimesh  # takes a while
 
     try:

@@ -154,7 +154,7 @@ def _mesh(
     path: Path, where: str, shape: ElementTree.Element | None, notes: list[str], split: bool
 ) -> ConvexPieces | None:
     name = shape.get("filename", "") if shape is not None else ""
-    file = _found(path, name)
+    file = mesh_of(path, name)
     if file is None:
         notes.append(f"{where}: the mesh {name} was not found; the link has no shape of it")
         return None
@@ -165,11 +165,15 @@ def _mesh(
             return convex_pieces(mesh.vertices, mesh.faces, THRESHOLD, SEED)
         except Er3aError as error:
             notes.append(f"{where}: the hull of {file.name} is taken ({error})")
-    return hull_of(read_vertices(file) * scale)
+    try:
+        return hull_of(read_vertices(file) * scale)
+    except Er3aError as error:
+        notes.append(f"{where}: {error}; the link has no shape of it")
+        return None
 
 
-def _found(path: Path, name: str) -> Path | None:
-    """The file that a URDF names, beside it or in a package above it."""
+def mesh_of(path: Path, name: str) -> Path | None:
+    """The mesh's file that a URDF names, beside it or in a package above it; None if there is none."""
     package, _, rest = name.removeprefix("package://").partition("/")
     places = [path.parent / name.removeprefix("file://")]
     if name.startswith("package://"):

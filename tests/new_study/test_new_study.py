@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import re
+import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 from typer.testing import CliRunner
 
+import er3a
+from er3a.collision.clearance import clearance
 from er3a.errors import Er3aError, InputError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.robot_library import load_robot, robot_of
+from er3a.files.scene_file import load_scene
 from er3a.files.shipped import ROOT
 from er3a.formats.urdf import export_urdf
+from er3a.kinematics.rank_loss import scaled_jacobian
 from er3a.pipeline.check import check_file, check_study
 from er3a.pipeline.cli import app
 from er3a.pipeline.new_study.brought_arm import arm_of
 from er3a.pipeline.new_study.write import write_study
 from er3a.pipeline.stages.inverse.compute import compute as compute_inverse
 from er3a.pipeline.stages.trajectory.compute import compute as compute_trajectory
-from er3a.pipeline.study import load_study
+from er3a.pipeline.study import Study, load_study
+from er3a.robots.robot import Envelope
 from er3a.robots.shown import joint_columns
+
+REGULAR = 0.02
+"""Smallest singular value below which a pose is near-singular."""
 
 UR = """joint,a_mm,alpha_deg,d_mm
 1,0,90,162.5
@@ -69,7 +82,7 @@ def new(*words: object) -> tuple[int, str, str]:
     return done.exit_code, done.output, str(done.exception or "")
 
 
-LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("er3_600", "er3a_c60_article")]
+LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("er3_600", "er3a_c60_article", "ur5e", "lbr_iiwa_14")]
 
 
 @pytest.fixture(scope="module", params=["er3a_c60", *LONG])
@@ -88,16 +101,41 @@ def test_every_file_is_in_order(written, monkeypatch):
     check_study(Path("config/config.yaml"))
 
 
+def check_promise(study: Study, name: str) -> set[str]:
+    """That targets and paths are within limits, away from singular poses and clear, by the study's own stages.
+
+    Singular poses are judged by the Jacobian's smallest singular value, whatever rule the stages have for the arm.
+    Returns the kinds of the paths.
+    """
+    robot = study.robot(name)
+    inverse = compute_inverse(study, name)
+    targets = inverse.summary.targets
+    assert len(targets) >= 2
+    assert [target.name for target in targets if target.chosen_deg is None] == []
+    chosen = np.array([target.chosen_deg for target in targets])
+    q = np.where(robot.slides, chosen / 1000, np.radians(chosen))
+    assert (q > robot.lower).all()
+    assert (q < robot.upper).all()
+    assert np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[:, -1].min() > REGULAR
+    assert (clearance(robot, q, load_scene(study.scene(name, "inverse"))).distance > 0).all()
+    found = compute_trajectory(study, name)
+    assert {path.name: path.verdict for path in found.summary.paths if path.verdict != "safe"} == {}
+    assert found.checks.within_limits.all()
+    assert not found.checks.near_singular.any()
+    assert found.checks.smallest_singular_value.min() > REGULAR / 2
+    assert np.nanmin(found.clearance.clearance_mm) > 0
+    return {path.name for path in found.summary.paths}
+
+
 @pytest.mark.long
 def test_its_targets_are_reached_and_its_paths_are_safe(written, monkeypatch):
     name, folder = written
     monkeypatch.chdir(folder)
-    study = load_study("config/config.yaml")
-    targets = compute_inverse(study, name).summary.targets
-    assert len(targets) >= 2
-    assert [target.name for target in targets if target.chosen_deg is None] == []
-    paths = compute_trajectory(study, name).summary.paths
-    assert {path.name: path.verdict for path in paths} == {"joint_move": "safe", "line": "safe", "arc": "safe"}
+    kinds = check_promise(load_study("config/config.yaml"), name)
+    assert kinds == ({"joint_move"} if name == "lbr_iiwa_14" else {"joint_move", "line", "arc"})
+    text = " ".join(Path("README.md").read_text(encoding="utf-8").split())
+    assert "poses that the arm reaches within its limits, away from singular poses and clear of collisions" in text
+    assert "Read this first" not in text
 
 
 @pytest.mark.long
@@ -105,7 +143,7 @@ def test_the_readme_tells_what_stands_there_and_which_references_count(written):
     name, folder = written
     text = (folder / "README.md").read_text(encoding="utf-8")
     assert f"data/robots/{name}.yaml" in text
-    assert "no references yet" not in text
+    assert ("no references yet" in text) == (not load_robot(name).references)
     assert (folder / "data/robots" / f"{name}.yaml").read_bytes() == (ROOT / f"data/robots/{name}.yaml").read_bytes()
 
 
@@ -221,14 +259,147 @@ def test_nothing_is_overwritten(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::er3a.errors.InputWarning")  # joint values of so stiff an arm are small
-def test_an_arm_that_finds_no_clear_pose_gets_random_ones_and_is_told(tmp_path, monkeypatch):
+def test_an_arm_without_a_clear_pose_says_so_and_why(tmp_path, monkeypatch):
     table = tmp_path / "stiff.csv"
     rows = [line + (",lower_deg,upper_deg" if "joint" in line else ",-1,7") for line in UR.splitlines()]
     table.write_text("\n".join(rows), encoding="utf-8")
-    write_study(arm_of(None, table, None), tmp_path / "cell")
+    code, output, _ = new(tmp_path / "cell", "--dh", table)
+    warning = output[output.index("WARNING: ") :]
+    assert code == 0
+    assert "joint values drawn at random, not tasks: of 1000 joint vectors drawn within the limits none are" in warning
+    assert "1000 to a singular pose" in warning
     monkeypatch.chdir(tmp_path / "cell")
     check_study(Path("config/config.yaml"))
-    assert "no poses were found" in " ".join(Path("README.md").read_text(encoding="utf-8").split()).lower()
+    text = Path("README.md").read_text(encoding="utf-8")
+    assert "## Read this first" in text
+    assert "joint vectors drawn within the limits none are" in text
+    assert "poses of random joint values" in text
+    assert "that the arm reaches" not in text
+
+
+def test_shapes_that_always_overlap_are_named(tmp_path):
+    arm = arm_of(None, None, "er3_600")
+    ball = Envelope(3, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0)
+    robot = arm.robot.replace(envelopes=(*arm.robot.envelopes, ball))
+    found = write_study(replace(arm, robot=robot), tmp_path)
+    text = found.shortcomings[0]
+    assert "1000 collide" in text
+    assert re.search(r"link_3\S* in 1000", text)
+    assert "overlap in all of them, which no arm can do. Correct the shapes, or allow the contact" in text
+
+
+def test_collisions_that_were_not_examined_are_named(tmp_path):
+    arm = arm_of(None, None, "er3_600")
+    ball = Envelope(0, (0.0, 0.0, 0.3), (0.0, 0.0, 0.3), 2.0)
+    robot = arm.robot.replace(envelopes=(*arm.robot.envelopes, ball))
+    found = write_study(replace(arm, robot=robot), tmp_path)
+    assert [text for text in found.shortcomings if re.match(r"Collisions of .*base/link_4.* were not examined", text)]
+    text = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert found.shortcomings[0] in text
+
+
+@pytest.fixture
+def xacro(tmp_path) -> Path:
+    """A xacro arm whose links stand in another package beside it, with a mesh and a joint type as arguments."""
+    urdf = export_urdf(load_robot("er3_600")).replace('<?xml version="1.0"?>', "")
+    shape = '<collision><geometry><mesh filename="package://arm_shapes/meshes/$(arg mesh)"/></geometry></collision>'
+    urdf = urdf.replace('<link name="link_1" />', f'<link name="link_1">{shape}</link>', 1)
+    assert shape in urdf
+    body = urdf[urdf.index(">") + 1 : urdf.rindex("<")]
+    head = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"'
+    files = {
+        "arm_shapes/package.xml": "<package><name>arm_shapes</name></package>",
+        "arm_shapes/urdf/arm.xacro": f'{head}><xacro:macro name="arm" params="">{body}</xacro:macro></robot>',
+        "arm_support/package.xml": "<package><name>arm_support</name></package>",
+        "arm_support/urdf/my arm.urdf.xacro": f'{head} name="arm"><xacro:arg name="mesh" default="l.stl"/>'
+        '<xacro:include filename="$(find arm_shapes)/urdf/arm.xacro"/><xacro:arm/></robot>',
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "arm_shapes/meshes").mkdir()
+    trimesh.creation.torus(0.1, 0.03, 16, 8).export(tmp_path / "arm_shapes/meshes/ring.stl")
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "arm_shapes/meshes/box.stl")
+    (tmp_path / "arm_shapes/meshes/torn.stl").write_bytes(b"solid torn")
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "arm_shapes/meshes/box.dae")
+    return tmp_path / "arm_support/urdf/my arm.urdf.xacro"
+
+
+def test_xacro_is_expanded_with_its_packages_arguments_and_meshes(xacro):
+    packaged = load_robot("er3_600")
+    arm = arm_of(xacro, None, None, xacro=("mesh:=box.stl",))
+    q = np.random.default_rng(1).uniform(packaged.lower, packaged.upper, (20, 6))
+    assert np.allclose(er3a.forward(arm.robot, q), er3a.forward(packaged, q), atol=1e-9)
+    assert arm.robot.name == "my_arm"
+    assert np.ptp(np.array(arm.robot.hulls[0].points), axis=0) == pytest.approx([0.1] * 3, abs=1e-6)
+    assert arm_of(xacro, None, None, xacro=("mesh:=ring.stl",)).robot.hulls != arm.robot.hulls
+    assert [path.name for path in xacro.parent.iterdir()] == [xacro.name]
+
+
+def test_import_urdf_takes_xacro_too(xacro, tmp_path):
+    done = CliRunner().invoke(
+        app, ["import-urdf", str(xacro), "--xacro", "mesh:=box.stl", "--output", str(tmp_path / "arm.yaml")]
+    )
+    assert done.exit_code == 0, done.output
+    assert len(load_robot(tmp_path / "arm.yaml").hulls) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("mesh=box.stl",), "'mesh=box.stl' is no argument of xacro. Write NAME:=VALUE"),
+        ((":=box.stl",), "':=box.stl' is no argument of xacro"),
+        (None, "--xacro: the file holds no xacro macros"),
+    ],
+)
+def test_wrong_arguments_of_xacro_are_refused_in_one_line(xacro, tmp_path, words, told):
+    if words is None:
+        xacro = tmp_path / "plain.urdf"
+        xacro.write_text(f"<!-- <xacro:arm/> -->{export_urdf(load_robot('er3_600')).split('?>')[1]}", encoding="utf-8")
+        assert arm_of(xacro, None, None).robot.joints == 6
+    with pytest.raises(InputError, match=re.escape(told)) as error:
+        arm_of(xacro, None, None, xacro=words or ("mesh:=box.stl",))
+    assert error.value.file == str(xacro)
+
+
+def test_what_xacro_can_t_expand_and_what_the_expanded_file_lacks_name_the_file_given(xacro):
+    text = xacro.read_text(encoding="utf-8")
+    xacro.write_text(text.replace("find arm_shapes", "find arm_forms"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"can't be expanded .*arm_forms"):
+        arm_of(xacro, None, None)
+    xacro.write_text(text.replace("<xacro:arm/>", ""), encoding="utf-8")
+    with pytest.raises(InputError, match="holds no joints") as error:
+        arm_of(xacro, None, None)
+    assert error.value.file == str(xacro)
+
+
+def test_without_xacrodoc_the_extra_is_named(xacro, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xacrodoc", None)
+    with pytest.raises(InputError, match=r"is xacro, which xacrodoc expands\. Install it: pip install 'er3a\[xacro\]'"):
+        arm_of(xacro, None, None)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "told"),
+    [
+        ("gone.stl", r"gone\.stl was not found; the link has no shape of it"),
+        ("torn.stl", r"torn\.stl: .*; the link has no shape of it"),
+        ("box.dae", r"box\.dae: can't be read without pycollada\. Install it: pip install 'er3a\[meshes\]'; the link"),
+    ],
+)
+def test_a_mesh_that_can_t_be_read_is_a_note(xacro, monkeypatch, mesh, told):
+    monkeypatch.setattr("er3a.formats.mesh_file.find_spec", lambda name: None)
+    arm = arm_of(xacro, None, None, xacro=(f"mesh:={mesh}",))
+    assert arm.robot.hulls == ()
+    assert [note for note in arm.notes if re.search(told, note)]
+
+
+@pytest.mark.long
+def test_meshes_are_split_where_that_is_asked_for(xacro):
+    whole, parts = (arm_of(xacro, None, None, xacro=("mesh:=ring.stl",), split=split).robot for split in (False, True))
+    assert len(whole.hulls) == 1
+    assert len(parts.hulls) > 3
+    assert not any(np.linalg.norm(np.mean(piece.points, axis=0)[:2]) < 0.03 for piece in parts.hulls)
 
 
 @pytest.mark.parametrize(
@@ -240,6 +411,8 @@ def test_an_arm_that_finds_no_clear_pose_gets_random_ones_and_is_told(tmp_path, 
         (("--robot", "er3_600", "--name", "Arm"), "can't be a robot's name"),
         (("--robot", "er3_600", "--modified"), "--modified says how a table is meant"),
         (("--urdf", "nowhere.urdf"), "there is no such file"),
+        (("--robot", "er3_600", "--split"), "say how a URDF is read"),
+        (("--dh", "x.csv", "--xacro", "a:=b"), "say how a URDF is read"),
     ],
 )
 def test_a_wrong_call_is_told_in_one_line(tmp_path, words, told):

@@ -84,6 +84,10 @@ AnyRobot = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name o
 StudyFile = Annotated[Path, typer.Option("--study", envvar="ER3A_STUDY", help="the study file")]
 Results = Annotated[Path, typer.Option(help="folder of the results")]
 Reports = Annotated[Path, typer.Option(help="folder of the reports")]
+Split = Annotated[bool, typer.Option(help="split a URDF's collision meshes into convex pieces; else their hulls")]
+Xacro = Annotated[
+    list[str] | None, typer.Option(metavar="NAME:=VALUE", help="an argument of a URDF that is xacro; can be repeated")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, for another program")]
 
 

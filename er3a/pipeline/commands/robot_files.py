@@ -12,29 +12,34 @@ import typer
 from er3a.errors import Er3aError
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.formats.mesh_file import Unit
-from er3a.pipeline.commands.options import ROBOT_FILES, AnyRobot, AsJson, app, print_json, print_note
+from er3a.pipeline.commands.options import ROBOT_FILES, AnyRobot, AsJson, Split, Xacro, app, print_json, print_note
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
 def import_urdf(
-    file: Annotated[Path, typer.Argument(help="a URDF of a serial arm (expanded, if it is xacro)")],
+    file: Annotated[Path, typer.Argument(help="a URDF of a serial arm, or xacro")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
     *,
     base: Annotated[str | None, typer.Option(help="the link at which the arm begins; the root by default")] = None,
     tip: Annotated[str | None, typer.Option(help="the link at which it ends, if the file leaves a choice")] = None,
     snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
-    split: Annotated[bool, typer.Option(help="split collision meshes into convex pieces; else their hulls")] = False,
+    split: Split = False,
+    xacro: Xacro = None,
     as_json: AsJson = False,
 ):
     """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
     from er3a.formats.urdf import robot_name
+    from er3a.formats.xacro import plain_urdf
 
-    with shown_work(f"{file}: the arm is read" + (", meshes are split into convex pieces" if split else "")):
-        imported = read_urdf(file, base=base, tip=tip, snap=snap, split=split)
+    with (
+        shown_work(f"{file}: the arm is read" + (", meshes are split into convex pieces" if split else "")),
+        plain_urdf(file, xacro or ()) as plain,
+    ):
+        imported = read_urdf(plain, base=base, tip=tip, snap=snap, split=split)
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(imported.robot.replace(name=output.stem), output)

@@ -22,7 +22,9 @@ from er3a.pipeline.commands.options import (
     Reports,
     Results,
     SomeRobot,
+    Split,
     StudyFile,
+    Xacro,
     app,
     print_error,
     print_json,
@@ -38,9 +40,11 @@ from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 def new(
     folder: Annotated[Path, typer.Argument(help="where the study is written; no file that is there is touched")],
     *,
-    urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF")] = None,
+    urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF or xacro")] = None,
+    xacro: Xacro = None,
     base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
+    split: Split = False,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, by the name or the file of a robot of er3a")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
@@ -50,15 +54,18 @@ def new(
     from er3a.pipeline.new_study.brought_arm import arm_of
     from er3a.pipeline.new_study.write import write_study
 
+    ends, arguments = (base, tip), tuple(xacro or ())
     with shown_work(f"{folder}: the arm is read") as at:
-        arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=(base, tip))
+        arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=ends, xacro=arguments, split=split)
         at(f"{folder}: targets and paths that the arm can do are looked for")
-        files = write_study(arm, folder)
-    for note in arm.notes:
+        written = write_study(arm, folder)
+    for note in (*arm.notes, *written.missing):
         print_note(note)
-    for file in files:
+    for file in written.files:
         print(f"{file}: written")
     print(f"Next: cd {shlex.quote(str(folder))} && er3a run")
+    for shortcoming in written.shortcomings:
+        typer.secho(f"WARNING: {shortcoming}", fg="red", bold=True, err=True)
 
 
 @app.command(rich_help_panel=FIRST)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from er3a.files.robot_library import read_robot, robot_of, robot_path
 from er3a.files.robot_writer import robot_file, yaml_text
 from er3a.formats.text_file import read_text
 from er3a.formats.urdf import import_urdf, robot_name
+from er3a.formats.xacro import plain_urdf
 from er3a.robots.robot import Robot
 
 SCHEMA_LINE = "# yaml-language-server: $schema=../../config/robot.schema.json\n"
@@ -26,11 +28,13 @@ class Arm:
     ----------
     text : of the robot file
     notes : what was assumed about it, in words
+    of_hulls : whether links have the hulls of meshes as shapes, which pieces could take the place of
     """
 
     robot: Robot
     text: str
     notes: tuple[str, ...] = ()
+    of_hulls: bool = False
 
 
 def arm_of(
@@ -41,6 +45,8 @@ def arm_of(
     name: str | None = None,
     modified: bool = False,
     ends: tuple[str | None, str | None] = (None, None),
+    xacro: Sequence[str] = (),
+    split: bool = False,
 ) -> Arm:
     """The arm that exactly one of a URDF, a D-H table and a robot's name or file describes.
 
@@ -49,6 +55,8 @@ def arm_of(
     name : of the robot in the study; by default that of the file
     modified : whether the D-H table is modified (Craig)
     ends : the URDF's links at which the arm begins and ends, where the file leaves a choice
+    xacro : arguments ``NAME:=VALUE`` of a URDF that is xacro
+    split : whether collision meshes of a URDF are split into convex pieces; else their hulls are taken
 
     Raises
     ------
@@ -64,22 +72,23 @@ def arm_of(
         raise Er3aError(f"--name '{name}' can't be a robot's name: {told}")
     if modified and dh is None:
         raise Er3aError("--modified says how a table is meant; give it with --dh")
-    if urdf is None and ends != (None, None):
-        raise Er3aError("--base and --tip are links of a URDF; give them with --urdf")
+    if urdf is None and (ends != (None, None) or xacro or split):
+        raise Er3aError("--base, --tip, --xacro and --split say how a URDF is read; give them with --urdf")
     if urdf is not None:
-        return _from_urdf(urdf, name or robot_name(urdf), ends)
+        with plain_urdf(urdf, xacro) as file:
+            return _from_urdf(file, name or robot_name(file), ends, split)
     if dh is not None:
         content, notes = read_dh_table(dh, name or robot_name(dh), "modified" if modified else "standard")
         return Arm(robot_of(content), _text(content), notes)
     return _known(str(robot), name)
 
 
-def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None]) -> Arm:
-    imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True)
+def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None], split: bool) -> Arm:
+    imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True, split=split)
     robot = imported.robot.replace(name=name)
     content = robot_file(robot, path)
     misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"
-    return Arm(robot_of(content), _text(content), (*imported.notes, misfit))
+    return Arm(robot_of(content), _text(content), (*imported.notes, misfit), bool(robot.hulls) and not split)
 
 
 def _known(robot: str, name: str | None) -> Arm:

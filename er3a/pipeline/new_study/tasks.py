@@ -1,14 +1,16 @@
-"""Targets that an arm reaches and paths that it can do, found by solving and by the judgement of the trajectory stage.
+"""Targets that an arm reaches and paths that it can do, found by the judgement of the inverse and trajectory stages.
 
-Poses are looked for above the scene's table with the tool straight down first, then anywhere. What is written is what
-was tried: millimetres and degrees, rounded before they are solved.
+Poses are looked for above the scene's table with the tool straight down first, then at joint values drawn within the
+limits that are away from singular poses and clear of collisions. What is written is what was tried: millimetres and
+degrees, rounded before they are solved, with the joint values as reference that make the inverse stage choose them.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import chain, combinations, islice, product
 from typing import Any
 
 import numpy as np
@@ -22,9 +24,11 @@ from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import Unsolved
+from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.near_singular import NearSingular
-from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.kinematics.solutions import Solutions
+from er3a.kinematics.targets import Target
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.new_study.surroundings import SampledReach
@@ -34,21 +38,24 @@ from er3a.pipeline.stages.trajectory.judgement import judge
 from er3a.pipeline.stages.trajectory.motion import motion_of
 from er3a.pipeline.stages.trajectory.motion_demands import limits_of, wanted_of
 from er3a.planning.commands import CommandSource
-from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Wanted
 from er3a.robots.joint_limits import limit_margin, within
 from er3a.robots.robot import Robot
 from er3a.robots.shown import shown
+from er3a.selection.nearest import nearest
+from er3a.selection.select import refusals_of
 
-MOST_TARGETS, LEAST_TARGETS, CHOICE = 5, 2, 30
+MOST_TARGETS, LEAST_TARGETS = 5, 2
+NAMED_PAIRS = 3
 APART = 0.1  # of the reach
-TRIES, TRIES_SLOW = 300, 40
+TRIES, CHOICE = 150, 30  # of poses above the ground and of drawn ones each; solved ones to choose from
+TRIES_SLOW, CHOICE_SLOW = 20, 10  # of arms that are solved slowly
+DRAWN = 1000  # joint vectors that are judged at once
 LIMIT_MARGIN_RAD = np.radians(8.0)
 FULL_POSE = 6  # joints that it takes to hold any pose
 FINE_BELOW = 40.0  # deg or mm
 SINGULAR_MARGIN = 2.0  # times what the study calls near
-LEAST_SINGULAR_VALUE = 0.05  # for arms without a closed form
 DOWN_DEG = (180, 0, 0)
 HEIGHTS, DISTANCES, ASIDE = (0.3, 0.4, 0.22), (0.6, 0.5, 0.7, 0.42), (0.0, 0.25, -0.25, 0.12, -0.12)  # of the reach
 STEPS = ((0, 1, 0), (0, 0, 1), (1, 0, 0), (0, -1, 0), (0, 0, -1), (-1, 0, 0))
@@ -83,9 +90,36 @@ class Spot:
         return tuple(self.written.get("rpy_deg", ())[:2]) == DOWN_DEG[:2]
 
 
+@dataclass(frozen=True)
+class DrawnCounts:
+    """How many of the joint vectors drawn within the limits meet each condition for a target.
+
+    Attributes
+    ----------
+    fit : those that meet all conditions
+    near_limit, near_singular, colliding : those that fail it, whatever else they fail
+    overlaps : pairs of bodies, those that overlap most often first, with in how many
+    """
+
+    drawn: int
+    fit: int
+    near_limit: int
+    near_singular: int
+    colliding: int
+    overlaps: tuple[tuple[str, int], ...]
+
+
 @dataclass
 class TaskSearch:
-    """What an arm can do in a scene, by the settings of the study's trajectory stage."""
+    """What an arm can do in a scene, by the settings of the study's trajectory stage.
+
+    Attributes
+    ----------
+    fit : (k, n), rad or m, joint vectors drawn within the limits that meet all conditions for a target
+    counts : how many meet which
+    tried : how many poses were solved
+    rejected : kind of path -> why paths of it that were tried are none that the arm can do, with how many
+    """
 
     robot: Robot
     reach: SampledReach
@@ -96,18 +130,35 @@ class TaskSearch:
     limits: JointLimits = field(init=False)
     wanted: Wanted = field(init=False)
     bodies: Bodies = field(init=False)
+    middle: Reals = field(init=False)
+    fit: Reals = field(init=False)
+    counts: DrawnCounts = field(init=False)
+    tried: int = 0
+    rejected: dict[str, Counter[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.follows_tool = has_branches(self.robot)
         self.limits, self.wanted = limits_of(self.robot, self.settings), wanted_of(self.robot, self.settings)
         self.near, self.bodies = self.wanted.near, Bodies(self.robot, self.scene)
+        self.middle = self.reach.q.mean(axis=0)
+        q = self.reach.q[:DRAWN]
+        roomy, regular, free = self._roomy(q), self._regular(q), self.bodies.free(q)
+        self.fit = q[roomy & regular & free]
+        touching = Counter({pair.label: 0 for pair in self.bodies.pairs})
+        for pair, count in zip(self.bodies.pairs, self.bodies.overlaps(q).sum(axis=0).tolist()):
+            touching[pair.label] = max(touching[pair.label], count)
+        near_limit, near_singular, colliding = (int(np.count_nonzero(~each)) for each in (roomy, regular, free))
+        often = tuple((label, count) for label, count in touching.most_common(NAMED_PAIRS) if count)
+        self.counts = DrawnCounts(len(q), len(self.fit), near_limit, near_singular, colliding, often)
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
+        if not len(self.fit):
+            return []
         slow = self.robot.joints > FULL_POSE or isinstance(arm_solver(self.robot).chain, Unsolved)
-        tries = TRIES_SLOW if slow else TRIES
-        tried = (self._spot(written) for written in islice(self._candidates(), tries))
-        choice = list(islice(filter(None, tried), CHOICE))
+        tries, most = (TRIES_SLOW, CHOICE_SLOW) if slow else (TRIES, CHOICE)
+        written = chain(islice(self._above_ground(), tries), islice(self._drawn(), tries))
+        choice = list(islice(filter(None, map(self._spot, written)), most))
         found = choice[:1]
         while choice and len(found) < MOST_TARGETS:
             away = [min(_distance(spot, other) for other in found) for spot in choice]
@@ -125,37 +176,24 @@ class TaskSearch:
         return [Spot(pose, (x, y, z), q, "") for pose, (x, y, z), q in zip(written, points, reach.q)]
 
     def any_path(self, spots: list[Spot]) -> list[dict[str, Any]]:
-        """A joint move between two of them, whatever is in the way."""
-        return list(islice(self._joint_moves(spots), len(DURATIONS_S) - 1, len(DURATIONS_S)))
+        """A slow joint move between two of them, whatever is in the way."""
+        return [
+            entry | {"duration_s": DURATIONS_S[-1], "samples": SAMPLES} for entry in islice(self._joint_moves(spots), 1)
+        ]
 
     def paths(self, spots: list[Spot]) -> list[dict[str, Any]]:
-        """Entries of a path file, each safe: a joint move and, where the arm has a closed form, a line and an arc."""
-        found = [self._first_safe(self._joint_moves(spots))]
-        if self.follows_tool:
-            found += [self._first_safe(self._lines(spots)), self._first_safe(self._arcs(spots))]
-        return [entry for entry in found if entry]
-
-    def _candidates(self) -> Iterator[dict[str, list[float]]]:
-        """Poses to try: above the ground on the side where the arm works, tool down; then those of drawn joints.
-
-        Arms with fewer than six joints get joint values alone: a rounded pose is none that they can hold. Those with
-        more get the joint values that settle what a pose leaves open.
+        """Entries of a path file, each safe and away from singular poses: a joint move and, where the arm has branches,
+        a line and an arc.
         """
-        if self.robot.joints < FULL_POSE:
-            for q in self.reach.q:
-                yield {"q_deg": self._written(q)}
-            return
-        if self.robot.joints > FULL_POSE:
-            middle = {"q_ref_deg": self._written(self.reach.q.mean(axis=0))}
-            yield from (pose | middle for pose in islice(self._above_ground(), TRIES_SLOW // 2))
-            yield from (pose | {"q_ref_deg": self._written(q)} for pose, q in zip(self._drawn(), self.reach.q))
-        else:
-            yield from self._above_ground()
-            yield from self._drawn()
+        kinds = {"joint": self._joint_moves}
+        if self.follows_tool:
+            kinds |= {"line": self._lines, "arc": self._arcs}
+        return [found for kind, entries in kinds.items() if (found := self._first_safe(kind, entries(spots)))]
 
     def _above_ground(self) -> Iterator[dict[str, list[float]]]:
+        """Poses above the ground on the side where the arm works, tool down, for arms that can hold any pose."""
         base = self.robot.base
-        if not self.reach.stands:
+        if not self.reach.stands or self.robot.joints < FULL_POSE:
             return
         turn = np.radians(self.reach.side_deg)
         out, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
@@ -163,29 +201,54 @@ class TaskSearch:
             for distance in DISTANCES:
                 for share in ASIDE:
                     point = base[:3, 3] + self.reach.radius * (distance * out + share * aside + [0, 0, height])
-                    yield {"xyz_mm": _millimetres(point), "rpy_deg": [180.0, 0.0, 0.0]}
+                    yield {"xyz_mm": _millimetres(point), "rpy_deg": [180.0, 0.0, 0.0]} | self._where_open(self.middle)
 
     def _drawn(self) -> Iterator[dict[str, list[float]]]:
-        for pose in self.reach.poses:
-            yield {"xyz_mm": _millimetres(pose[:3, 3]), "rpy_deg": np.round(np.degrees(rpy_of(pose))).tolist()}
+        """Poses of drawn joint values that meet all conditions: of arms with fewer than six joints the joint values.
+
+        A rounded pose is none that those can hold.
+        """
+        for q, pose in zip(self.fit, forward(self.robot, self.fit)):
+            if self.robot.joints < FULL_POSE:
+                yield {"q_deg": self._written(q)}
+            else:
+                rpy = np.round(np.degrees(rpy_of(pose))).tolist()
+                yield {"xyz_mm": _millimetres(pose[:3, 3]), "rpy_deg": rpy} | self._where_open(q)
+
+    def _where_open(self, q: Reals) -> dict[str, list[float]]:
+        """The joint values (n,) that settle what a pose leaves open, for arms with more than six joints."""
+        return {"q_ref_deg": self._written(q)} if self.robot.joints > FULL_POSE else {}
 
     def _spot(self, pose: dict[str, list[float]]) -> Spot | None:
-        """The pose with its best solution: within the limits, clear of everything, far from singular."""
+        """The pose with its solution that has most room; None if the inverse stage would not choose one that fits."""
+        self.tried += 1
         try:
-            target = parse(TargetEntry, {"name": "spot", **pose}, None).target(self.robot)
-            solutions = inverse(self.robot, target.T, target.q_ref)
+            solutions = self._solutions(pose)[0]
+            rows = np.flatnonzero(solutions.solved & within(self.robot, solutions.q))
+            rows = rows[self._fits(solutions.q[rows])]
+            if not rows.size:
+                return None
+            best = rows[limit_margin(self.robot, solutions.q[rows]).argmax()]
+            written = pose | {"q_ref_deg": self._written(solutions.q[best])}
+            solutions, target = self._solutions(written)
         except Er3aError:
             return None
-        margin = limit_margin(self.robot, solutions.q)
-        rows = np.flatnonzero(solutions.solved & within(self.robot, solutions.q) & self._roomy(solutions.q))
-        rows = rows[self._regular(solutions.q[rows])]
-        rows = rows[self.bodies.free(solutions.q[rows])]
-        if not rows.size:
+        chosen = nearest(self.robot, solutions, target.q_ref, refusals_of(self.bodies, solutions)).chosen
+        if chosen is None or not self._fits(solutions.q[[chosen]])[0]:
             return None
-        best = int(rows[margin[rows].argmax()])
         x, y, z = (target.T[:3, 3] * 1000).tolist()
-        written = {key: [*values] for key, values in pose.items()}  # lists of its own: YAML would alias those it shares
-        return Spot(written, (x, y, z), solutions.q[best], str(solutions.label[best]))
+        written = {key: [*values] for key, values in written.items()}  # YAML would alias lists that several share
+        return Spot(written, (x, y, z), solutions.q[chosen], str(solutions.label[chosen]))
+
+    def _solutions(self, pose: dict[str, list[float]]) -> tuple[Solutions, Target]:
+        target = parse(TargetEntry, {"name": "spot", **pose}, None).target(self.robot)
+        return inverse(self.robot, target.T, target.q_ref), target
+
+    def _fits(self, q: Reals) -> Flags:
+        """Whether joints (N, n) are away from limits and singular poses, and clear of everything."""
+        fits = self._roomy(q) & self._regular(q)
+        fits[fits] = self.bodies.free(q[fits])
+        return fits
 
     def _roomy(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from their limits, by 8 deg or a twentieth of the range."""
@@ -200,50 +263,58 @@ class TaskSearch:
         values: list[float] = (np.round(np.round(shown(self.robot, q) / step) * step, 2) + 0.0).tolist()
         return values
 
-    def _regular(self, q: Reals) -> Any:
-        if self.follows_tool:
-            return self.near.margin(self.robot, q) > SINGULAR_MARGIN
-        smallest = conditioning(self.robot, q, characteristic_length(self.robot)).smallest_singular_value
-        return smallest > LEAST_SINGULAR_VALUE
+    def _regular(self, q: Reals) -> Flags:
+        """Whether joints (N, n) are away from singular poses, by twice what the study calls near."""
+        return np.asarray(self.near.margin(self.robot, q) > SINGULAR_MARGIN)
 
     def _joint_moves(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
-        for first, start in enumerate(spots):
-            for end in spots[first + 1 :]:
-                degrees = [self._written(spot.q) for spot in (start, end)]
-                for duration in DURATIONS_S:
-                    yield {
-                        "name": "joint_move",
-                        "kind": "joint",
-                        "title": "All joints together, from one target to another",
-                        "title_zh": "各关节同时运动，从一个目标到另一个",
-                        "start_deg": degrees[0],
-                        "end_deg": degrees[1],
-                        "duration_s": duration,
-                        "samples": SAMPLES,
-                    }
+        for start, end in combinations(spots, 2):
+            yield {
+                "name": "joint_move",
+                "kind": "joint",
+                "title": "All joints together, from one target to another",
+                "title_zh": "各关节同时运动，从一个目标到另一个",
+                "start_deg": self._written(start.q),
+                "end_deg": self._written(end.q),
+            }
 
     def _lines(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
-        for length in LENGTHS:
-            for spot in spots:
-                for step in STEPS:
-                    end = _shifted(spot, length * self.reach.radius * np.array(step))
-                    titles = {"title": "A straight line, the tool held as it is", "title_zh": "直线，工具姿态不变"}
-                    yield from _moves("line", titles, spot, {"end": end})
+        titles = {"title": "A straight line, the tool held as it is", "title_zh": "直线，工具姿态不变"}
+        for length, spot, step in product(LENGTHS, spots, STEPS):
+            end = _shifted(spot, length * self.reach.radius * np.array(step))
+            if self._reached(spot, end):
+                yield _move("line", titles, spot, {"end": end})
 
     def _arcs(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
         titles = {"title": "Half a circle, the tool held as it is", "title_zh": "半圆，工具姿态不变"}
-        for length in LENGTHS:
-            for spot in spots:
-                for step, side in zip(STEPS, (*STEPS[2:], *STEPS[:2])):
-                    way, bulge = (length * self.reach.radius * np.array(each) for each in (step, side))
-                    via = _shifted(spot, way / 2 + bulge / 2)["xyz_mm"]
-                    yield from _moves("arc", titles, spot, {"via_mm": via, "end": _shifted(spot, way)})
+        for length, spot, (step, side) in product(LENGTHS, spots, zip(STEPS, (*STEPS[2:], *STEPS[:2]))):
+            way, bulge = (length * self.reach.radius * np.array(each) for each in (step, side))
+            via, end = _shifted(spot, way / 2 + bulge / 2), _shifted(spot, way)
+            if self._reached(spot, via) and self._reached(spot, end):
+                yield _move("arc", titles, spot, {"via_mm": via["xyz_mm"], "end": end})
 
-    def _first_safe(self, entries: Iterator[dict[str, Any]]) -> dict[str, Any] | None:
-        return next((entry for entry in entries if self._safe(entry)), None)
+    def _reached(self, spot: Spot, pose: dict[str, list[float]]) -> bool:
+        """Whether the arm reaches another pose on a target's branch, with room and clear of everything."""
+        solutions = self._solutions(pose)[0]
+        same = np.array([str(label) == spot.label for label in solutions.label], bool)
+        rows = np.flatnonzero(solutions.solved & same)
+        return bool(self._fits(solutions.q[rows]).any())
 
-    def _safe(self, written: dict[str, Any]) -> bool:
-        """Whether the trajectory stage would call a path safe."""
+    def _first_safe(self, kind: str, entries: Iterator[dict[str, Any]]) -> dict[str, Any] | None:
+        """The first entry that is safe, with the shortest of ``DURATIONS_S`` in which it is."""
+        rejected = self.rejected[kind] = Counter()
+        for entry in entries:
+            for duration in DURATIONS_S:
+                timed = entry | {"duration_s": duration, "samples": SAMPLES}
+                if (fault := self._fault(timed)) is None:
+                    return timed
+                if not fault.startswith("too fast"):
+                    break
+            rejected[fault or ""] += 1
+        return None
+
+    def _fault(self, written: dict[str, Any]) -> str | None:
+        """Why the trajectory stage would not call a path safe and away from singular poses; None where it would."""
         entry = parse(PathFile, {"kind": "paths", "paths": [written]}, None).paths[0]
         assert not isinstance(entry, ProgramPath)
         try:
@@ -251,33 +322,20 @@ class TaskSearch:
                 self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.wanted
             )
         except Er3aError:
-            return False
-        if self.follows_tool:
-            if judge(self.robot, motion, self.near, self.limits).verdict != "safe":
-                return False
-        elif (
-            (curve := motion.polynomials) is None
-            or limit_intervals(self.robot, curve)
-            or any(rate_intervals(curve, limit) for limit in self.limits.rates)
-        ):
-            return False
+            return "can't be followed"
+        judgement = judge(self.robot, motion, self.near, self.limits)
+        if judgement.verdict != "safe":
+            return judgement.verdict
+        if judgement.events:
+            return "near-singular"
         around = Surroundings(self.bodies, self.settings.penetration_tolerance_mm / 1000)
-        return not measured(around, motion).contacts
+        return "collides" if measured(around, motion).contacts else None
 
 
-def _moves(kind: str, titles: dict[str, str], spot: Spot, rest: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _move(kind: str, titles: dict[str, str], spot: Spot, rest: dict[str, Any]) -> dict[str, Any]:
+    """A path of the tool, without its duration."""
     branch = spot.label.replace("_elbow", ", elbow").replace("_no_flip", ", no flip").replace("_flip", ", flip")
-    for duration in DURATIONS_S:
-        yield {
-            "name": kind,
-            "kind": kind,
-            **titles,
-            "start": spot.pose,
-            "start_branch": branch.replace("_", " "),
-            **rest,
-            "duration_s": duration,
-            "samples": SAMPLES,
-        }
+    return {"name": kind, "kind": kind, **titles, "start": spot.pose, "start_branch": branch.replace("_", " "), **rest}
 
 
 def _distance(spot: Spot, other: Spot) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,18 +29,47 @@ HELP = "data/manual_refs/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
-NOTHING_CLEAR = (
-    "no poses were found that the arm reaches clear of itself, of its limits and of singularities: targets and path "
-    "are random joint values; check its table, its joint limits and its envelopes"
-)
+PATH_WORDS = {"joint": "move of the joints", "line": "line of the tool", "arc": "arc of the tool"}
 
 
-def write_study(arm: Arm, folder: Path) -> list[Path]:
+@dataclass(frozen=True, eq=False)
+class WrittenStudy:
+    """What was written.
+
+    Attributes
+    ----------
+    files : apart from schemas and the description of reference tables
+    shortcomings : why targets or paths are none that the arm can do, or were not examined for, in words
+    missing : kinds of path of which none was found beside others, in words
+    """
+
+    files: tuple[Path, ...]
+    shortcomings: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FoundTasks:
+    """Scene, targets and paths of a study.
+
+    Attributes
+    ----------
+    clear, safe : whether the targets, the paths are within limits, away from singular poses and clear of collisions;
+        else the targets are drawn joint values, the path is a move between two
+    shortcomings, missing : see :class:`WrittenStudy`
+    """
+
+    scene: dict[str, Any]
+    spots: list[Spot]
+    paths: list[dict[str, Any]]
+    clear: bool
+    safe: bool
+    shortcomings: tuple[str, ...]
+    missing: tuple[str, ...] = ()
+
+
+def write_study(arm: Arm, folder: Path) -> WrittenStudy:
     """Write a study of an arm into a folder.
-
-    Returns
-    -------
-    files : what was written, apart from schemas and the description of reference tables
 
     Raises
     ------
@@ -58,47 +87,113 @@ def write_study(arm: Arm, folder: Path) -> list[Path]:
     }
     if there := sorted(place for place in places if (folder / place).exists()):
         raise Er3aError(f"{folder / there[0]} is there already, and is kept; give another folder")
-    scene, spots, paths, clear = _found(arm)
-    if not clear:
-        arm = replace(arm, notes=(*arm.notes, NOTHING_CLEAR))
+    found = _found(arm)
     texts = {
         STUDY: _study(name),
-        SCENE: _with_schema("scene", scene),
+        SCENE: _with_schema("scene", found.scene),
         f"data/robots/{name}.yaml": arm.text,
-        f"data/targets/{name}.yaml": _with_schema("targets", {"kind": "targets", "targets": _targets(spots)}),
-        f"data/paths/{name}.yaml": _with_schema("paths", {"kind": "paths", "paths": paths}),
-        "README.md": _readme(arm, spots, paths),
+        f"data/targets/{name}.yaml": _with_schema("targets", {"kind": "targets", "targets": _targets(found)}),
+        f"data/paths/{name}.yaml": _with_schema("paths", {"kind": "paths", "paths": found.paths}),
+        "README.md": _readme(arm, found),
     }
     aids = [HELP, *(f"config/{kind}.schema.json" for kind in SCHEMAS)]
     texts |= {place: (ROOT / place).read_text(encoding="utf-8") for place in aids}
     for place, text in texts.items():
         write_atomically(folder / place, partial(Path.write_text, data=text, encoding="utf-8"))
-    return [folder / place for place in texts if place not in aids]
+    return WrittenStudy(
+        tuple(folder / place for place in texts if place not in aids), found.shortcomings, found.missing
+    )
 
 
-def _found(arm: Arm) -> tuple[dict[str, Any], list[Spot], list[dict[str, Any]], bool]:
-    """Scene, poses and paths: of the first scene in which the arm finds poses and a path, and whether there is one."""
+def _found(arm: Arm) -> FoundTasks:
+    """What is found in the first scene in which the arm finds targets and a path; else in that with most targets."""
     reach = reach_of(arm.robot)
     settings = parse(TrajectorySettings, read_yaml(ROOT / STUDY)["trajectory"], STUDY)
+    best: tuple[dict[str, Any], TaskSearch, list[Spot]] | None = None
     for scene in scenes(arm.robot, reach):
         search = TaskSearch(arm.robot, reach, parse(SceneFile, scene, None).scene(), settings)
         spots = search.spots()
         if len(spots) >= LEAST_TARGETS and (paths := search.paths(spots)):
-            return scene, spots, paths, True
-    spots = search.any_spots()
-    return scene, spots, search.any_path(spots), False
+            missing = (f"No {_without_path(kind, search)}" for kind in search.rejected if kind not in _kinds(paths))
+            return FoundTasks(scene, spots, paths, True, True, tuple(_unexamined(arm, search)), tuple(missing))
+        if best is None or len(spots) >= len(best[2]):
+            best = scene, search, spots
+    assert best is not None
+    scene, search, spots = best
+    clear = len(spots) >= LEAST_TARGETS
+    if clear:
+        why = " ".join(f"No {_without_path(kind, search)}." for kind in search.rejected)
+        shortcoming = f"The path is a move of the joints between two targets that the arm can't be said to do. {why}"
+    else:
+        shortcoming = _without_targets(arm, search, len(spots))
+        spots = search.any_spots()
+    return FoundTasks(scene, spots, search.any_path(spots), clear, False, (shortcoming, *_unexamined(arm, search)))
 
 
-def _targets(spots: list[Spot]) -> list[dict[str, Any]]:
+def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
+    """Which collisions were not looked at, if any."""
+    if not search.bodies.unexamined:
+        return []
+    pairs = ", ".join(pair.label for pair in search.bodies.unexamined)
+    return [
+        f"Collisions of {pairs} were not examined: these shapes overlap in every joint vector tried, which no arm can "
+        f"do. {_remedy(arm)}"
+    ]
+
+
+def _remedy(arm: Arm) -> str:
+    """What to do about shapes that overlap always."""
+    text = f"Correct the shapes, or allow the contact, in data/robots/{arm.robot.name}.yaml."
+    if arm.of_hulls:
+        text += (
+            " The links have the hulls of their meshes as shapes, which fill what is bent or hollow: --split takes "
+            "convex pieces instead (minutes for fine meshes)."
+        )
+    return text
+
+
+def _kinds(paths: list[dict[str, Any]]) -> set[str]:
+    return {path["kind"] for path in paths}
+
+
+def _without_path(kind: str, search: TaskSearch) -> str:
+    """Why there is no path of a kind."""
+    faults = search.rejected[kind]
+    counts = ", ".join(f"{fault}: {count}" for fault, count in faults.most_common())
+    tried = f"of {faults.total()} tried none is safe ({counts})" if faults else "none begins and ends in reach"
+    return f"{PATH_WORDS[kind]} among the paths: {tried}"
+
+
+def _without_targets(arm: Arm, search: TaskSearch, found: int) -> str:
+    """Why there are no targets."""
+    counts = search.counts
+    text = (
+        f"Targets and path are joint values drawn at random, not tasks: of {counts.drawn} joint vectors drawn within "
+        f"the limits {counts.fit or 'none'} {'is' if counts.fit == 1 else 'are'} away from the limits (8 deg or a "
+        "twentieth of a joint's range), away from singular poses and clear of collisions. "
+        f"{counts.near_limit} are too near to a limit, {counts.near_singular} to a singular pose, "
+        f"{counts.colliding} collide"
+    )
+    if counts.overlaps:
+        text += f" ({', '.join(f'{pair} in {count}' for pair, count in counts.overlaps)})"
+    if counts.fit:
+        text += f"; of {search.tried} poses tried {found or 'none'} could be solved so, and {LEAST_TARGETS} are needed"
+    always = [pair for pair, count in counts.overlaps if count == counts.drawn]
+    if always:
+        text += f". {', '.join(always)} overlap in all of them, which no arm can do"
+    return f"{text}. {_remedy(arm)}" if counts.colliding else f"{text}."
+
+
+def _targets(found: FoundTasks) -> list[dict[str, Any]]:
     notes = {
         True: ("Tool straight down.", "工具竖直朝下。"),
         False: ("As the arm holds the tool at random joint values.", "随机关节值下的工具姿态。"),
     }
-    found = []
-    for number, spot in enumerate(spots, 1):
+    targets = []
+    for number, spot in enumerate(found.spots, 1):
         note, note_zh = notes[spot.down]
-        found.append({"name": f"target_{number}", "note": note, "note_zh": note_zh, **spot.written})
-    return found
+        targets.append({"name": f"target_{number}", "note": note, "note_zh": note_zh, **spot.written})
+    return targets
 
 
 def _study(name: str) -> str:
@@ -115,11 +210,10 @@ def _with_schema(kind: str, content: dict[str, Any]) -> str:
     return f"# yaml-language-server: $schema=../../config/{kind}.schema.json\n{yaml_text(content)}"
 
 
-def _readme(arm: Arm, spots: list[Spot], paths: list[dict[str, Any]]) -> str:
+def _readme(arm: Arm, found: FoundTasks) -> str:
     template = Path(__file__).with_name("README.md.j2").read_text(encoding="utf-8")
     environment = jinja2.Environment(trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     columns = {kind: ",".join(form.all_columns) for kind, form in FORMATS.items()}
     page = environment.from_string(template)
-    follows_tool = has_branches(arm.robot)
-    parts = {"arm": arm, "robot": arm.robot, "spots": spots, "paths": paths, "columns": columns}
-    return page.render(**parts, follows_tool=follows_tool) + "\n"
+    parts = {"arm": arm, "robot": arm.robot, "found": found, "columns": columns}
+    return page.render(**parts, follows_tool=has_branches(arm.robot)) + "\n"
