@@ -173,7 +173,7 @@ class TaskSearch:
         """The pose with its best solution: within the limits, clear of everything, far from singular."""
         try:
             target = parse(TargetEntry, {"name": "spot", **pose}, None).target(self.robot)
-            solutions = inverse(self.robot, target.T, target.q_ref)
+            solutions = inverse(self.robot, target.T, target.q_ref, self_motion_rows=True)
         except Er3aError:
             return None
         margin = limit_margin(self.robot, solutions.q)
