@@ -8,7 +8,10 @@ is traced and stands with its member nearest to the reference; starts from every
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import overload
 
 import numpy as np
 
@@ -217,6 +220,33 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
     solver = arm_solver(robot)
     more = to_joints(robot, solver.poses_at(T).roots(_starts(robot, STARTS)))  # curves between the values scanned
     return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, values, CERTAIN)
+
+
+@dataclass(frozen=True, eq=False)
+class LazySelfMotions(Sequence[SelfMotionCurve]):
+    """What :func:`all_motions` gives, traced when it is first looked at."""
+
+    robot: Robot
+    T: Reals
+    q_ref: Reals
+    values: Reals
+
+    @cached_property
+    def traced(self) -> tuple[SelfMotionCurve, ...]:
+        """The self-motions, nearest to the reference first."""
+        return all_motions(self.robot, self.T, self.q_ref, self.values).motions
+
+    @overload
+    def __getitem__(self, index: int) -> SelfMotionCurve: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[SelfMotionCurve]: ...
+
+    def __getitem__(self, index: int | slice) -> SelfMotionCurve | Sequence[SelfMotionCurve]:
+        return self.traced[index]
+
+    def __len__(self) -> int:
+        return len(self.traced)
 
 
 def _starts(robot: Robot, count: int) -> Reals:

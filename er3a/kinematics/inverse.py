@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,7 @@ from er3a.errors import PoseError, ShapeError
 from er3a.geometry.angles import greatest_move, wrap_to_pi
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.by_class import (
-    all_motions,
+    LazySelfMotions,
     arm_solver,
     checked_parameters,
     parameters_of,
@@ -25,6 +27,7 @@ from er3a.kinematics.configuration import side_of, slot_labels
 from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, solve
+from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import (
     ByClass,
@@ -65,13 +68,20 @@ BY_ELIMINATION: tuple[ArmClassCode, ...] = (
 )
 
 
-def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None, redundancy: Reals | None = None) -> Solutions:
+def inverse(
+    robot: Robot,
+    T: Reals,
+    q_ref: Reals | None = None,
+    redundancy: Reals | None = None,
+    self_motion_rows: bool = False,
+) -> Solutions:
     """All joint solutions of one pose of the tool, by the class of the arm's geometry.
 
     Where a joint is free, the member of each family within the limits that is nearest to ``q_ref`` is among the rows,
     and for the branch that meets there (spherical wrist) the one half a turn further. Arms with more than six joints
-    have rows at the given value of their redundancy parameter, and of each self-motion the member nearest to ``q_ref``
-    and the one farthest from the limits. Arms with fewer meet what :func:`er3a.kinematics.by_class.task_mask` tells.
+    have rows at the given value of their redundancy parameter; their self-motions (``families``) are traced when they
+    are first looked at, which takes some 0.3 s. Arms with fewer meet what
+    :func:`er3a.kinematics.by_class.task_mask` tells.
 
     Parameters
     ----------
@@ -80,6 +90,8 @@ def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None, redundancy: Real
         means zeros.
     redundancy : (k,), values of what the pose leaves open (``parameters_of``): an arm angle in rad, or a joint's value;
         None means those of ``q_ref``
+    self_motion_rows : of an arm with one redundancy parameter, also list of each self-motion the member nearest to
+        ``q_ref`` and the one farthest from the limits; done anyway if no row has the parameter's value
 
     Raises
     ------
@@ -91,7 +103,7 @@ def inverse(robot: Robot, T: Reals, q_ref: Reals | None = None, redundancy: Real
         raise ShapeError("T", T.shape, "(4, 4)")
     q_ref = checked_reference(robot, q_ref)
     if closed_form_missing(robot) or robot.coupling is not None:
-        return _by_class(robot, T, q_ref, redundancy)
+        return _by_class(robot, T, q_ref, redundancy, self_motion_rows)
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
     q = _free_joints_near(robot, T, q, q_ref, continua)
@@ -135,16 +147,18 @@ def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals
     return q, np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
 
 
-def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) -> Solutions:
+def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool) -> Solutions:
     solver = arm_solver(robot).chain
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
     values = checked_parameters(robot, redundancy, q_ref[None], 1)
     found = slots_of_class(robot, T[None], q_ref[None], values)
     slots, motions = found.q, found.settled[0].motions if found.settled else ()
-    if len(solver.parameters) == 1:
-        motions = all_motions(robot, T, q_ref, values).motions
     filled = np.flatnonzero(np.isfinite(slots[0, :, 0]))
+    traced: Sequence[SelfMotionCurve] = motions
+    if len(solver.parameters) == 1:
+        traced = LazySelfMotions(robot, T, q_ref, values)
+        motions = tuple(traced) if self_motion_rows or not filled.size else ()
     if solver.parameters:  # where two branches meet one stands; other arms' poses of that kind are settled
         apart = np.abs(shortest_way(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
         filled = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)]
@@ -184,7 +198,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None) ->
     q, branch = _stacked(branches, rows, robot.joints)
     inside = within(robot, q)
     method = ByClass(solver.code, bool(certain), bool(slot_labels(robot)))
-    return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, motions)
+    return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, traced)
 
 
 def all_told(robot: Robot, certainty: Integers) -> Flags:

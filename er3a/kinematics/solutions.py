@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -200,7 +201,8 @@ class Solutions(ByValue, Displayed):
     method : closed form, the solver of the arm's class, or iteration
     unsolved : ``inverse``: per shoulder side without solution, why (both sides: the pose can't be reached);
         ``solve``: per pose without solution, why
-    families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest
+    families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest; of arms with more
+        than six joints traced when they are first looked at
     turn_range : (..., 6, 2) int8, least and greatest number of whole turns that can be added to each joint within its
         limits (least above greatest: none); None unless ``inverse_batch`` was asked for it
     position_error, rotation_error : (...,), m and rad, of the degrees of freedom that ``solve`` was asked for
@@ -215,7 +217,7 @@ class Solutions(ByValue, Displayed):
     branch: Integers
     method: Method = ClosedForm()
     unsolved: tuple[Unsolved, ...] = ()
-    families: tuple[Family | SelfMotionCurve, ...] = ()
+    families: Sequence[Family | SelfMotionCurve] = ()
     turn_range: NDArray[np.int8] | None = None
     position_error: Reals | None = None
     rotation_error: Reals | None = None

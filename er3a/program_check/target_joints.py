@@ -120,7 +120,7 @@ def goal_of(placed: PlacedMotion, target: Target | None, before: Reals | None) -
 def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals | None) -> Goal:
     reference = target.near if target.near is not None else before
     try:
-        found = inverse(placed.arm, pose, reference)
+        found = inverse(placed.arm, pose, reference, self_motion_rows=True)
     except PoseError:
         return Goal(None, None, False, (TargetNotGiven("", "not_finite"),))
     if not len(found.q):

@@ -259,7 +259,11 @@ def plan_grasp(
     covariance_at : from joint angles (n,) of a grasp to the covariance (6, 6) of the object's pose as the tool meets it
     """
     poses = _poses(target, T_base_object)
-    candidates = [_Candidate(name, turn, T, q) for name, turn, T in poses for q in inverse(task.robot, T, task.home).q]
+    candidates = [
+        _Candidate(name, turn, T, q)
+        for name, turn, T in poses
+        for q in inverse(task.robot, T, task.home, self_motion_rows=True).q
+    ]
     left, refusal = _judged(task, candidates, len(poses))
     followed = left[:FOLLOWED]
     plans = [_followed(task, each, target) for each in followed]

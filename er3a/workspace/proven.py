@@ -29,6 +29,8 @@ BEYOND_ROUNDING = 1 + 1e-9
 LEAST_BOUND_M = 1e-4  # for a tool point that no joint moves
 VOID_RATIO = 0.25
 NEAR_WRIST = 0.07
+WIDE, WIDEST = 6.3, 0.5
+"""Width of the bracket times the root of the budget (and width) from which the general method is tried, too."""
 _SETTLED = 0.1  # of the volume
 GENERAL_CELLS = 4
 """For each cell of the budget, where the general method is used: its cells."""
@@ -50,10 +52,18 @@ class ToolNearWrist:
 
 
 @dataclass(frozen=True)
+class BoundsFarApart:
+    """The method for spherical wrists leaves so much between its bounds, for narrow limits say, and this one less."""
+
+    percent: float
+    code: Literal["bounds_far_apart"] = "bounds_far_apart"
+
+
+@dataclass(frozen=True)
 class GeneralMethod:
     """The cells were decided by the method for any arm, because of what this one lacks."""
 
-    lacks: ClosedFormMissing | ToolNearWrist
+    lacks: ClosedFormMissing | ToolNearWrist | BoundsFarApart
     code: Literal["general_method"] = "general_method"
 
 
@@ -125,7 +135,11 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
         return _prove_general(robot, most_cells, points, seed, ToolNearWrist(1000 * arm.d))
     section = SectionMap(prove(arm, TARGET, int((1 - VOID_RATIO) * most_cells)))
     section = _about_voids(arm, section, int(VOID_RATIO * most_cells))
-    estimate = estimate_volume(arm, section, arm.reach, arm.heights, points, seed)
+    if (width := section.proof.width) > min(WIDE / np.sqrt(most_cells), WIDEST):
+        general = _prove_general(robot, most_cells, points, seed, BoundsFarApart(100 * width))
+        if general.proof.width < width:
+            return general
+    estimate = estimate_volume(arm, section.proof, points, seed)
     witness = witness_joints(robot, arm, section.proof)
     return Proven(arm, section.proof, section, *section_frame(robot), witness, estimate, SphericalWrist())
 
@@ -145,7 +159,7 @@ def _bounded_by_lengths(robot: Robot, points: int, seed: int, method: GeneralMet
     cells, none = np.array([[0.0, reach, low, high]]), np.zeros((1, 4))
     proof = Proof(cells, unfilled, empty, np.zeros(1, dtype=np.int64), none, 0)
     section = SectionMap(proof)
-    estimate = estimate_volume(_nothing_found, section, reach, (low, high), points, seed)
+    estimate = estimate_volume(_nothing_found, proof, points, seed)
     R = constant_links(robot)[0, :3, :3].T
     witness = np.full((1, robot.joints), np.nan)
     return Proven(None, proof, section, R, bound.axis_point, witness, estimate, method)
@@ -157,7 +171,7 @@ def _nothing_found(local: Reals) -> Flags:
 
 
 def _prove_general(
-    robot: Robot, most_cells: int, points: int, seed: int, lacks: ClosedFormMissing | ToolNearWrist
+    robot: Robot, most_cells: int, points: int, seed: int, lacks: ClosedFormMissing | ToolNearWrist | BoundsFarApart
 ) -> Proven:
     arm, R, origin = general_arm(robot)
     if not arm.carries_around:
@@ -175,8 +189,7 @@ def _prove_general(
         starts = np.where(np.isfinite(q[cells]), q[cells], (robot.lower + robot.upper) / 2)
         return np.isfinite(reach_points(robot, local @ R + origin, starts)[:, 0])
 
-    low, high = arm.heights[0].tolist()
-    estimate = estimate_volume(search, section, float(arm.radii[0]), (low, high), points, seed)
+    estimate = estimate_volume(search, proof, points, seed)
     return Proven(None, proof, section, R, origin, q, estimate, GeneralMethod(lacks))
 
 

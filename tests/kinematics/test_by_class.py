@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
 from er3a.geometry.angles import wrap_to_pi
+from er3a.kinematics import by_class
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import checked_parameters, parameters_of, task_mask, to_rows
 from er3a.kinematics.cuspidal import cuspidal_move
@@ -109,7 +110,7 @@ def test_a_redundant_arm_has_the_member_with_most_margin(random):
     robot = arm(IIWA, most=2.6)
     q = random.uniform(-2, 2, 7)
     T = forward(robot, q)
-    found = inverse(robot, T, q)
+    found = inverse(robot, T, q, self_motion_rows=True)
     best = max(motion.roomiest_margin for motion in found.families)
     grid = np.linspace(-np.pi, np.pi, 400)
     rows = inverse_batch(robot, np.broadcast_to(T, (400, 4, 4)), redundancy=grid[:, None]).q
@@ -117,6 +118,27 @@ def test_a_redundant_arm_has_the_member_with_most_margin(random):
     assert best >= on_grid - 1e-6
     margins = np.minimum(found.q - robot.lower, robot.upper - found.q).min(axis=1)
     assert margins.max() == pytest.approx(best, abs=1e-9)
+
+
+def test_self_motions_of_a_redundant_arm_are_traced_when_looked_at(random, monkeypatch):
+    robot = arm(IIWA, most=2.6)
+    q = random.uniform(-2, 2, 7)
+    T = forward(robot, q)
+    asked = []
+    trace = by_class.all_motions
+    monkeypatch.setattr(by_class, "all_motions", lambda *args: asked.append(args) or trace(*args))
+    found = inverse(robot, T, q)
+    assert not asked
+    assert np.abs(found.q - q).max(axis=1).min() < 1e-9
+    assert np.abs(forward(robot, found.q) - T).max() < 1e-9
+    assert "self-motion" in repr(found)
+    whole = inverse(robot, T, q, self_motion_rows=True)
+    assert [motion.q0.tolist() for motion in found.families] == [motion.q0.tolist() for motion in whole.families]
+    assert len(asked) == 2
+    np.testing.assert_array_equal(whole.q[: len(found.q)], found.q)
+    for motion in found.families:
+        for member in (motion.q0, motion.roomiest):
+            assert np.abs(whole.q - member).max(axis=1).min() < 1e-6
 
 
 def test_parameters_of_redundant_arms(random):

@@ -17,7 +17,7 @@ from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import general_arm, place
 from er3a.workspace.lookup import EMPTY, FILLED, SectionMap
 from er3a.workspace.proof import prove
-from er3a.workspace.proven import GeneralMethod, ToolNearWrist, prove_robot
+from er3a.workspace.proven import BoundsFarApart, GeneralMethod, ToolNearWrist, prove_robot
 from er3a.workspace.section_arm import section_arm
 from er3a.workspace.witness import reach_points
 
@@ -118,6 +118,21 @@ def test_a_tool_point_on_the_wrist_centre(random):
     assert proven.proof.width < 0.1
     points = forward(robot, random.uniform(robot.lower, robot.upper, (100_000, 6)))[:, :3, 3]
     assert proven.count_in_empty(points) == 0
+
+
+@pytest.mark.long
+def test_narrow_limits_of_a_spherical_wrist_take_the_method_with_the_tighter_bounds(random):
+    robot = load_robot("er3a_c60")
+    middle, half = (robot.lower + robot.upper) / 2, np.radians([60, 60, 60, 40, 40, 40])
+    robot = robot.replace(lower=middle - half, upper=middle + half)
+    proven = prove_robot(robot, 500, 5000, 1)
+    assert isinstance(proven.method, GeneralMethod)
+    assert isinstance(proven.method.lacks, BoundsFarApart)
+    assert 100 * proven.proof.width < proven.method.lacks.percent / 3
+    points = forward(robot, random.uniform(robot.lower, robot.upper, (100_000, 6)))[:, :3, 3]
+    assert proven.count_in_empty(points) == 0
+    guess, (lower, upper) = proven.estimate, proven.proof.bounds
+    assert lower < guess.low < guess.value < guess.high <= upper
 
 
 @pytest.mark.long

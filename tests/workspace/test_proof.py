@@ -17,8 +17,8 @@ from er3a.workspace.azimuths import MOST_ARCS, measure, meets, remove
 from er3a.workspace.boundary import border
 from er3a.workspace.causes import Disappears, cause_of, joints_behind, relaxations
 from er3a.workspace.cavities import cavities
-from er3a.workspace.lookup import EMPTY, FILLED, SectionMap
-from er3a.workspace.proof import judge, prove
+from er3a.workspace.lookup import EMPTY, FILLED, UNDECIDED, SectionMap
+from er3a.workspace.proof import Proof, judge, prove
 from er3a.workspace.section_arm import section_arm, section_frame, wrist_and_forearm
 from er3a.workspace.volume import estimate_volume, wilson
 from er3a.workspace.witness import witness_joints
@@ -109,10 +109,51 @@ def test_bracket_narrows_and_holds_the_estimate(proven):
     finer = section.proof
     assert coarse.bounds[0] <= finer.bounds[0] <= finer.bounds[1] <= coarse.bounds[1]
     assert finer.width < 0.07
-    guess = estimate_volume(arm, section, arm.reach, arm.heights, 20_000, 7)
+    guess = estimate_volume(arm, coarse, 20_000, 7)
     assert guess.low < finer.bounds[1]
     assert guess.high > finer.bounds[0]
-    assert guess.undecided < 20
+    assert coarse.bounds[0] < guess.low < guess.value < guess.high < coarse.bounds[1]
+    assert guess.high - guess.low < 0.2 * (coarse.bounds[1] - coarse.bounds[0])
+    assert guess.undecided < 40
+
+
+def test_intervals_of_the_estimate_hold_a_volume_known_exactly():
+    """A shell of radii 0.1 and 0.9 m."""
+    arm, exact = section_arm(two_links(0.1)), 4 / 3 * np.pi * (0.9**3 - 0.1**3)
+    proof = prove(arm, 0.0, 300)
+    guesses = [estimate_volume(arm, proof, 3000, seed) for seed in range(30)]
+    assert sum(guess.low <= exact <= guess.high for guess in guesses) >= 26
+    assert all(proof.bounds[0] <= guess.low < guess.high <= proof.bounds[1] for guess in guesses)
+    error = np.std([guess.value for guess in guesses])
+    assert abs(np.mean([guess.value for guess in guesses]) - exact) < error
+    assert guesses[0].high - guesses[0].low < 6 * error
+
+
+def test_points_of_the_estimate_are_even_over_arcs_that_are_open(random):
+    """Those of a cylinder's points that two cells, which differ in arcs and volume, leave open."""
+    cells = np.array([[0.2, 0.5, -0.1, 0.2], [0.5, 0.8, -0.1, 0.2]])
+    unfilled, empty = np.full((2, 2, MOST_ARCS, 2), np.nan)
+    unfilled[0, :2], empty[0, 0] = [(0.0, 1.0), (3.0, 6.0)], (4.0, 5.0)
+    unfilled[1, 0], empty[1, 0] = (2.0, 2.5), (2.0, 2.1)
+    proof = Proof(cells, unfilled, empty, np.zeros(2, np.int64), np.zeros((2, 4)), 0)
+    chosen: list[np.ndarray] = []
+
+    def search(points):
+        chosen.append(points)
+        return np.ones(len(points), dtype=bool)
+
+    estimate_volume(search, proof, 400_000, 3)
+    x, y, z = chosen[0].T
+    drawn = np.stack([np.hypot(x, y), np.arctan2(y, x) % (2 * np.pi), z])
+    section = SectionMap(proof)
+    n = 400_000
+    box = np.stack([np.sqrt(random.uniform(0.04, 0.64, n)), 2 * np.pi * random.random(n), random.uniform(-0.1, 0.2, n)])
+    expected = box[:, section.status(*box) == UNDECIDED]
+    assert (section.status(*drawn) == UNDECIDED).all()
+    assert drawn.shape[1] == pytest.approx(expected.shape[1], rel=0.03)
+    bins = [np.linspace(0.2, 0.8, 7), np.linspace(0, 2 * np.pi, 13), np.linspace(-0.1, 0.2, 4)]
+    shares = [np.histogramdd(points.T, bins)[0] / points.shape[1] for points in (drawn, expected)]
+    np.testing.assert_allclose(*shares, atol=0.004)
 
 
 def test_witnesses_reach_the_middle_of_their_cell(proven):

@@ -33,6 +33,7 @@ from er3a.kinematics.classes.links import axes_of, inverse_rigid, poses_of, size
 from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.scara import scara
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, prepared, solve_six_revolute
+from er3a.kinematics.classes.slide_and_wrist import slide_and_wrist, solve_slide_and_wrist
 from er3a.kinematics.classes.spherical_joints import about_x, about_z, frame_along
 from er3a.kinematics.classes.two_slides import solve_two_slides, two_slides
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, constants_of, recognised
@@ -149,7 +150,10 @@ def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
             return Unsolved(6) if two is None else General(partial(solve_two_slides, two), "six_two_prismatic")
         arm = prepared(links, sliding)
         if arm.readings:
-            return General(partial(solve_six_revolute, arm), "six_one_prismatic" if sliding.any() else "general_six")
+            by_elimination = partial(solve_six_revolute, arm)
+            if not arm.clear and (with_wrist := slide_and_wrist(links, sliding)) is not None:
+                return General(partial(solve_slide_and_wrist, with_wrist, by_elimination), "six_one_prismatic")
+            return General(by_elimination, "six_one_prismatic" if sliding.any() else "general_six")
         return Unsolved(6)
     return Unsolved(6, "dependent")
 

@@ -56,7 +56,7 @@ def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
     """
     turn = np.ascontiguousarray(arm.frame @ T[:, :3, :3] @ arm.behind)
     angles, least = np.empty((len(T), SLOTS, 3)), np.empty(len(T))
-    _angles(arm.angles, turn, angles, least)
+    wrist_angles(arm.angles, turn, angles, least)
     q = np.zeros((len(T), SLOTS, 6))
     q[:, :, ~arm.sliding] = wrap_to_pi(angles)
     start = poses_of(arm.links, q, arm.sliding)[..., :3, 3]
@@ -77,7 +77,7 @@ def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
 
 
 @kernel
-def _angles(k: SphericalConstants, turn: Reals, angles: Reals, least: Reals) -> None:
+def wrist_angles(k: SphericalConstants, turn: Reals, angles: Reals, least: Reals) -> None:
     for n in range(turn.shape[0]):
         R = turn[n]
         for slot in range(SLOTS):

@@ -61,12 +61,14 @@ _Arm = TypeVar("_Arm", bound=PreparedArm)
 
 @dataclass(frozen=True, eq=False)
 class SixRevolute:
-    """What the solver keeps of a chain: links in units of its size, and readings of its loop, best first."""
+    """What the solver keeps of a chain: links in units of its size, and readings of its loop, best first; whether the
+    first is clear at all poses that were tried."""
 
     links: Reals
     size: float
     sliding: Flags
     readings: tuple[Reading, ...]
+    clear: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,8 @@ def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRe
         good = _trial(reading, bare, T, memory)
         ranked.append((good < 0.5, -round(4 * good), reading.place not in (0, 5), -good, number, reading))
     ranked.sort(key=lambda entry: entry[:-1])
-    return SixRevolute(scaled, size, sliding, tuple(entry[5] for entry in ranked if entry[3] < 0))
+    clear = bool(ranked) and ranked[0][3] == -1.0
+    return SixRevolute(scaled, size, sliding, tuple(entry[5] for entry in ranked if entry[3] < 0), clear)
 
 
 def _trial(reading: Reading, links: Reals, T: Reals, memory: LoopMemory) -> float:

@@ -13,7 +13,7 @@ from er3a.workspace.causes import (
     SeveralLimits,
     VoidCause,
 )
-from er3a.workspace.proven import GeneralMethod, SphericalWrist, ToolNearWrist
+from er3a.workspace.proven import BoundsFarApart, GeneralMethod, SphericalWrist, ToolNearWrist
 
 
 @say.register
@@ -102,4 +102,11 @@ def _(found: GeneralMethod) -> str:
 def _(found: ToolNearWrist) -> str:
     return sentence(
         found.code, "its tool point is only {distance:.3g} mm from the wrist centre", distance=found.distance_mm
+    )
+
+
+@say.register
+def _(found: BoundsFarApart) -> str:
+    return sentence(
+        found.code, "the method for spherical wrists leaves {percent:.3g} % between its bounds", percent=found.percent
     )

@@ -242,7 +242,7 @@ class TaskSearch:
 
     def _solutions(self, pose: dict[str, list[float]]) -> tuple[Solutions, Target]:
         target = parse(TargetEntry, {"name": "spot", **pose}, None).target(self.robot)
-        return inverse(self.robot, target.T, target.q_ref), target
+        return inverse(self.robot, target.T, target.q_ref, self_motion_rows=True), target
 
     def _fits(self, q: Reals) -> Flags:
         """Whether joints (N, n) are away from limits and singular poses, and clear of everything."""

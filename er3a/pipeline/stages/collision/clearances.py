@@ -25,7 +25,7 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetCl
     tables, closest = [], []
     targets = load_targets(file, robot)
     for target in targets:
-        solutions = inverse(robot, target.T, target.q_ref)
+        solutions = inverse(robot, target.T, target.q_ref, self_motion_rows=True)
         if len(targets) > MANY_TARGETS:
             solutions = solutions.without_turns()
         rows = np.flatnonzero(solutions.within_limits)

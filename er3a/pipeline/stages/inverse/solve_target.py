@@ -72,7 +72,7 @@ def solve_target(
     One of ``many``: only the turn nearest to the reference is kept of each arm. With ``advise`` what would help a pose
     without solution is looked for.
     """
-    solutions = inverse(robot, target.T, target.q_ref)
+    solutions = inverse(robot, target.T, target.q_ref, self_motion_rows=True)
     if many:
         solutions = solutions.without_turns()
     refused = refusals(robot, solutions, scene)

@@ -123,7 +123,7 @@ class AvoidanceTask:
         """Joint angles (k, n) within the limits at an end of a path: its own, else others that reach the pose."""
         if np.isfinite(q).all() and within(self.robot, q):
             return q[None]
-        solved = inverse(self.robot, T)
+        solved = inverse(self.robot, T, self_motion_rows=True)
         return solved.q[solved.within_limits]
 
     def _joint_move(self, motion: Motion, found: Judgement) -> tuple[Timed | None, list[StrategyResult]]:

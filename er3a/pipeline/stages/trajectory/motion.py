@@ -162,7 +162,7 @@ def joints_at(robot: Robot, end: Reals) -> Reals:
     """Joint angles (k, n) within the limits at joint angles (n,) or a pose (4, 4): as given, or all that reach it."""
     if end.ndim == 1:
         return end[None]
-    solved = inverse(robot, end)
+    solved = inverse(robot, end, self_motion_rows=True)
     return solved.q[solved.within_limits]
 
 

@@ -28,7 +28,8 @@ class WorkspaceSettings(StrictModel):
     ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints or (``sampling: sobol``) more evenly than
     chance as points of a Sobol' sequence; ``cells_across`` cells span the bounding box's longest side,
     the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
-    The proof looks at ``proof_cells`` cells of the section; ``volume_points`` uniform points estimate the volume.
+    The proof looks at ``proof_cells`` cells of the section; the volume is estimated from points in what it leaves open,
+    as dense as ``volume_points`` over all cells.
     """
 
     samples: Annotated[int, Field(ge=1, le=100_000_000_000)]

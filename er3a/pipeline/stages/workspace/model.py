@@ -66,7 +66,8 @@ class Volume:
 
 @dataclass(frozen=True)
 class VolumePoints:
-    """Points that the estimate drew, and how many of them are reached or could not be decided."""
+    """Points that the estimate drew where the proof leaves open what is reached, how many of them are reached, and how
+    many could not be decided."""
 
     drawn: int
     reached: int
