@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 import yaml
 from rerun.chunk import RrdReader
@@ -38,7 +37,6 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import compute as compute_module
 from er3a.pipeline.stages.validation.checks import checks_of_set
-from er3a.pipeline.stages.validation.compute import compute
 from er3a.pipeline.stages.validation.model import RESULTS, ValidationResults, ValidationSummary
 from er3a.pipeline.stages.validation.record import record
 from er3a.pipeline.stages.validation.report import report
@@ -214,16 +212,12 @@ def test_every_check_has_the_agreed_keys(folders, name):
             assert (abs(check["difference"]) <= check["tolerance"] + 1e-9) == (check["status"] == "pass")
 
 
-@pytest.mark.long
-def test_equal_inputs_give_equal_bytes_which_are_read_as_they_were_computed(study, folders, stored, tmp_path):
-    results, read = compute(study, "er3_600"), stored["er3_600"].results
-    write_results(tmp_path, study, "er3_600", STAGES["validation"], results, say)
+def test_what_is_read_is_written_as_the_same_bytes(study, folders, stored, tmp_path):
+    read = stored["er3a_c60_article"].results
+    write_results(tmp_path, study, "er3a_c60_article", STAGES["validation"], read, say)
     assert {path.name for path in tmp_path.iterdir()} == WRITTEN
     for path in tmp_path.iterdir():
-        assert path.read_bytes() == (folders["er3_600"] / path.name).read_bytes()
-    assert read.summary == results.summary
-    for name in table_types(RESULTS):
-        pd.testing.assert_frame_equal(getattr(read, name).frame(), getattr(results, name).frame())
+        assert path.read_bytes() == (folders["er3a_c60_article"] / path.name).read_bytes()
     assert list(read.checks.subject) == [check.subject for check in read.summary.checks]
 
 
