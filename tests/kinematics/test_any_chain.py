@@ -162,6 +162,7 @@ def test_any_chain_is_written_and_read_back(robot, tmp_path_factory):
     np.testing.assert_allclose(forward(again, q), forward(robot, q), rtol=0, atol=1e-11)
 
 
+@pytest.mark.long
 def test_a_coupled_arm_is_solved_in_the_angles_of_its_pendant():
     """Fanuc's J2 and J3: the closed form gives pendant angles, and the limit of their sum refuses some."""
     arm = make_arm(coupling=FANUC, combined=(CombinedLimit((0, 1, 1, 0, 0, 0), -1.5, 1.5),))

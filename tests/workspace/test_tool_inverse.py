@@ -179,7 +179,11 @@ def test_points_of_three_slides_are_a_box():
 
 
 @pytest.mark.parametrize(
-    "make", [lambda: load_robot("ur5e"), lambda: load_robot("lbr_iiwa_14"), crx_like, free_roll, scara, coupled]
+    "make",
+    [
+        *(lambda: load_robot("ur5e"), lambda: load_robot("lbr_iiwa_14"), scara, coupled),
+        *(pytest.param(make, marks=pytest.mark.long) for make in (crx_like, free_roll)),
+    ],
 )
 def test_solutions_reach_their_poses_within_the_limits(make, random):
     robot = make()
