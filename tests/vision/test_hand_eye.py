@@ -127,7 +127,7 @@ def test_the_refinement_ends_where_scipy_finds_the_least_squares():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("setup", "stated"), zip(SETUPS, (True, False), strict=True))
+@pytest.mark.parametrize(("setup", "stated"), list(zip(SETUPS, (True, False), strict=True)))
 def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):
     """Of 300 runs with 12 numbers: 3.5 standard deviations of each share, and 94 to 96 % in all."""
     held = pose_coverage(setup, stated, 300, 17)
