@@ -134,7 +134,10 @@ def test_the_sums_limit_is_named():
     found = limits_exceeded(arm, q).joints[0]
     assert (found.joints, found.side) == ((2, 3), "above")
     assert found.excess == pytest.approx(40 - np.degrees(0.5))
-    assert limit_margin(arm, q) == pytest.approx(0.5 - np.radians(40))
+    assert limit_margin(arm, q) == limit_margin(arm, -q) == pytest.approx(0.5 - np.radians(40))
+    slide = stanford().replace(combined=(CombinedLimit((0, 0, 2, 0, 0, 0), 0.0, 1.0),))
+    (found,) = limits_exceeded(slide, np.array([0, 0, 0.9, 0, 0, 0])).joints
+    assert (found.value, found.excess, found.limit) == pytest.approx((1800, 800, 1000))  # mm
 
 
 @pytest.mark.long
