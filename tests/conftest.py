@@ -32,10 +32,10 @@ LONGEST_S = 900
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of the finished small study are long; time limits of long ones and of those that run Snakemake."""
+    """Tests of the small study or of a stage's results of it are long; time limits of long ones and of Snakemake's."""
     for item in items:
         fixtures = getattr(item, "fixturenames", ())
-        if "small_study" in fixtures:
+        if {"small_study", "small_results"} & set(fixtures):
             item.add_marker(pytest.mark.long)
         if "shared_folder" in fixtures or item.get_closest_marker("long"):
             item.add_marker(pytest.mark.timeout(LONGEST_S))
