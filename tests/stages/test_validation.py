@@ -310,6 +310,7 @@ def set_of(*stated: tuple[float, str]) -> ReferenceSet:
         (((170, "claim"), (165, "official")), ["pass", "fail"]),
         (((170, "official"), (165, "claim")), ["pass", "conflict"]),
         (((170.4, "official"), (169.7, "cad")), ["pass", "pass"]),
+        (((170.7, "official"),), ["fail"]),
     ],
 )
 def test_conflicts_excuse_only_what_another_trustworthy_row_outweighs(stated, statuses):
