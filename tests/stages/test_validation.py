@@ -107,11 +107,11 @@ def edited_robot(study: Study, folder: Path, edit) -> Study:
     return study.model_copy(update={"robots": {**study.robots, "edited": entry}})
 
 
-def computed(study: Study, folder: Path) -> Stored[ValidationResults]:
+def computed(study: Study, folder: Path, name: str = "edited") -> Stored[ValidationResults]:
     """Results without the evidence of each entry, which has tests of its own and takes longest."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compute_module, "evidence_of_table", lambda robot, sets: None)
-        run.compute("validation", study, "edited", folder)
+        run.compute("validation", study, name, folder)
     return read_results(folder, RESULTS)
 
 
@@ -243,7 +243,7 @@ def test_one_wrong_number_fails_where_it_shows(study, tmp_path, edit, missed):
 def test_the_studys_tool_and_base_do_not_matter(study, folders, tmp_path):
     entry = study.entry("er3_600").model_copy(update={"tool": Placement(xyz_mm=[0.0, 0.0, 100.0])})
     moved = study.model_copy(update={"robots": {**study.robots, "er3_600": entry}})
-    run.compute("validation", moved, "er3_600", tmp_path)
+    computed(moved, tmp_path, "er3_600")
     assert (tmp_path / "checks.parquet").read_bytes() == (folders["er3_600"] / "checks.parquet").read_bytes()
 
 
