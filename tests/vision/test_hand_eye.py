@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from scipy.stats import t as student
 
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
@@ -123,7 +124,13 @@ def test_the_refinement_ends_where_scipy_finds_the_least_squares():
     assert found.used.all()
     np.testing.assert_allclose(found.X[:3, 3], least.x[:3], atol=1e-7)
     np.testing.assert_allclose(found.X[:3, :3], Rotation.from_rotvec(least.x[3:6]).as_matrix(), atol=1e-7)
-    np.testing.assert_allclose(found.scatter**2 * (6 * 15 - 12), 2 * least.cost, rtol=1e-9)
+    free = 6 * 15 - 12
+    np.testing.assert_allclose(found.scatter**2 * free, 2 * least.cost, rtol=1e-9)
+    variances = 2 * least.cost / free * np.diag(np.linalg.inv(least.jac.T @ least.jac))
+    half_width = student.ppf(0.975, free) * np.sqrt(variances.reshape(4, 3).sum(axis=1))
+    np.testing.assert_allclose(
+        np.linalg.norm(found.half_width.reshape(4, 3), axis=1)[[0, 2]], half_width[[0, 2]], rtol=1e-3
+    )
 
 
 @pytest.mark.long
