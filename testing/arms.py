@@ -217,6 +217,23 @@ def dh_matrix(convention: str, a: float, alpha: float, d: float, theta: float) -
     )
 
 
+def tools_by_hand(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Tool poses (n, 4, 4) of joints (n, joints), from standard rows, with slides and couplings."""
+    u = q if robot.coupling is None else q @ robot.coupling.T
+    T = np.tile(robot.base, (len(q), 1, 1))
+    for k in range(robot.rows):
+        moved = robot.direction[k] * u[:, k]
+        turned, along = (0 * moved, moved) if robot.sliding[k] else (moved, 0 * moved)
+        c, s = np.cos(turned + robot.offset[k]), np.sin(turned + robot.offset[k])
+        ca, sa, a = np.cos(robot.alpha[k]), np.sin(robot.alpha[k]), robot.a[k]
+        step = np.zeros((len(q), 4, 4))
+        step[:, 0] = np.stack([c, -s * ca, s * sa, a * c], axis=1)
+        step[:, 1] = np.stack([s, c * ca, -c * sa, a * s], axis=1)
+        step[:, 2, 1], step[:, 2, 2], step[:, 2, 3], step[:, 3, 3] = sa, ca, robot.d[k] + along, 1
+        T = T @ step
+    return T @ robot.tool
+
+
 def frame_by_hand(robot: Robot, q: np.ndarray, frame: int) -> np.ndarray:
     """Frame after joint ``frame``, base included, flange and tool not."""
     T = robot.base.copy()

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ import pytest
 import yaml
 
 from er3a.files.robot_library import load_robot
+from er3a.pipeline.cli import main
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
 from testing.processes import run
@@ -30,10 +32,10 @@ LONGEST_S = 900
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of the finished small study are long; time limits of long ones and of those that run Snakemake."""
+    """Tests of the small study or of a stage's results of it are long; time limits of long ones and of Snakemake's."""
     for item in items:
         fixtures = getattr(item, "fixturenames", ())
-        if "small_study" in fixtures:
+        if {"small_study", "small_results"} & set(fixtures):
             item.add_marker(pytest.mark.long)
         if "shared_folder" in fixtures or item.get_closest_marker("long"):
             item.add_marker(pytest.mark.timeout(LONGEST_S))
@@ -57,6 +59,27 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 def random() -> np.random.Generator:
     """A generator with a fixed seed."""
     return np.random.default_rng(20261120)
+
+
+Call = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Call:
+    """Calls ``er3a`` with some words in the project's folder, as a person would, but in this process."""
+
+    def called(*words: str | Path) -> subprocess.CompletedProcess[str]:
+        command = ["er3a", *map(str, words)]
+        with monkeypatch.context() as patch, warnings.catch_warnings():
+            patch.chdir(ROOT)
+            patch.setattr(sys, "argv", command)
+            patch.delenv("FORCE_COLOR", raising=False)
+            warnings.simplefilter("default")
+            with pytest.raises(SystemExit) as ended:
+                main()
+        return subprocess.CompletedProcess(command, ended.value.code or 0, *capfd.readouterr())
+
+    return called
 
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -3,40 +3,27 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 from er3a.pipeline.cli import main
 
-ROOT = Path(__file__).resolve().parents[1]
 
-
-def er3a(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "er3a", *map(str, words)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-
-
-@pytest.mark.long
-def test_check_says_what_a_file_is(tmp_path):
-    done = er3a("check", "data/robots/er3_600.yaml", "data/manual_refs/er3_600/axes.csv")
+def test_check_says_what_a_file_is(call):
+    done = call("check", "data/robots/er3_600.yaml", "data/manual_refs/er3_600/axes.csv")
     assert done.returncode == 0
     assert "data/robots/er3_600.yaml: a robot, in order" in done.stdout
 
 
-@pytest.mark.long
-def test_check_names_every_bad_file_and_goes_on(tmp_path):
+def test_check_names_every_bad_file_and_goes_on(call, tmp_path):
     bad = tmp_path / "bad.yaml"
     bad.write_text("kind: robot\nname: bad\n")
-    done = er3a("check", bad, "data/robots/er3_600.yaml", tmp_path / "none.yaml")
+    done = call("check", bad, "data/robots/er3_600.yaml", tmp_path / "none.yaml")
     assert done.returncode == 2
     assert done.stderr.count("error: ") == done.stderr.count("\n") == 2
     assert "a robot, in order" in done.stdout
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -48,8 +35,8 @@ def test_check_names_every_bad_file_and_goes_on(tmp_path):
         (("view", "nobody"), "no recordings below reports/nobody"),
     ],
 )
-def test_a_wrong_call_is_one_line_and_exit_code_2(words, told):
-    done = er3a(*words)
+def test_a_wrong_call_is_one_line_and_exit_code_2(call, words, told):
+    done = call(*words)
     assert done.returncode == 2
     assert told in done.stderr
     assert done.stderr.startswith("error: ")
@@ -115,10 +102,9 @@ def _own_sigterm():
     signal.signal(signal.SIGTERM, before)
 
 
-@pytest.mark.long
-def test_urdf_out_and_in(tmp_path):
+def test_urdf_out_and_in(call, tmp_path):
     urdf, robot = tmp_path / "arm.urdf", tmp_path / "arm.yaml"
-    assert er3a("export-urdf", "er3_600", "--output", urdf).returncode == 0
-    done = er3a("import-urdf", urdf, "--output", robot)
+    assert call("export-urdf", "er3_600", "--output", urdf).returncode == 0
+    done = call("import-urdf", urdf, "--output", robot)
     assert "differs from the URDF by at most" in done.stdout
-    assert er3a("check", robot).returncode == 0
+    assert call("check", robot).returncode == 0

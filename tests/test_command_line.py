@@ -25,32 +25,24 @@ ROOT = Path(__file__).resolve().parents[1]
 FIRST_FIVE = ("new", "check", "run", "verdicts", "view")
 
 
-def called(*words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "er3a", *map(str, words)]
-    kept = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "FORCE_COLOR")}
-    return subprocess.run(
-        command, cwd=ROOT, env=kept | environment, capture_output=True, text=True, check=False, timeout=120
-    )
-
-
-def test_a_bare_call_shows_the_five_commands_that_a_newcomer_needs():
-    done = called()
+def test_a_bare_call_shows_the_five_commands_that_a_newcomer_needs(call):
+    done = call()
     assert done.returncode == 0
     shown = [line.split()[1] for line in done.stdout.splitlines() if line.startswith("  er3a ")]
     assert tuple(shown) == FIRST_FIVE
     assert "\x1b" not in done.stdout
 
 
-def test_the_version_stands_in_one_place():
-    done = called("--version")
+def test_the_version_stands_in_one_place(call):
+    done = call("--version")
     assert (done.returncode, done.stdout) == (0, f"er3a {er3a.__version__}\n")
     project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     assert 'dynamic = ["version"]' in project
     assert er3a.__version__ not in project
 
 
-def test_all_commands_have_help():
-    shown = called("--help").stdout
+def test_all_commands_have_help(call):
+    shown = call("--help").stdout
     assert shown.index("A study") < shown.index("Robot files") < shown.index("Single jobs")
     assert "\x1b" not in shown
 
@@ -73,11 +65,10 @@ def test_completion_knows_commands_stages_and_robots(typed, offered):
     assert offered in done.stdout.split()
 
 
-@pytest.mark.long
-def test_check_for_programs(tmp_path):
+def test_check_for_programs(call, tmp_path):
     bad = tmp_path / "bad.yaml"
     bad.write_text("kind: robot\nname: bad\n")
-    done = called("check", "data/robots/er3_600.yaml", bad, "--json")
+    done = call("check", "data/robots/er3_600.yaml", bad, "--json")
     first, second = json.loads(done.stdout)
     assert done.returncode == 2
     stages = first.pop("stages")
@@ -88,13 +79,12 @@ def test_check_for_programs(tmp_path):
     assert done.stderr.startswith(f"error: {bad}: ")
 
 
-@pytest.mark.long
-def test_notes_go_to_standard_error_and_results_to_standard_output(tmp_path):
+def test_notes_go_to_standard_error_and_results_to_standard_output(call, tmp_path):
     urdf = tmp_path / "arm.urdf"
-    assert called("export-urdf", "er3_600", "--output", urdf).returncode == 0
+    assert call("export-urdf", "er3_600", "--output", urdf).returncode == 0
     text = urdf.read_text().replace("1.5707963267948966", "1.5708", 1)
     urdf.write_text(text)
-    done = called("import-urdf", urdf, "--output", tmp_path / "arm.yaml", "--snap", "--json")
+    done = call("import-urdf", urdf, "--output", tmp_path / "arm.yaml", "--snap", "--json")
     assert done.stderr.startswith("note: ")
     told = json.loads(done.stdout)
     assert told["output"] == str(tmp_path / "arm.yaml")
@@ -103,7 +93,7 @@ def test_notes_go_to_standard_error_and_results_to_standard_output(tmp_path):
 
 
 @pytest.mark.long
-def test_calibration_for_programs(tmp_path):
+def test_calibration_for_programs(call, tmp_path):
     robot = load_robot("er3_600")
     random = np.random.default_rng(1)
     q = random.uniform(np.maximum(robot.lower, -1.5), np.minimum(robot.upper, 1.5), (40, 6))
@@ -115,7 +105,7 @@ def test_calibration_for_programs(tmp_path):
         for angles, T in zip(q, forward(longer, q))
     ]
     table.write_text("\n".join(",".join(row) for row in (header, *rows)), encoding="utf-8")
-    done = called("calibrate", "er3_600", table, "--output", tmp_path / "new.yaml", "--json")
+    done = call("calibrate", "er3_600", table, "--output", tmp_path / "new.yaml", "--json")
     told = json.loads(done.stdout)
     (upper_arm,) = (entry for entry in told["entries"] if entry["name"] == "a2")
     assert abs(upper_arm["correction"] - 0.4) < 0.01
@@ -123,12 +113,12 @@ def test_calibration_for_programs(tmp_path):
     assert Path(told["output"]).is_file()
 
 
-def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(small_study):
+def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(call, small_study):
     results = small_study.folder / "results"
     study = small_study.folder / "config/small.yaml"
 
     def verdicts(*words: str) -> subprocess.CompletedProcess[str]:
-        return called("verdicts", "--study", study, "--results", results, *words)
+        return call("verdicts", "--study", study, "--results", results, *words)
 
     found = json.loads(verdicts("--json").stdout)
     assert {each["robot"] for each in found} == set(small_study.robots)
@@ -163,14 +153,14 @@ def test_a_run_ends_with_1_for_findings_and_with_2_for_an_input(small_study):
 
 
 @pytest.mark.long
-def test_diff_ends_with_1_if_anything_differs(small_study, tmp_path):
+def test_diff_ends_with_1_if_anything_differs(call, small_study, tmp_path):
     results = small_study.folder / "results"
-    same = called("diff", results, results)
+    same = call("diff", results, results)
     assert (same.returncode, same.stdout) == (0, "Nothing differs.\n")
-    assert json.loads(called("diff", results, results, "--json").stdout) == []
+    assert json.loads(call("diff", results, results, "--json").stdout) == []
     fewer = shutil.copytree(results, tmp_path / "fewer")
     shutil.rmtree(fewer / small_study.robots[0] / "inverse")
-    done = called("diff", results, fewer, "--json")
+    done = call("diff", results, fewer, "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)[0]["stage"] == "inverse"
 

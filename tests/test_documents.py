@@ -33,7 +33,6 @@ from testing.documents import PAGES, ROOT, blocks, commands, name_of, prose
 from testing.evidence import CAMPAIGNS
 from testing.links import broken_links
 
-NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("*.md"))
 SETTING = re.compile(r"`([a-z_]+: [^`]+)`")
 DOTTED = re.compile(r"`(validation|workspace|capability|inverse|trajectory|report)\.([a-z_]+)`")
 MODULES = {"report.py"}
@@ -66,18 +65,6 @@ def all_blocks(*languages: str) -> list[Any]:
 def test_python_in_documents_runs(block, monkeypatch):
     monkeypatch.chdir(ROOT)
     exec(compile(block, "a document", "exec"), {})
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda page: page.stem)
-def test_notebooks_run_to_their_end(notebook, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("matplotlib.pyplot.show", lambda: None)
-    cells = blocks(notebook, "{code-cell}")
-    assert len(cells) > 4
-    names: dict[str, Any] = {}
-    for cell in cells:
-        exec(compile(cell, notebook.name, "exec"), names)
 
 
 def merged(into: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:

@@ -31,9 +31,9 @@ def test_sound_files_are_accepted_and_read_as_they_are_written(tmp_path):
 
 @pytest.mark.long
 def test_damaged_files_are_refused_clearly_or_read_as_they_are_written(tmp_path):
-    found = run(150, 7, tmp_path)
+    found = run(60, 7, tmp_path)
     assert [(name, damage, outcome.fault) for name, damage, _, outcome in found if outcome.fault] == []
-    assert 10 < sum(outcome.accepted for *_, outcome in found) < 100
+    assert 4 < sum(outcome.accepted for *_, outcome in found) < 40
 
 
 def test_damage_is_the_same_for_the_same_seed():

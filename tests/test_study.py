@@ -172,3 +172,23 @@ def test_on_a_cluster_each_stage_is_a_group_of_its_own():
     profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text(encoding="utf-8"))
     views = {f"{verb}={{stage}}" for verb in ("record", "report")}
     assert {*profile["groups"]} == {f"compute_{stage}={stage}" for stage in STAGES} | views
+
+
+@pytest.mark.parametrize(
+    ("section", "change", "stages"),
+    [
+        ("workspace", {"samples": 200_008}, {"workspace"}),
+        ("capability", {"directions": 101}, {"workspace"}),
+        ("inverse", {"map_cells": 41}, {"inverse"}),
+        ("validation", {"round_trips": 201}, {"validation"}),
+        ("report", {"language": "zh"}, set()),
+    ],
+)
+def test_the_numbers_of_a_stage_depend_on_its_own_settings(study, study_with, section, change, stages):
+    other = study_with(lambda content: content.setdefault(section, {}).update(change))
+    for robot in study.robots:
+        of_robot = study.stages(robot)
+        differing = {
+            stage for stage in of_robot if study.computed_from(robot, stage) != other.computed_from(robot, stage)
+        }
+        assert differing == stages & set(of_robot)

@@ -12,3 +12,4 @@ STAGE_PAGES_OF_EACH_KIND = [
     "er3a_c60_article/validation.html",  # of a table that evidence contradicts
 ]
 PAGES_OF_EACH_KIND = [*OVER_ALL, *STAGE_PAGES_OF_EACH_KIND, "er3a_c60/teach.html"]
+PAGES_WITH_EACH_CONTROL = [*OVER_ALL, "er3a_c60/validation.html", "er3a_c60/trajectory.html", "er3a_c60/teach.html"]

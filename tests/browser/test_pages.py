@@ -17,7 +17,7 @@ from tests.browser.pages import OVER_ALL, PAGES, PAGES_OF_EACH_KIND
 from tests.conftest import ROBOTS
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", [*PAGES_OF_EACH_KIND, "er3a_c60_article/workspace.html", "er3_600/workspace.html"])
 def test_page_opens_clean(browser, small_study, page):
     path = small_study.folder / "reports" / page
     browser.get(path.as_uri())

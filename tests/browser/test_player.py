@@ -14,7 +14,6 @@ from er3a.kinematics.forward import frames
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style, stretch
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.page import render
-from testing import chromium
 from testing.small_study import ROOT
 
 pytestmark = pytest.mark.long
@@ -107,28 +106,6 @@ def test_it_plays_to_the_end_and_stops(page):
     until(page, lambda: clock(page).startswith("t = 2.000 s"))
     until(page, lambda: button.text == "Play")
     assert told(page) == "It bows."
-
-
-PLAYED = """
-const [seconds, done] = arguments;
-const button = document.querySelector(".player .play");
-let [first, frames] = [null, 0];
-const step = (now) => {
-  first ??= now;
-  frames += 1;
-  if (!document.querySelector("[data-playing]")) button.click();
-  if (now - first < 1000 * seconds) requestAnimationFrame(step);
-  else done(frames);
-};
-requestAnimationFrame(step);
-"""
-
-
-def test_one_processor_makes_thirty_frames_a_second_without_a_graphics_processor(page):
-    """What the browser computes for a frame; the rate itself depends on what else the machine does."""
-    before = chromium.processor_time(page)
-    frames = page.execute_async_script(PLAYED, 3)
-    assert (chromium.processor_time(page) - before) / frames < 1 / 30
 
 
 JOINTS = """return [...document.querySelectorAll(".player .joints dl > div")].map((cell) => {

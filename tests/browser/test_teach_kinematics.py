@@ -26,7 +26,7 @@ from testing.teach_kinematics import NEAR, SOLVE
 
 pytestmark = pytest.mark.long
 
-POSES, AGREE = 1000, 1e-9
+POSES, AGREE = 150, 1e-9
 STUDY = load_study("config/small.yaml")
 
 REPRESENT = """
@@ -62,7 +62,7 @@ def check_forward_and_measures(robot: Robot, q: np.ndarray, found: list[dict[str
         assert np.array([one["measures"][name] for one in found]) == pytest.approx(values, abs=AGREE)
 
 
-@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 def test_agrees_with_python_on_random_poses(page, name, random):
     robot = load_robot(name)
     q = joints_at_random(robot, random, POSES)
@@ -126,7 +126,7 @@ def test_iteration_reaches_poses_of_any_arm_and_stays_within_the_limits(page, ra
 
 
 @given(robot=arms(), data=st.data())
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_any_table_of_the_class_is_solved(page, robot, data):
     seed = data.draw(st.integers(0, 2**32 - 1))
     q = joints_at_random(robot, np.random.default_rng(seed), 10)
@@ -148,7 +148,7 @@ def test_tables_outside_the_class_have_forward_kinematics_and_a_reason(page, con
     check_forward_and_measures(robot, q, in_the_browser(page, robot, q))
 
 
-@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+@pytest.mark.parametrize("name", ["er3a_c60_article", "er3_600"])
 def test_singular_poses_keep_every_branch(page, name, random):
     """Wrist aligned, elbow straight, both: each row solves the pose, and Python's closed form has no branch more."""
     robot = load_robot(name)

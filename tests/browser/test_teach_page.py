@@ -105,7 +105,7 @@ def panel(browser, folder) -> Panel:
     return Panel(browser, folder / "er3a_c60.html").open()
 
 
-@pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])
+@pytest.mark.parametrize("name", ["er3a_c60_article", "er3_600"])
 def test_opens_clean_in_one_small_file(browser, folder, name):
     panel = Panel(browser, folder / f"{name}.html", name).open()
     panel.until(lambda: panel.browser.find_elements(By.CSS_SELECTOR, "#branches .solution"))
@@ -470,6 +470,7 @@ def test_any_arm_is_jogged_along_the_axes_that_its_joints_can_follow(other):
     assert (values(panel) - before)[-1] == pytest.approx(step)
 
 
+@pytest.mark.parametrize("other", ["scara", "iiwa"], indirect=True)
 def test_any_arm_refuses_values_in_words_and_in_the_joint_s_unit(other):
     robot, _, panel = other
     before = values(panel)
@@ -482,6 +483,7 @@ def test_any_arm_refuses_values_in_words_and_in_the_joint_s_unit(other):
         field.send_keys(Keys.TAB)
 
 
+@pytest.mark.parametrize("other", ["scara", "ur5e"], indirect=True)
 def test_any_arm_s_way_points_become_a_path_file(other, tmp_path):
     robot, at, panel = other
     panel.browser.execute_script("localStorage.clear()")

@@ -65,6 +65,7 @@ def test_pieces_with_their_margin_hold_the_mesh_and_come_again(tmp_path):
     assert content.excess_mm < 20
 
 
+@pytest.mark.long  # a kernel that takes five seconds to compile
 def test_what_stands_out_is_bounded_from_above_and_not_by_much():
     """A box of which the pieces hold all but a slice of 3 mm."""
     box = trimesh.creation.box((0.2, 0.1, 0.1))

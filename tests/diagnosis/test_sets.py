@@ -172,11 +172,9 @@ def test_the_first_set_is_all_single_entries_that_explain_and_no_more(arm, entry
     "wrong",
     [
         {"d5": 0.05, "a3": -0.03},
-        pytest.param({"alpha2": np.radians(5), "d4": -0.04}, marks=pytest.mark.long),
-        pytest.param({"offset2": np.radians(-35), "alpha3": np.radians(50)}, marks=pytest.mark.long),
-        pytest.param({"offset1": np.radians(12), "d1": 0.2}, marks=pytest.mark.long),
-        pytest.param({"direction4": 0.0, "a2": 0.011}, marks=pytest.mark.long),
-        pytest.param({"direction1": 0.0, "offset5": np.radians(-70)}, marks=pytest.mark.long),
+        {"alpha2": np.radians(5), "d4": -0.04},
+        {"offset2": np.radians(-35), "alpha3": np.radians(50)},
+        {"direction1": 0.0, "offset5": np.radians(-70)},
     ],
 )
 def test_pairs_are_solved_for(arm, wrong):
@@ -257,7 +255,7 @@ def test_a_fault_beside_references_that_are_off_is_named_as_what_leaves_least(ar
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+@pytest.mark.parametrize("name", ["er3a_c60"])
 def test_a_missed_reference_is_never_put_down_to_noise(name):
     """One reference moved beyond its half-width: the table can't meet it, so something is said about it."""
     robot, stated = load_robot(name), list(usable(load_references(name)))

@@ -134,7 +134,10 @@ def test_the_sums_limit_is_named():
     found = limits_exceeded(arm, q).joints[0]
     assert (found.joints, found.side) == ((2, 3), "above")
     assert found.excess == pytest.approx(40 - np.degrees(0.5))
-    assert limit_margin(arm, q) == pytest.approx(0.5 - np.radians(40))
+    assert limit_margin(arm, q) == limit_margin(arm, -q) == pytest.approx(0.5 - np.radians(40))
+    slide = stanford().replace(combined=(CombinedLimit((0, 0, 2, 0, 0, 0), 0.0, 1.0),))
+    (found,) = limits_exceeded(slide, np.array([0, 0, 0.9, 0, 0, 0])).joints
+    assert (found.value, found.excess, found.limit) == pytest.approx((1800, 800, 1000))  # mm
 
 
 @pytest.mark.long
@@ -162,6 +165,7 @@ def test_any_chain_is_written_and_read_back(robot, tmp_path_factory):
     np.testing.assert_allclose(forward(again, q), forward(robot, q), rtol=0, atol=1e-11)
 
 
+@pytest.mark.long
 def test_a_coupled_arm_is_solved_in_the_angles_of_its_pendant():
     """Fanuc's J2 and J3: the closed form gives pendant angles, and the limit of their sum refuses some."""
     arm = make_arm(coupling=FANUC, combined=(CombinedLimit((0, 1, 1, 0, 0, 0), -1.5, 1.5),))

@@ -141,6 +141,7 @@ def test_wrong_shapes_are_refused(robot):
         inverse_batch(robot, T, np.array([[0.0] * 6, [np.nan] * 6, [0.0] * 6]))
 
 
+@pytest.mark.long
 def test_other_arms_are_solved_by_their_class():
     arm = make_arm(d=[0.3, 0, 0, 0.35, 0.02, 0.08])
     q = np.random.default_rng(4).uniform(-2, 2, (50, 6))

@@ -19,6 +19,8 @@ from er3a.kinematics.numerical import solve
 from er3a.kinematics.rank_loss import dependent_axes, rank_losses, scaled_jacobian
 from er3a.robots.robot import CombinedLimit, Robot
 
+pytestmark = pytest.mark.long  # kernels that take half a minute to compile
+
 H = np.pi / 2
 UR5 = ([0, -0.425, -0.39225, 0, 0, 0], [H, 0, 0, H, -H, 0], [0.089159, 0, 0, 0.10915, 0.09465, 0.0823])
 CRX = ([0, 0.71, 0, 0, 0, 0], [-H, np.pi, -H, H, -H, np.pi], [0, 0, 0, -0.54, 0.15, -0.16])
@@ -367,7 +369,6 @@ def test_a_slot_has_the_turn_that_keeps_a_limit_of_a_sum():
 GANTRY = ([0, 0, 0, 0.1, 0, 0], [H, H, 0, -H, H, 0], [0, 0, 0, 0.2, 0, 0.15])
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("turns", "slides"),
     [((0.0, 0.4, 0.7), (1, 1, 0)), ((0.5, 0.4, 0.0), (0, 1, -1)), ((np.pi, 0.4, 0.7), (1, -1, 0))],

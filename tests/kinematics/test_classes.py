@@ -19,6 +19,8 @@ from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.scara import scara, solve_scara
 from er3a.kinematics.classes.six_revolute import CERTAIN, prepared, solve_six_revolute
 
+pytestmark = pytest.mark.long  # kernels that take half a minute to compile
+
 H = np.pi / 2
 ROWS = {
     "ur5": ([0, -0.425, -0.39225, 0, 0, 0], [H, 0, 0, H, -H, 0], [0.089159, 0, 0, 0.10915, 0.09465, 0.0823]),

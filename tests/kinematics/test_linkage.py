@@ -11,6 +11,8 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.robots.robot import Robot
 
+pytestmark = pytest.mark.long  # kernels that take half a minute to compile
+
 H = np.pi / 2
 PALLETIZER = [(0.15, H, 0.6), (0.8, 0, 0), (0.7, 0, 0), (0.2, -H, 0), (0, 0, -0.15)]
 LEVELLED = {  # rows, what moves each, limits of the joints
@@ -59,10 +61,7 @@ def found_from(name: str, T: np.ndarray, random: np.random.Generator) -> list[np
     return found
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["parallelogram", *(pytest.param(name, marks=pytest.mark.long) for name in LEVELLED if name != "parallelogram")],
-)
+@pytest.mark.parametrize("name", LEVELLED)
 def test_a_levelled_arm_has_all_solutions_by_the_class_of_its_chain(name, random):
     robot, peers = levelled(name), 0
     for own in random.uniform(robot.lower, robot.upper, (6, robot.joints)):

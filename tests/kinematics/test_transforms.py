@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError, ShapeError
+from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import (
     check_poses,
     rot_x,
@@ -135,3 +136,10 @@ def test_rpy_along_points_z_along_the_direction(direction):
     roll, pitch, yaw = rpy_along(np.array(direction))
     np.testing.assert_allclose(Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()[:, 2], direction, atol=1e-12)
     assert yaw == 0
+
+
+def test_angles_are_wrapped_to_half_a_turn_either_way_and_half_a_turn_is_positive():
+    angles = np.array([np.pi, -np.pi, 3 * np.pi, np.pi + 1e-9, -0.5, 6.5])
+    np.testing.assert_allclose(
+        wrap_to_pi(angles), [np.pi, np.pi, np.pi, 1e-9 - np.pi, -0.5, 6.5 - 2 * np.pi], atol=1e-14
+    )

@@ -14,6 +14,8 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import DependentJoints, Iteration
 from er3a.robots.robot import Robot
 
+pytestmark = pytest.mark.long  # kernels that take half a minute to compile
+
 PAIRS = list(combinations(range(6), 2))
 Rows = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
@@ -95,7 +97,6 @@ def test_every_order_finds_its_own_joints_and_nothing_else(travel, random):
             assert apart.min() > 1e-6
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("geometry", [general, special])
 def test_many_starts_find_nothing_more(geometry, random):
     peers = 0

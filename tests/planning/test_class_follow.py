@@ -64,7 +64,10 @@ def test_scara_follows_a_line_as_plane_trigonometry_has_it(side):
     np.testing.assert_allclose(acceleration[2:-2], np.gradient(speed, t, axis=0)[2:-2], atol=0.02)
 
 
-@pytest.mark.parametrize("robot", [THREE, FIVE, SIX])
+LONG_TO_COMPILE = [pytest.param(robot, marks=pytest.mark.long) for robot in (FIVE, SIX)]
+
+
+@pytest.mark.parametrize("robot", [THREE, *LONG_TO_COMPILE])
 def test_points_and_directions_of_the_tool_are_met_between_the_points_solved(robot, random):
     q = random.uniform(0.3, 0.9, robot.joints)
     T = forward(robot, np.stack([q, q + random.uniform(-0.1, 0.1, robot.joints)]))

@@ -99,6 +99,7 @@ def test_timetable_is_kept_and_never_runs_backwards(random):
         np.testing.assert_allclose(v[halts], 0, atol=1e-12)
         np.testing.assert_allclose(v[[0, -1]], 0, atol=1e-12)
         assert (law(np.linspace(0, times[-1], 2001))[1] >= -1e-12).all()
+        np.testing.assert_allclose(law(times[1:] * (1 - 1e-12))[0], progress[1:], atol=1e-9)
         t = (times[:-1] + 0.3 * np.diff(times))[:, None] + np.array([0.0, 0.01])
         assert max(derivative_errors(law, t.ravel(), 1e-6)) < 1e-4
 

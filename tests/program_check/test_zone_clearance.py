@@ -103,8 +103,7 @@ def line_corner(rng, size, turn):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("turn", [0.0, 0.1])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("seed", "turn"), [(0, 0.0), (1, 0.1)])
 def test_no_overlap_of_a_way_between_two_lines_goes_unnoticed(seed, turn):
     """Against blends of the tool's poses, solved one by one: parabolas and points of the triangle."""
     rng = np.random.default_rng(seed)

@@ -26,7 +26,7 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.inverse.compute import compute
 from er3a.pipeline.stages.inverse.model import RESULTS, SINGULAR_PARTS, InverseResults, TargetResult
 from er3a.pipeline.stages.inverse.shown_targets import MOST_SHOWN, shown_targets
-from er3a.pipeline.study import Study, load_study
+from er3a.pipeline.study import Study
 from er3a.selection.rules import RULES
 
 ROOT = Path(__file__).parents[2]
@@ -223,17 +223,6 @@ def test_round_trips_tell_when_the_solver_fails(monkeypatch):
     assert trips.own_found == trips.poses - 1
     assert trips.worst_own == pytest.approx(1e-3)
     assert trips.worst_position > 1e-5
-
-
-@pytest.mark.long
-def test_results_are_the_same_bytes_in_another_process(tmp_path, monkeypatch):
-    words = ["compute", "inverse", "er3a_c60", "--study", "config/small.yaml", "--results", str(tmp_path / "there")]
-    subprocess.run([sys.executable, "-m", "er3a", *words], check=True, cwd=ROOT, capture_output=True)
-    monkeypatch.chdir(ROOT)
-    run.compute("inverse", load_study("config/small.yaml"), "er3a_c60", tmp_path / "here")
-    for file in ("summary.json", "solutions.parquet"):
-        there = tmp_path / "there" / "er3a_c60" / "inverse" / file
-        assert there.read_bytes() == (tmp_path / "here" / file).read_bytes()
 
 
 def test_all_targets_solved_is_a_pass_and_none_a_fail(tmp_path):

@@ -86,13 +86,6 @@ def test_a_finding_leads_to_its_moment_of_the_motion(stored):
     assert np.interp(found.program_s, rows.t_s, rows.q_deg[:, 2]) == pytest.approx(105.0, abs=0.01)
 
 
-@pytest.mark.long
-def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
-    run.compute("programs", study, "er3_600", tmp_path)
-    for file in sorted(folders["er3_600"].iterdir()):
-        assert (tmp_path / file.name).read_bytes() == file.read_bytes()
-
-
 def test_an_unexpected_fault_fails_the_stage(study, tmp_path):
     listed = tmp_path / "programs.yaml"
     entry = {"name": "far", "title": "Far", "file": "data/programs/faults/out_of_reach.src"}

@@ -73,14 +73,6 @@ def test_tables_say_what_the_summary_says(folders):
         assert each.error_mm.together >= max(each.error_mm.camera, each.error_mm.calibration, each.error_mm.table)
 
 
-@pytest.mark.long
-@pytest.mark.long
-def test_equal_inputs_give_equal_bytes(study, folders, tmp_path):
-    run.compute("vision", study, "er3_600", tmp_path)
-    for file in folders["er3_600"].iterdir():
-        assert file.read_bytes() == (tmp_path / file.name).read_bytes(), file.name
-
-
 def test_a_robot_without_a_camera_says_so(study, tmp_path):
     entry = study.robots["er3_600"].model_copy(update={"vision": None})
     without = study.model_copy(update={"robots": {"er3_600": entry}})

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from scipy.stats import t as student
 
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
@@ -123,25 +124,22 @@ def test_the_refinement_ends_where_scipy_finds_the_least_squares():
     assert found.used.all()
     np.testing.assert_allclose(found.X[:3, 3], least.x[:3], atol=1e-7)
     np.testing.assert_allclose(found.X[:3, :3], Rotation.from_rotvec(least.x[3:6]).as_matrix(), atol=1e-7)
-    np.testing.assert_allclose(found.scatter**2 * (6 * 15 - 12), 2 * least.cost, rtol=1e-9)
+    free = 6 * 15 - 12
+    np.testing.assert_allclose(found.scatter**2 * free, 2 * least.cost, rtol=1e-9)
+    variances = 2 * least.cost / free * np.diag(np.linalg.inv(least.jac.T @ least.jac))
+    half_width = student.ppf(0.975, free) * np.sqrt(variances.reshape(4, 3).sum(axis=1))
+    np.testing.assert_allclose(
+        np.linalg.norm(found.half_width.reshape(4, 3), axis=1)[[0, 2]], half_width[[0, 2]], rtol=1e-3
+    )
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("stated", [True, False])
-@pytest.mark.parametrize("setup", SETUPS)
+@pytest.mark.parametrize(("setup", "stated"), list(zip(SETUPS, (True, False), strict=True)))
 def test_intervals_hold_the_truth_as_often_as_they_say(setup, stated):
-    """Of 600 runs with 12 numbers: three standard deviations of each share, and 94 to 96 % in all."""
-    held = pose_coverage(setup, stated, 600, 17)
-    assert (np.abs(held - 0.95) < 3.5 * np.sqrt(0.95 * 0.05 / 600)).all()
+    """Of 300 runs with 12 numbers: 3.5 standard deviations of each share, and 94 to 96 % in all."""
+    held = pose_coverage(setup, stated, 300, 17)
+    assert (np.abs(held - 0.95) < 3.5 * np.sqrt(0.95 * 0.05 / 300)).all()
     assert 0.94 < held.mean() < 0.96
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("setup", SETUPS)
-def test_intervals_hold_the_truth_in_ten_thousand_runs(setup):
-    held = np.mean([pose_coverage(setup, stated, 1250, 100 * k) for k in range(4) for stated in (True, False)], axis=0)
-    assert (held > 0.94).all()
-    assert (held < 0.96).all()
 
 
 @pytest.mark.parametrize("setup", SETUPS)
@@ -177,8 +175,8 @@ def test_a_shifted_board_is_named_though_no_angle_tells_it():
 
 @pytest.mark.long
 def test_sound_sets_name_hardly_any_sample():
-    named = [len(calibrate_hand_eye(a_set("eye_in_hand", seed, 12)).suspects) for seed in range(60)]
-    assert sum(named) <= 4  # 0.6 to be expected at one false alarm in a hundred sets
+    named = [len(calibrate_hand_eye(a_set("eye_in_hand", seed, 12)).suspects) for seed in range(25)]
+    assert sum(named) <= 2  # 0.25 to be expected at one false alarm in a hundred sets
 
 
 def test_repeated_poses_are_named():
@@ -190,12 +188,11 @@ def test_repeated_poses_are_named():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("setup", SETUPS)
-def test_directions_say_what_is_excluded_and_what_can_not_be_told(setup, seed):
-    directions = calibrate_hand_eye(a_set(setup, seed)).directions
+def test_directions_say_what_is_excluded_and_what_can_not_be_told(setup):
+    directions = calibrate_hand_eye(a_set(setup, 0)).directions
     assert [each.status for each in directions] == ["best", "same_problem", "excluded", "excluded"]
-    samples = a_set(setup, seed)
+    samples = a_set(setup, 0)
     inverted = CalibrationSet(setup, samples.flange, np.linalg.inv(samples.target))
     by_inverse = {
         (each.flange_inverted, each.target_inverted): each.status for each in calibrate_hand_eye(inverted).directions
@@ -223,8 +220,10 @@ def test_a_board_of_another_size_is_named_with_the_factor():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("stream", ["flange", "target", "both"])
-@pytest.mark.parametrize("how", ["quaternion", "kuka", "static_xyz", "transposed"])
+@pytest.mark.parametrize(
+    ("stream", "how"),
+    [("flange", "quaternion"), ("target", "kuka"), ("both", "static_xyz"), ("flange", "transposed"), ("both", "kuka")],
+)
 def test_orientations_read_by_another_convention_are_named(stream, how):
     """Written by scipy in one convention, taken for another: A, B, C in columns of roll, pitch, yaw, ..."""
     samples = a_set("eye_in_hand", 14)

@@ -17,7 +17,7 @@ from er3a.workspace.causes import (
 from er3a.workspace.cavities import Cavity
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.proof import in_section
-from testing.arms import dh_matrix, made_of
+from testing.arms import made_of, tools_by_hand
 
 TURN = 2 * np.pi
 DEG = np.pi / 180
@@ -65,15 +65,7 @@ def share_by_hand(robot: Robot, cavity: Cavity, lower: np.ndarray, upper: np.nda
     for limit in robot.combined:
         total = q @ np.array(limit.factors)
         q = q[(total >= limit.lower - sums) & (total <= limit.upper + sums)]
-    moved = q if robot.coupling is None else q @ robot.coupling.T
-    points = np.empty((len(q), 3))
-    for n, row in enumerate(moved):
-        T = robot.base
-        for k in range(robot.rows):
-            shift = robot.direction[k] * row[k]
-            theta, d = (0.0, shift) if robot.sliding[k] else (shift, 0.0)
-            T = T @ dh_matrix("standard", robot.a[k], robot.alpha[k], robot.d[k] + d, theta + robot.offset[k])
-        points[n] = T[:3, 3]
+    points = tools_by_hand(robot, q)[:, :3, 3]
     x, y, z = ((points - frame.origin) @ frame.R.T).T
     rho = x if frame.bar else np.hypot(x, y)
     hit = [((rho > a) & (rho < b) & (z > c) & (z < d)).any() for a, b, c, d in cavity.cells]

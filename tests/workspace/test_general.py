@@ -85,7 +85,7 @@ def test_it_agrees_with_the_proof_for_spherical_wrists():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("lower_2", "upper_2", "turn"), [(0.5, 2.5, np.pi), (-1.0, 2.5, np.pi), (0.5, 2.5, 1.2)])
+@pytest.mark.parametrize(("lower_2", "upper_2", "turn"), [(-1.0, 2.5, np.pi), (0.5, 2.5, 1.2)])
 def test_bounds_of_a_scara_hold_the_volume_that_a_formula_gives(lower_2, upper_2, turn):
     proof, _ = prove_general(general_arm(scara(lower_2, upper_2, turn))[0], 0.0, 12_000, 1)
     nearest = 0.0 if lower_2 < 0 < upper_2 else min(abs(lower_2), abs(upper_2))
@@ -173,7 +173,7 @@ slides = st.tuples(st.just(False), *[st.booleans()] * 5)
 
 
 @pytest.mark.long
-@settings(max_examples=10, deadline=None, phases=[Phase.generate])
+@settings(max_examples=4, deadline=None, phases=[Phase.generate])
 @given(
     lengths,
     lengths,

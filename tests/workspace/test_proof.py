@@ -78,12 +78,9 @@ def proven(request):
 @pytest.mark.long
 def test_no_sample_lies_in_an_empty_cell(proven):
     robot, section = proven
-    filled = 0.0
-    for seed in range(4):  # ten million over the three arms
-        states = section.status(*about_axis_1(robot, forward(robot, samples(robot, 850_000, seed))[:, :3, 3]))
-        assert not (states == EMPTY).any()
-        filled += (states == FILLED).mean() / 4
-    assert filled > 0.9
+    states = states_of_samples(robot, section, 400_000)
+    assert not (states == EMPTY).any()
+    assert (states == FILLED).mean() > 0.9
 
 
 @pytest.mark.long
@@ -91,14 +88,14 @@ def test_filled_cells_are_reached_at_random_points(proven, random):
     robot, section = proven
     R, origin = section_frame(robot)
     low, high = section_arm(robot).heights
-    n = 400
+    n = 150
     rho, azimuth = section_arm(robot).reach * np.sqrt(random.random(n)), 2 * np.pi * random.random(n)
     z = random.uniform(low, high, n)
     chosen = section.status(rho, azimuth, z) == FILLED
     points = np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=1)[chosen] @ R + origin
     missed = [point for point in points if not reachable(robot, point, random)]
     missed = [point for point in missed if not reachable(robot, point, random, 200_000)]  # few orientations do
-    assert len(points) > 100
+    assert len(points) > 50
     assert not missed
 
 
@@ -239,7 +236,7 @@ small = st.floats(-0.15, 0.15)
 
 
 @pytest.mark.long
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(
     st.lists(st.tuples(angles, st.floats(0, 7)), min_size=6, max_size=6),
     st.tuples(small, small, small, angles, angles, angles),

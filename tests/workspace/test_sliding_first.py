@@ -11,7 +11,7 @@ from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.lookup import EMPTY, FILLED
 from er3a.workspace.proven import Proven, prove_robot
 from er3a.workspace.surface import surface_of
-from testing.arms import DEG, dh_matrix, gantry, made_of, palletiser, placement
+from testing.arms import DEG, dh_matrix, gantry, made_of, palletiser, placement, tools_by_hand
 
 TILTED = placement([0.3, -0.2, 0.5], [0.4, -0.7, 1.1])
 ARM = [
@@ -103,13 +103,13 @@ def test_empty_cells_hold_no_point_and_filled_ones_are_reached(make, random):
     span = robot.upper - robot.lower
     q = robot.lower + span * np.clip(random.uniform(-0.2, 1.2, (20_000, robot.joints)), 0, 1)  # many at limits
     q = np.array([row for row in q if not beyond_sums(robot, row).any()])
-    points = np.array([point_by_hand(robot, row) for row in q])
+    points = tools_by_hand(robot, q)[:, :3, 3]
     assert len(points) > 1000
     assert not (states(proven, points) == EMPTY).any()
 
     box = random.uniform(points.min(axis=0), points.max(axis=0), (4000, 3))
-    filled = box[states(proven, box) == FILLED][:25]
-    assert len(filled) == 25
+    filled = box[states(proven, box) == FILLED][:12]
+    assert len(filled) == 12
     assert all(is_reached(robot, point, random) for point in filled)
 
 
