@@ -66,15 +66,17 @@ def _compiled(function: Function, kind: type[_Kernel], **wrappers: bool) -> Func
 
 
 class _Kernel(CPUDispatcher):
+    _cache: Any
+
     def compile(self, sig: Any) -> Any:
         with _alone(self._cache, self.py_func.__qualname__):
             return super().compile(sig)  # type: ignore[no-untyped-call]
 
-    def get_call_template(self, args: tuple[types.Type, ...], kws: dict[str, types.Type]) -> Any:
+    def get_call_template(self, args: Any, kws: Any) -> Any:
         """Numba compiles a call with a constant integer for that very integer; one version serves all."""
-        return super().get_call_template(  # type: ignore[no-untyped-call]
-            tuple(types.unliteral(arg) for arg in args), {name: types.unliteral(arg) for name, arg in kws.items()}
-        )
+        unliteral: Callable[[Any], Any] = types.unliteral
+        named = {name: unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(map(unliteral, args)), named)  # type: ignore[no-untyped-call]
 
 
 class _InnerKernel(_Kernel):

@@ -115,16 +115,14 @@ def _load_libraries() -> None:
     """Import what jobs import, but for Rerun, which starts threads as it is loaded: they do not survive a fork."""
     from importlib import import_module
 
-    from er3a.pipeline import cli
     from er3a.pipeline.stages.registry import STAGES
 
-    assert cli.main
     for stage in STAGES.values():
         import_module(stage.verdict_messages)
         for verb in ("compute", "report"):
             with suppress(ImportError):  # the job that needs it says so
                 stage.module(verb)
-    for module in ("viewing.index", "teach.panel"):
+    for module in ("cli", "viewing.index", "teach.panel"):
         import_module(f"er3a.pipeline.{module}")
 
 

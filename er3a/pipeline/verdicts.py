@@ -10,7 +10,7 @@ from er3a.pipeline.results import NotComputed, Status, is_computed, read_verdict
 from er3a.pipeline.study import Study
 
 Level = Literal["caution", "fail"]
-NOT_EXAMINED = "not_examined"
+NOT_EXAMINED: Literal["not_examined"] = "not_examined"
 _COUNTED: dict[Level, tuple[Status, ...]] = {"caution": ("caution", "fail"), "fail": ("fail",)}
 
 
