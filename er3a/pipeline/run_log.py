@@ -6,6 +6,8 @@ A logger plugin of Snakemake, which writes its own log into ``.snakemake/log/`` 
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 import time
 from collections.abc import Mapping
@@ -20,23 +22,27 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
+from er3a.pipeline import job_server
+
 MARKS = {"pass": "✓", "caution": "!", "fail": "✗"}
 NO_VERDICT = "–"
+INDEX_EVERY_S = 25.0
 HEAVY = {"sample_workspace": 6.0, "compute_workspace": 8.0, "compute_validation": 5.0, "compute_programs": 5.0}
 """Jobs beside the others, by rule: what they take on average, in units of a page."""
 
 Expected = Mapping[tuple[str, str], str]
 
 
-def logger_words(expected: Expected) -> list[str]:
+def logger_words(study: Path, expected: Expected) -> list[str]:
     """The words that make Snakemake, called in this process, report to a person in this way.
 
     Parameters
     ----------
-    expected : verdicts that the study expects, by robot and stage
+    study : its file
+    expected : verdicts that it expects, by robot and stage
     """
     module = ModuleType("snakemake_logger_plugin_er3a")
-    module.LogHandler = type("LogHandler", (RunLog,), {"expected": expected})  # type: ignore[attr-defined]
+    module.LogHandler = type("LogHandler", (RunLog,), {"study": study, "expected": expected})  # type: ignore[attr-defined]
     module.LogHandlerSettings = RunLogSettings  # type: ignore[attr-defined]
     LoggerPluginRegistry().register_plugin(module.__name__, module)
     return ["--logger", "er3a"]
@@ -50,6 +56,7 @@ class RunLogSettings(LogHandlerSettingsBase):
 class RunLog(LogHandlerBase):
     """Writes to standard error; records come one at a time, from one thread."""
 
+    study = Path("config/config.yaml")
     expected: Expected = {}
     writes_to_stream = True
     writes_to_file = False
@@ -63,6 +70,8 @@ class RunLog(LogHandlerBase):
         self._sampled: dict[tuple[str, str], float] = {}
         self._left: dict[str, int] = {}
         self._done = 0.0
+        self._index: subprocess.Popen[bytes] | None = None
+        self._indexed = -INDEX_EVERY_S
         self._bar = _bar() if sys.stderr.isatty() and not self.common_settings.nocolor else None
 
     def emit(self, record: LogRecord) -> None:
@@ -80,12 +89,15 @@ class RunLog(LogHandlerBase):
             logs = ", ".join(str(log) for log in job.get("log") or ())
             self._print(f"✗ {job.get('rule_msg') or job.get('rule_name')}: ended with an error; see {logs}")
         elif event is None and (record.levelno >= WARNING or record.getMessage().startswith("Nothing to be done")):
-            self._print(record.getMessage())
+            if "output files of rule index were not present" not in record.getMessage():  # written now and then, below
+                self._print(record.getMessage())
 
     def close(self) -> None:
-        """Take the bar away."""
+        """Take the bar away, and let an index that is being written be finished."""
         if self._bar:
             self._bar.stop()
+        if self._index:
+            self._index.wait()
         super().close()
 
     def _finish(self, job: int) -> None:
@@ -103,9 +115,23 @@ class RunLog(LogHandlerBase):
             took = seconds + self._sampled.get(of, 0.0)
             mark = MARKS.get(status, NO_VERDICT)
             self._print(f"{mark} {of[0]}  {stage:<10}  {status.replace('_', ' ')}{note}  {took:.0f} s", self._rest())
+        elif rule == "report" and self._left.get("index"):
+            self._write_index()
         if self._bar:
             share = self._done / max(self._done + self._weight_left(), 1e-9)
             self._bar.update(self._bar.task_ids[0], completed=share, description=self._rest())
+
+    def _write_index(self) -> None:
+        """Have the index written with what is there; that of the whole run comes last, as one of its jobs."""
+        if time.monotonic() - self._indexed < INDEX_EVERY_S or (self._index and self._index.poll() is None):
+            return
+        self._indexed = time.monotonic()
+        self._index = subprocess.Popen(
+            [sys.executable, "-m", "er3a", "index", "--study", str(self.study)],
+            env=os.environ | job_server.SETTINGS,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
 
     def _weight_left(self) -> float:
         return sum(HEAVY.get(rule, 1.0) * max(n, 0) for rule, n in self._left.items())

@@ -79,7 +79,7 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     plain = ["--nocolor"] if os.environ.get("NO_COLOR") else []
     expected = {(name, stage): verdict for name in study.names for stage, verdict in study.entry(name).expect.items()}
     own_log = asked.logger or asked.verbose or asked.printshellcmds or asked.debug_dag
-    shown = [] if own_log else logger_words(expected)
+    shown = [] if own_log else logger_words(study_file, expected)
     on_this_machine = not (asked.executor or asked.profile or asked.workflow_profile)
     with job_server.running(lock) if on_this_machine else nullcontext():
         return _snakemake(

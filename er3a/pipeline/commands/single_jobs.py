@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 from pathlib import Path
 from typing import Annotated
 
@@ -132,10 +133,12 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
     from er3a.pipeline.viewing.index import write_index
 
     shown = _study_to_show(study)
-    with house_style():
+    reports.mkdir(parents=True, exist_ok=True)
+    with (reports / ".index.lock").open("w") as lock, house_style():
+        fcntl.flock(lock, fcntl.LOCK_EX)  # a run writes it now and then while it lasts
         write_index(shown, results, reports)
-    for page in OVERALL:
-        write_checksum(reports / page)
+        for page in OVERALL:
+            write_checksum(reports / page)
 
 
 def _study_to_show(file: Path) -> Study:
