@@ -88,9 +88,8 @@ class RunLog(LogHandlerBase):
             job = record.__dict__
             logs = ", ".join(str(log) for log in job.get("log") or ())
             self._print(f"✗ {job.get('rule_msg') or job.get('rule_name')}: ended with an error; see {logs}")
-        elif event is None and (record.levelno >= WARNING or record.getMessage().startswith("Nothing to be done")):
-            if "output files of rule index were not present" not in record.getMessage():  # written now and then, below
-                self._print(record.getMessage())
+        elif event is None and _concerns_a_person(record):
+            self._print(record.getMessage())
 
     def close(self) -> None:
         """Take the bar away, and let an index that is being written be finished."""
@@ -148,6 +147,13 @@ class RunLog(LogHandlerBase):
             self._bar.console.print(line, markup=False, highlight=False)
         else:
             print(f"{line}  ({rest})" if rest else line, file=sys.stderr, flush=True)
+
+
+def _concerns_a_person(record: LogRecord) -> bool:
+    text = record.getMessage()
+    if "output files of rule index were not present" in text:  # it was written meanwhile, by this log
+        return False
+    return record.levelno >= WARNING or text.startswith("Nothing to be done")
 
 
 def _bar() -> Any:
