@@ -83,7 +83,14 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     on_this_machine = not (asked.executor or asked.profile or asked.workflow_profile)
     with job_server.running(lock) if on_this_machine else nullcontext():
         return _snakemake(
-            [*snakemake, *plain, *([] if asked.resources else _one_at_first()), *shown, *words, *study_words]
+            [
+                *snakemake,
+                *plain,
+                *(_one_at_first() if on_this_machine and not asked.resources else ()),
+                *shown,
+                *words,
+                *study_words,
+            ]
         )
 
 
