@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from contextlib import chdir
 from functools import partial
 from pathlib import Path
 
@@ -92,7 +94,8 @@ def stage_forms(robot: Robot) -> dict[str, str]:
 def check_file(path: Path) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
 
-    Of a study each file that it names is looked at too, from the folder that it is run in.
+    Of a study each file that it names is looked at too, from the folder that it is run in: that which its folder
+    ``config`` stands in, or else the working folder.
     """
     if path.suffix == ".csv" and path.parent.name == "targets":
         read_targets(path)
@@ -112,7 +115,9 @@ def check_file(path: Path) -> str:
         raise InputError(path, None, f"'{path.suffix}' files are none of er3a's inputs", "Give a .yaml or .csv file")
     kind = read_yaml(path).get("kind")
     if kind == "study":
-        check_study(path)
+        file = path.absolute()
+        with chdir(file.parent.parent if file.parent.name == "config" else Path.cwd()):
+            check_study(Path(os.path.relpath(file)))
         return _WORDS[kind]
     if not isinstance(kind, str) or kind not in _CHECKS:
         problem = "missing" if kind is None else f"'{kind}' is not known"

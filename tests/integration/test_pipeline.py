@@ -244,3 +244,19 @@ def test_two_runs_at_once_are_refused(small_study):
         done = small_study.make_run(check=False)
     assert done.returncode == 2
     assert done.stderr == "error: another run is active in this folder; wait for its end, or stop it\n"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("words", [("-n",), ("-np",), ("-nc1",), ("--dry-run",), ("--dryrun", "validation")])
+def test_a_dry_run_changes_nothing(small_study, words):
+    damaged = small_study.folder / "results/er3_600/validation/checks.parquet"
+    before, parts = damaged.read_bytes(), ("results", "reports", "logs")
+    damaged.write_bytes(before + b"x")
+    try:
+        there = {path: path.stat().st_mtime_ns for part in parts for path in (small_study.folder / part).rglob("*")}
+        done = small_study.make_run(*words)
+        assert "note: results/er3_600/validation/checks.parquet: damaged" in done.stderr
+        again = {path: path.stat().st_mtime_ns for part in parts for path in (small_study.folder / part).rglob("*")}
+        assert again == there
+    finally:
+        damaged.write_bytes(before)
