@@ -144,7 +144,7 @@ def _summary(
     volume = Volume(lower, upper, guess.value, (guess.low, guess.high))
     reach = search_reach(robot, grid, samples.q_kept)
     return WorkspaceSummary(
-        verdict=Verdict("caution", OnSurface(surface)) if surface else judged,
+        verdict=(Verdict("caution", OnSurface(surface)) if surface else judged).without(tool.unexamined),
         figures=_figures(reach, voids, volume, hull, settings.samples, surface),
         samples=settings.samples,
         sampling=settings.sampling,
