@@ -5,13 +5,13 @@ harmless:
 
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
-- *joined*: they overlap in all joint vectors tried because a joint joins them. Either no link with a shape is between the two, and
-  they overlap in all joint vectors drawn (of neighbours, being less than ``TOUCH`` apart counts as overlap if it is
-  proven). Or there are two joints between them (more if their axes meet), and a ball in the outer link about a point of
-  its joint's axis, or in its middle, is proven to touch the inner link in all joint vectors, as in a wrist. Only the
-  region around that joint is left out: what lies within the two bodies' girths of it, of hulls from the point that is
-  proven to hold them, of lines from where they are nearest in the pose that holds them farthest apart. What is left of
-  them is judged again, so that an arm that folds onto itself is seen;
+- *joined*: they overlap in all joint vectors drawn (``TRIED``) because a joint joins them. Either no link with a shape
+  is between the two (of neighbours, being less than ``TOUCH`` apart counts as overlap if it is proven). Or there are
+  two joints between them (more if their axes meet), and a ball in the outer link about a point of its joint's axis, or
+  in its middle, is proven to touch the inner link in all joint vectors, as in a wrist. Only the region around that
+  joint is left out: what lies within the two bodies' girths of it, of hulls from the point that is proven to hold them,
+  of lines from where they are nearest in the pose that holds them farthest apart. What is left of them is judged again,
+  so that an arm that folds onto itself is seen.
   A default shape that slides in a thicker one is joined to it likewise: of the guide only what lies along the sliding
   axis is left out, and of what slides nothing;
 - *overlaps*: they overlap in all joint vectors drawn, none in which they don't was found in the boxes, and no joint
