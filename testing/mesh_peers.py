@@ -1,11 +1,13 @@
 """Arms with the meshes of their URDF, as Pinocchio places them and Coal measures them: the oracle for an arm's shapes.
 
-Nothing of ours is used for them: Pinocchio reads the URDF and its meshes itself, and they are measured as triangles.
+Nothing of ours is used for them but where a mesh's file is: Pinocchio reads the URDF and its meshes itself, and they
+are measured as triangles.
 """
 
 from __future__ import annotations
 
 import warnings
+import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -21,6 +23,7 @@ from er3a.collision.distance_kernels import measure
 from er3a.collision.pairs import link_label
 from er3a.collision.shapes import arm_bodies, layout_of
 from er3a.formats.urdf import UrdfImport
+from er3a.formats.urdf_shapes import mesh_of
 from er3a.robots.robot import Robot
 
 APART = 1e-5  # m, by which two readers of one mesh in single precision and their placements differ
@@ -35,11 +38,11 @@ class MeshPeer:
     """
 
     def __init__(self, path: Path, imported: UrdfImport) -> None:
-        self.model = pin.buildModelFromUrdf(str(path))
-        folders = [str(parent) for parent in path.resolve().parents]
+        text = _with_files(path)
+        self.model = pin.buildModelFromXML(text)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of Pinocchio's conversions
-            self.geometry = pin.buildGeomFromUrdf(self.model, str(path), pin.GeometryType.COLLISION, folders)
+            self.geometry = pin.buildGeomFromUrdfString(self.model, text, pin.GeometryType.COLLISION)
         self.data, self.placed = self.model.createData(), pin.GeometryData(self.geometry)
         self.joints = [self.model.joints[self.model.getJointId(name)] for name in imported.joints]
         numbers = {joint.id: k + 1 for k, joint in enumerate(self.joints)} | {0: 0}
@@ -70,6 +73,21 @@ class MeshPeer:
         return least
 
 
+def _with_files(path: Path) -> str:
+    """A URDF's text with the files of its meshes where they are; without those that are nowhere."""
+    root = ElementTree.parse(path).getroot()
+    for link in root.iter("link"):
+        for collision in link.findall("collision"):
+            mesh = collision.find("geometry/mesh")
+            if mesh is None:
+                continue
+            if file := mesh_of(path, mesh.get("filename", "")):
+                mesh.set("filename", str(file))
+            else:
+                link.remove(collision)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
 @dataclass
 class HeldAgainstMeshes:
     """What became of all statements on an arm's pairs of links at some poses.
@@ -81,6 +99,8 @@ class HeldAgainstMeshes:
     joined_apart : greatest distance (m) of meshes whose shapes a joint joins; -inf where they touch in all poses
     errors_apart, errors_crossing : pairs of which it is said that the shapes are in error: whose meshes are apart in
         some pose, so that it is indeed the shapes; and whose meshes touch or cross in all, so that the file has it so
+    folded, folded_apart : in how many poses what is left of two joined links overlaps, and the greatest distance (m) of
+        their meshes in them; -inf where there are none
     slack : by how much (m) shapes were nearer than meshes, as the median over watched pairs and poses
     free : share of the poses that is free of self-collision
     """
@@ -90,6 +110,8 @@ class HeldAgainstMeshes:
     joined_apart: float = -np.inf
     errors_apart: list[str] = field(default_factory=list)
     errors_crossing: list[str] = field(default_factory=list)
+    folded: int = 0
+    folded_apart: float = -np.inf
     slack: float = np.nan
     free: float = np.nan
 
@@ -100,7 +122,7 @@ def held_against_meshes(path: Path, imported: UrdfImport, poses: int, seed: int)
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (poses, robot.joints))
     bodies, numbers = Bodies(robot, None), {link_label(k): k for k in range(robot.rows + 1)}
     clear, free = bodies.least(q)[0], bodies.free(q)
-    shapes = _shape_distances(robot, q)
+    shapes, overlaps = _shape_distances(robot, q), bodies.overlaps(q)
     watched = Counter((pair.first, pair.second) for pair, joined in zip(bodies.pairs, bodies.joined) if not joined)
     nearest, slack = np.full(poses, np.inf), []
     meshes = {(numbers[row.first], numbers[row.second]): np.empty(poses) for row in bodies.matrix}
@@ -120,6 +142,10 @@ def held_against_meshes(path: Path, imported: UrdfImport, poses: int, seed: int)
             found.wrong.append(f"{name}: said to overlap always, shapes {1000 * least.max():.2f} mm apart")
         if row.state == "joined" and own.max() > 0:
             found.joined_apart = max(found.joined_apart, float(own.max()))
+        folds = [k for k, one in enumerate(bodies.pairs) if bodies.joined[k] and (one.first, one.second) == pair]
+        if (folded := overlaps[:, folds].any(axis=1)).any():
+            found.folded += int(folded.sum())
+            found.folded_apart = max(found.folded_apart, float(own[folded].max()))
         if row.state == "overlaps":
             (found.errors_apart if own.max() > 0 else found.errors_crossing).append(name)
         if watched[pair] == count:

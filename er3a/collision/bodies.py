@@ -33,7 +33,7 @@ class Bodies:
     second : (P,) int, number of the other link's body, -1 for a solid
     pairs : P, what meets what
     matrix : what was found of each pair of links
-    unexamined : pairs whose shapes overlap in every pose for no reason, so that what overlaps is left out
+    unexamined : pairs whose shapes overlap in all joint vectors tried for no reason, so that what overlaps is left out
     joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """

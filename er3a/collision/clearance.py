@@ -20,7 +20,7 @@ class Clearance:
 
     Attributes
     ----------
-    distance : (N,), m; negative where something overlaps, by the depth
+    distance : (N,), m, over the pairs of bodies that can meet; negative where something overlaps, by the depth
     pair : N, what is nearest to what; None where nothing can meet
     """
 

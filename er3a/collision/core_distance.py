@@ -23,7 +23,8 @@ HULL, CYLINDER, HALF_SPACE = 0, 1, 2
 EXACT = 1e-11  # m, to which the iteration goes on
 TOUCHING = 1e-9  # m; cores that are nearer overlap
 ROUNDS = 64
-_V, _WEIGHT, ROOM = 12, 13, 17  # rows of scratch memory behind the simplex and its points on either core
+# rows of scratch memory behind the simplex and its points on either core
+_V, _WEIGHT, _NEAR, ROOM = 12, 13, 17, 19
 
 
 @inner_kernel
@@ -219,12 +220,17 @@ def _cores(
         for r in range(3):
             room[_V, r] = near[0, r] - near[1, r]
             square += room[_V, r] ** 2
-        count, size = kept, np.sqrt(square)
+        if square >= last:  # a flat simplex, by rounding: what was found before is nearer
+            for r in range(3):
+                near[0, r], near[1, r] = room[_NEAR, r], room[_NEAR + 1, r]
+            break
+        for r in range(3):
+            room[_NEAR, r], room[_NEAR + 1, r] = near[0, r], near[1, r]
+        count, size, last = kept, np.sqrt(square), square
         if size <= TOUCHING:
             return 0.0
-        if square >= last or count == 4:
+        if count == 4:
             break
-        last = square
     return float(size)
 
 

@@ -5,17 +5,18 @@ harmless:
 
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
-- *joined*: they overlap in all of them because a joint joins them. Either no link with a shape is between the two, and
-  they overlap in all joint vectors drawn (of neighbours, being less than ``TOUCH`` apart counts as overlap if it is
-  proven). Or there are two joints between them (more if their axes meet), and a ball in the outer link about a point of
-  its joint's axis, or in its middle, is proven to touch the inner link in all joint vectors, as in a wrist. Only the
-  region around that joint is left out: what lies within the two bodies' girths of where they overlap in the pose that
-  holds them farthest apart. What is left of them is judged again, so that an arm that folds onto itself is seen;
+- *joined*: they overlap in all joint vectors drawn (``TRIED``) because a joint joins them. Either no link with a shape
+  is between the two (of neighbours, being less than ``TOUCH`` apart counts as overlap if it is proven). Or there are
+  two joints between them (more if their axes meet), and a ball in the outer link about a point of its joint's axis, or
+  in its middle, is proven to touch the inner link in all joint vectors, as in a wrist. Only the region around that
+  joint is left out: what lies within the two bodies' girths of it, of hulls from the point that is proven to hold them,
+  of lines from where they are nearest in the pose that holds them farthest apart. What is left of them is judged again,
+  so that an arm that folds onto itself is seen.
   A default shape that slides in a thicker one is joined to it likewise: of the guide only what lies along the sliding
   axis is left out, and of what slides nothing;
 - *overlaps*: they overlap in all joint vectors drawn, none in which they don't was found in the boxes, and no joint
-  explains it. No arm is built like that, so the shapes are
-  wrong: what overlaps is left out, and has to be named wherever it is not examined;
+  explains it. No arm is built like that, so the shapes are wrong: what overlaps is left out, and has to be named
+  wherever it is not examined;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: watched;
 - *undecided*: none of this within the number of boxes: watched.
 
@@ -34,6 +35,7 @@ import numpy as np
 from er3a.collision.core_distance import ROOM, pair_distance
 from er3a.collision.distance_kernels import FREE, MEETS, Layout, measure, place, search_boxes
 from er3a.collision.envelopes import arm_shapes, link_frames
+from er3a.collision.pairs import TRIED
 from er3a.collision.shapes import Body, arm_bodies, layout_of
 from er3a.collision.trimming import ball_inside, beside_axis, girth, trimmed
 from er3a.kinematics.forward import frames
@@ -44,7 +46,6 @@ from er3a.robots.robot import PairRule, Robot
 
 PairState = Literal["never", "joined", "overlaps", "meets", "undecided", "allowed", "watched"]
 
-SAMPLES = 1024
 BOXES = 50_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
 GOAL = 0.5  # of the least distance sampled, to be proven at first
@@ -53,6 +54,7 @@ TOUCH = 2e-3  # m
 MEETING = 0.05  # of the arm's length: axes that pass a point within that meet there
 HUBS = 9  # points looked at on an axis
 AROUND_GUIDE = 1.05  # of the radii of a guide and of what slides in it
+SETTLED = 0.99  # of the girth before
 GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
 
 
@@ -75,6 +77,15 @@ class JudgedPair:
     least: float = np.nan
     left_out: float = 0.0
     boxes: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """That two bodies always overlap: ``hub`` (3,), m, in the outer link's frame, where their joint holds them; None
+    where that is unknown. ``boxes``: of joint vectors looked at for it."""
+
+    hub: Reals | None
+    boxes: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +168,9 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
             continue
         if meets[k]:
             grown = (pair[0], replace(pair[1], radius=pair[1].radius + TOUCH))
-            if _neighbours(robot, pair) and least.max() < TOUCH and (looked := _held(robot, grown, boxes)):
-                found.append(_joined(robot, pair, q[least.argmax()], looked, boxes))
+            held = _held(robot, grown, boxes) if _neighbours(robot, pair) and least.max() < TOUCH else None
+            if held:
+                found.append(_joined(robot, pair, q[least.argmax()], held, boxes))
             else:
                 witness = q[np.where(overlap[:, k], least, np.inf).argmin()]
                 found.append(JudgedPair("meets", (pair,), witness))
@@ -179,7 +191,7 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
 def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Reals, boxes: int) -> JudgedPair:
     """A pair that overlaps in all joint vectors drawn (N, n); of these, ``distance`` (N,), negative or 0."""
     held, neighbours = _held(robot, pair, boxes), _neighbours(robot, pair)
-    looked = held
+    looked = held.boxes if held else 0
     if not held or all(len(body.points) <= 2 for body in pair):
         layout, box, at = layout_of(robot, pair, [(0, 1)]), np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
         outcome, looked, _ = search_boxes(layout, 0, box, (True, 0.0), boxes // 2, at)
@@ -189,7 +201,7 @@ def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Real
         if outcome == MEETS:
             return JudgedPair("meets", (pair,), q[distance.argmin()], boxes=looked)
     if neighbours or held:
-        return _joined(robot, pair, q[distance.argmax()], looked, boxes)
+        return _joined(robot, pair, q[distance.argmax()], Held(held.hub if held else None, looked), boxes)
     return JudgedPair("overlaps", witness=q[0], boxes=looked)
 
 
@@ -200,14 +212,14 @@ def _neighbours(robot: Robot, pair: tuple[Body, Body]) -> bool:
     return links.isdisjoint(range(pair[0].link + 1, pair[1].link))
 
 
-def _held(robot: Robot, pair: tuple[Body, Body], boxes: int) -> int:
-    """Whether a joint holds two bodies together, proven: the boxes of joint vectors looked at for it, or 0.
+def _held(robot: Robot, pair: tuple[Body, Body], boxes: int) -> Held | None:
+    """Whether a joint holds two bodies together, proven, and where; None if it is not.
 
     A ball inside the outer body, about a point of its joint's axis or in its middle, overlaps the inner body in all
     joint vectors; it moves only as its centre does.
     """
     inner, outer = pair
-    T = link_frames(robot, quasi_random_points(robot.lower, robot.upper, SAMPLES))
+    T = link_frames(robot, quasi_random_points(robot.lower, robot.upper, TRIED))
     seen = np.linalg.inv(T[:, inner.link]) @ T[:, outer.link]  # the outer link's frame in the inner's
     centre = outer.points.mean(axis=0)
     heights = np.linspace(outer.points[:, 2].min() - outer.radius, outer.points[:, 2].max() + outer.radius, HUBS)
@@ -218,15 +230,15 @@ def _held(robot: Robot, pair: tuple[Body, Body], boxes: int) -> int:
         ways = [np.ptp(seen[:, :3, :3] @ ball.points[0] + seen[:, :3, 3], axis=0) for ball in balls]
         balls = [ball for ball, way in zip(balls, ways) if np.linalg.norm(way) <= 2 * length]
     if not balls:
-        return 0
+        return None
     layout = layout_of(robot, [inner, *balls], [(0, 1 + k) for k in range(len(balls))])
     distance = _sampled(robot, layout)[1].max(axis=0)
     best = int(distance.argmin())
     if distance[best] >= 0:
-        return 0
+        return None
     box = np.stack([robot.lower, robot.upper])
     outcome, looked, _ = search_boxes(layout, best, box, (True, 0.0), boxes, np.empty(robot.joints))
-    return looked if outcome == FREE else 0
+    return Held(balls[best].points[0], looked) if outcome == FREE else None
 
 
 def _guide(robot: Robot, pair: tuple[Body, Body]) -> tuple[Reals, Reals, float] | None:
@@ -262,10 +274,12 @@ def _in_frame(T: Reals, point: Reals, axis: Reals) -> tuple[Reals, Reals]:
     return T[:3, :3].T @ (point - T[:3, 3]), T[:3, :3].T @ axis
 
 
-def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, looked: int, boxes: int) -> JudgedPair:
+def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, held: Held, boxes: int) -> JudgedPair:
     """A pair that overlaps in every pose: without the region around the joint, judged again."""
-    centres = _nearest_points(robot, pair, farthest)
-    radius = sum(girth(body, centre) for body, centre in zip(pair, centres))
+    centres = _centres(robot, pair, farthest, held.hub)
+    last, radius = np.inf, sum(girth(body, centre) for body, centre in zip(pair, centres))
+    while radius < SETTLED * last:  # girths of less and less of the bodies, until they hold for what is cut off
+        radius, last = sum(girth(body, centre, radius) for body, centre in zip(pair, centres)), radius
     for _ in range(GROWTHS):
         parts = [trimmed(body, centre, radius) for body, centre in zip(pair, centres)]
         rest = [(first, second) for first in parts[0] for second in parts[1]]
@@ -274,10 +288,10 @@ def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, looked: int,
             watched = tuple(pair for each in found for pair in each.bodies)
             witness = next((each.witness for each in found if each.witness is not None), None)
             return JudgedPair(
-                "joined", watched, witness, left_out=radius, boxes=looked + sum(each.boxes for each in found)
+                "joined", watched, witness, left_out=radius, boxes=held.boxes + sum(each.boxes for each in found)
             )
         radius *= GROWTH
-    return JudgedPair("joined", left_out=radius, boxes=looked)
+    return JudgedPair("joined", left_out=radius, boxes=held.boxes)
 
 
 def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair] | None:
@@ -292,26 +306,30 @@ def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: in
 
 
 def _sampled(robot: Robot, layout: Layout) -> tuple[Reals, Reals, Flags]:
-    """Joint vectors (SAMPLES, n) spread over the limits; of all pairs the distances (SAMPLES, K), and who overlaps.
+    """Joint vectors (TRIED, n) spread over the limits; of all pairs the distances (TRIED, K), and who overlaps.
 
     Of cores that overlap the distance is only a bound, 0 for bodies without a margin.
     """
-    q = quasi_random_points(robot.lower, robot.upper, SAMPLES)
-    found, none = np.empty((SAMPLES, len(layout.first))), np.empty(SAMPLES)
-    measure(layout, q, found, none, np.empty(SAMPLES, np.int64), np.empty(SAMPLES, bool))
+    q = quasi_random_points(robot.lower, robot.upper, TRIED)
+    found, none = np.empty((TRIED, len(layout.first))), np.empty(TRIED)
+    measure(layout, q, found, none, np.empty(TRIED, np.int64), np.empty(TRIED, bool))
     return q, found, found <= 0
 
 
-def _nearest_points(robot: Robot, pair: tuple[Body, Body], q: Reals) -> list[Reals]:
-    """Where the two cores are nearest in an arm pose (n,), each (3,) in its own link's frame, m."""
+def _centres(robot: Robot, pair: tuple[Body, Body], q: Reals, hub: Reals | None) -> list[Reals]:
+    """About where two bodies are joined, in an arm pose (n,), each (3,) in its own link's frame, m.
+
+    Of hulls where the joint holds them, if that is known; else, and of lines, where they are nearest.
+    """
     layout = layout_of(robot, pair, [(0, 1)])
     T, world, middle = np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty((2, 3))
     place(layout, q, T, world, middle)
-    near, shape = np.zeros((2, 3)), (layout.start, layout.kind, layout.radius, layout.disc)
-    _, deep = pair_distance(world, shape, 0, 1, np.empty((ROOM, 3)), near)
-    if deep:  # cores overlap: about where both are
-        near[:] = middle.mean(axis=0)
     frames = [T[body.link] for body in pair]
+    near, shape = np.zeros((2, 3)), (layout.start, layout.kind, layout.radius, layout.disc)
+    if hub is not None and any(len(body.points) > 2 for body in pair):
+        near[:] = frames[1][:3, :3] @ hub + frames[1][:3, 3]
+    elif pair_distance(world, shape, 0, 1, np.empty((ROOM, 3)), near)[1]:  # cores overlap: about where both are
+        near[:] = middle.mean(axis=0)
     return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
 
 

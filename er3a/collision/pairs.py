@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 BASE = 0  # number of the link that stands still
+TRIED = 1024  # joint vectors, spread over the limits, in which each pair is tried
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,8 @@ class PairOverlaps:
 
 @dataclass(frozen=True)
 class PairsUnexamined:
-    """Pairs whose collisions were not looked at, because their shapes overlap in every pose and so can't be right."""
+    """Pairs whose collisions were not looked at, because their shapes overlap in all joint vectors tried
+    and so can't be right."""
 
     pairs: tuple[Pair, ...]
     code: Literal["pairs_unexamined"] = "pairs_unexamined"

@@ -13,11 +13,17 @@ from er3a.numerics.arrays import Reals
 SHORTEST = 1e-6  # m
 
 
-def girth(body: Body, centre: Reals) -> float:
-    """How far a body stands out from the line that leads from ``centre`` (3,) through its middle, m."""
+def girth(body: Body, centre: Reals, within: float = np.inf) -> float:
+    """How far a body stands out from the line that leads from ``centre`` (3,) through its middle, m.
+
+    Of a hull only what is nearer than ``within`` (m) in the direction of its middle counts.
+    """
     along = body.points.mean(axis=0) - centre
     length = float(np.linalg.norm(along))
-    away = body.points - centre
+    hull = len(body.points) > 2
+    away = (_split(body, centre, within)[0] if hull and np.isfinite(within) else body.points) - centre
+    if not len(away):
+        return body.radius + body.disc
     if length > SHORTEST:
         away = away - np.outer(away @ along, along) / length**2
     return float(np.linalg.norm(away, axis=1).max()) + body.radius + body.disc
@@ -81,19 +87,26 @@ def _outside(body: Body, away: Reals, along: Reals, radius: float) -> list[Body]
 
 
 def _clipped(body: Body, centre: Reals, radius: float) -> list[Body]:
-    outward = body.points.mean(axis=0) - centre
-    outward /= max(float(np.linalg.norm(outward)), SHORTEST)
-    height = (body.points - centre) @ outward - radius
-    kept, cut = body.points[height >= 0], body.points[height < 0]
-    if not len(kept):
+    near, points = _split(body, centre, radius)
+    if not len(points):
         return []
-    if not len(cut):
+    if not len(near):
         return [body]
-    share = (height[height >= 0][:, None] / (height[height >= 0][:, None] - height[height < 0]))[..., None]
-    crossings = (kept[:, None] + share * (cut[None] - kept[:, None])).reshape(-1, 3)
-    points = np.concatenate([kept, crossings])
     try:
         points = points[scipy.spatial.ConvexHull(points).vertices]
     except scipy.spatial.QhullError:  # a sliver
         return []
     return [replace(body, points=points)]
+
+
+def _split(body: Body, centre: Reals, radius: float) -> tuple[Reals, Reals]:
+    """Corners (n, 3) of a hull's parts nearer and farther than ``radius`` in the direction of its middle."""
+    outward = body.points.mean(axis=0) - centre
+    outward /= max(float(np.linalg.norm(outward)), SHORTEST)
+    height = (body.points - centre) @ outward - radius
+    kept, cut = body.points[height >= 0], body.points[height < 0]
+    if not (len(kept) and len(cut)):
+        return cut, kept
+    share = (height[height >= 0][:, None] / (height[height >= 0][:, None] - height[height < 0]))[..., None]
+    crossings = (kept[:, None] + share * (cut[None] - kept[:, None])).reshape(-1, 3)
+    return np.concatenate([cut, crossings]), np.concatenate([kept, crossings])

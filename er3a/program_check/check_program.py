@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.by_value import ByValue
+from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
 from er3a.kinematics.near_singular import NearSingular
 from er3a.numerics.arrays import Reals
@@ -253,6 +254,9 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
             LocatedFinding(level_of(each), each, step.place, step.calls, 1, number, motion.moments.get(each))
             for each in motion.findings
         ]
+    arms = checker.obstacles.bodies.values() if checker.obstacles else ()
+    if pairs := tuple(dict.fromkeys(pair for bodies in arms for pair in bodies.unexamined)):
+        found.append(LocatedFinding("caution", PairsUnexamined(pairs), top))
     for step in execution.steps:
         what = step.instruction
         if isinstance(what, Unknown):

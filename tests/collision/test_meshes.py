@@ -21,6 +21,7 @@ from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
 from er3a.formats.mesh_file import read_mesh
 from er3a.formats.urdf import import_urdf
+from er3a.geometry.transforms import transform
 from er3a.robots.robot import ConvexPiece, PairRule
 from testing.arms import made_of
 
@@ -219,3 +220,21 @@ def test_hulls_without_margin_that_overlap_are_found_by_every_search():
     assert (bodies.least(q)[0] < 0).all()
     assert [row.state for row in bodies.matrix] == ["watched"]
     assert [row.state for row in collision_matrix(robot.replace(pair_rules=())).rows] == ["joined"]
+
+
+def test_faces_that_nearly_touch_are_as_far_apart_as_they_are():
+    """Two plates of many corners, 2 um apart, that turn face to face: rounding makes simplices of them flat."""
+    random = np.random.default_rng(0)
+    rule = PairRule("base", "link_1", "watch", "else the two are neighbours, and their joint is left out")
+    for _ in range(20):
+        angle = np.sort(random.uniform(-np.pi, np.pi, 30))
+        rim = random.uniform(0.1, 0.2, 30)[:, None] * np.c_[np.cos(angle), np.sin(angle)]
+        plates = [
+            ConvexPiece(link, tuple((x, y, z) for z in heights for x, y in rim.tolist()), 0.0)
+            for link, heights in ((0, (-0.3, 0.0)), (1, (2e-6, 0.6)))
+        ]
+        base = transform(random.normal(size=3), random.uniform(-np.pi, np.pi, 3))
+        robot = made_of([("R", 0, 0, 0, -180, 180)]).replace(hulls=tuple(plates), pair_rules=(rule,), base=base)
+        distance = Bodies(robot, None).least(random.uniform(-np.pi, np.pi, (200, 1)))[0]
+        assert (distance <= 2e-6 + 1e-9).all()
+        assert (distance > -1e-9).all()

@@ -13,13 +13,18 @@ from er3a.collision.clearance import clearance
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.collision_verdict import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
 from er3a.pipeline.stages.collision.model import RESULTS
 from er3a.pipeline.study import Study, load_study
+from er3a.pipeline.teach.panel import write_teach_page
+from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.programs.read_program import read_program
 
 NAME = "er3_600"
+HOME = [0, -10, -10, 0, -70, 0]  # deg
 SCENE = Path("data/scenes/table_and_post.yaml")
 
 
@@ -111,36 +116,62 @@ def test_scenes_that_leave_nothing_have_one_verdict(case, tmp_path):
     assert (verdict.status, verdict.finding.code) == expected
 
 
-@pytest.mark.long
-def test_shapes_in_error_are_named_and_end_no_other_stage(tmp_path):
-    """A base of 3 m: the stage says that the shapes are wrong; targets are judged without these pairs."""
-    content = yaml.safe_load(Path(f"data/robots/{NAME}.yaml").read_text(encoding="utf-8"))
-    content["envelopes"]["capsules"][0] |= {"from_mm": [0, 0, 0], "to_mm": [0, 0, 0], "radius_mm": 3000}
-    file = tmp_path / "arm.yaml"
-    file.write_text(yaml.safe_dump(content | {"name": "arm"}), encoding="utf-8")
-    study = study_with(None, samples=1000, rounds=0).model_dump()
-    targets = tmp_path / "targets.yaml"
-    target = {"name": "a", "q_deg": [20, -30, 10, 35, 40, -20]}
-    targets.write_text(json.dumps({"kind": "targets", "targets": [target]}), encoding="utf-8")
-    study["robots"] = {"arm": {"file": str(file), "targets": str(targets), "paths": study["robots"][NAME]["paths"]}}
+def with_a_base_too_large(folder: Path) -> Study:
+    """The small study with one arm, whose base is drawn as a ball of 3 m, and little to do."""
+    name = "er3a_c60"
+    arm = yaml.safe_load(Path(f"data/robots/{name}.yaml").read_text(encoding="utf-8"))
+    arm["envelopes"]["capsules"][0] |= {"from_mm": [0, 0, 0], "to_mm": [0, 0, 0], "radius_mm": 3000}
+    joints = {"start_deg": [0, 0, 0, 0, 30, 0], "end_deg": [10, 0, 0, 0, 30, 0]}
+    path = {"name": "a", "title": "A", "kind": "joint", "samples": 20, "duration_s": 2.0, **joints}
+    program = {"name": "a", "title": "A", "file": "data/programs/weld_seam.src", "expect": "pass", "start_deg": HOME}
+    contents = {
+        "file": arm | {"name": "file"},
+        "targets": {"kind": "targets", "targets": [{"name": "a", "q_deg": [20, -30, 10, 35, 40, -20]}]},
+        "paths": {"kind": "paths", "paths": [path]},
+        "programs": {"kind": "programs", "programs": [program]},
+    }
+    for part, content in contents.items():
+        (folder / f"{part}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    study = load_study("config/small.yaml").model_dump()
+    study["robots"] = {"arm": study["robots"][name] | {part: str(folder / f"{part}.yaml") for part in contents}}
+    study["collision"] |= {"scene": None, "samples": 1000, "cells_across": 8, "rounds": 0}
     study["inverse"] |= {"scene": None, "round_trips": 10, "map_cells": 8}
-    study = Study.model_validate(study)
-    stored = {}
-    for stage in ("collision", "inverse"):
-        run.compute(stage, study, "arm", tmp_path / stage)
-        stored[stage] = json.loads((tmp_path / stage / "summary.json").read_text(encoding="utf-8"))["verdict"]
-    wrong = stored["collision"]
-    assert (wrong["status"], wrong["code"]) == ("fail", "collision.shapes_overlap")
-    assert "base and link 4" in wrong["text"]
-    assert "an error of the shapes, not of the arm" in wrong["text"]
-    assert stored["inverse"]["status"] == "caution"
-    assert [pair["second"] for pair in stored["inverse"]["unexamined"]] == [3, 4, 6]
-    assert stored["inverse"]["text"].endswith(
-        "Collisions not examined, because the shapes overlap in every joint vector tried: "
+    study["workspace"] |= {"samples": 20_000, "blocks": 1, "proof_cells": 2000}
+    study["capability"] |= {"directions": 20, "proof_poses": 1000}
+    return Study.model_validate(study)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("stage", ["inverse", "trajectory", "programs", "vision", "workspace"])
+def test_shapes_in_error_end_no_other_stage_and_are_never_a_pass(stage, tmp_path):
+    """Each stage that looks for collisions says which pairs it did not look at."""
+    study = with_a_base_too_large(tmp_path)
+    run.compute(stage, study, "arm", tmp_path / stage)
+    verdict = json.loads((tmp_path / stage / "summary.json").read_text(encoding="utf-8"))["verdict"]
+    assert verdict["status"] == "caution"
+    assert [pair["second"] for pair in verdict["unexamined"]] == [3, 4, 6]
+    assert verdict["text"].endswith(
+        "Collisions not examined, because the shapes overlap in every joint vector tried (1024): "
         "base and link 3, base and link 4, base and link 6."
     )
-    run.show("report", "inverse", study, "arm", tmp_path / "inverse", tmp_path / "page.html")
+    run.show("report", stage, study, "arm", tmp_path / stage, tmp_path / "page.html")
     assert "Collisions not examined" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.long
+def test_shapes_in_error_are_an_error_of_the_shapes(tmp_path):
+    """The collision stage fails; check-program and the teach panel name the pairs."""
+    study = with_a_base_too_large(tmp_path)
+    verdict = compute(study, "arm").summary.verdict
+    assert (verdict.status, verdict.finding.code) == ("fail", "collision.shapes_overlap")
+    assert "an error of the shapes, not of the arm" in say(verdict.finding)
+    write_teach_page(study, "arm", tmp_path, tmp_path / "teach.html")
+    assert "Collisions not examined" in (tmp_path / "teach.html").read_text(encoding="utf-8")
+    robot, program = study.robot("arm"), read_program("data/programs/weld_seam.src")
+    check = check_program(program, robot, CheckOptions(start=np.radians(HOME)))
+    assert check.level == "caution"
+    assert [each.finding.code for each in check.findings if each.level == "caution"] == ["pairs_unexamined"]
+    assert check_program(program, robot, CheckOptions(start=np.radians(HOME), measures=False)).level == "pass"
 
 
 @pytest.mark.long

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import BASE, link_label
+from er3a.collision.pairs import BASE, TRIED, link_label
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import sentence, word
 
@@ -59,8 +59,9 @@ def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witne
             return tr("Neither proven apart nor found to collide, in {boxes} boxes; checked.", boxes=boxes)
         case "overlaps":
             return tr(
-                "Their shapes overlap in every joint vector tried, and no joint explains it: correct the shapes. What "
-                "overlaps is not checked."
+                "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the "
+                "shapes. What overlaps is not checked.",
+                count=TRIED,
             )
     if not left_out_mm:
         return tr("They collide at joint values ({witness}).", witness=witness)
@@ -71,4 +72,7 @@ def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witne
         return tr(
             "{first} {rest}", first=joined, rest=tr("Outside that region they collide at ({witness}).", witness=witness)
         )
-    return tr("{first} {rest}", first=joined, rest=tr("Outside that region no collision was found."))
+    rest = tr(
+        "Outside that region no collision was found; if one of them lies within it as a whole, nothing is checked."
+    )
+    return tr("{first} {rest}", first=joined, rest=rest)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.pairs  # noqa: F401
+from er3a.collision.pairs import TRIED
 from er3a.pipeline.messages.say import joined, listed, say, sentence
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
 
@@ -22,9 +23,10 @@ def _(found: NeverFree) -> str:
 def _(found: ShapesOverlap) -> str:
     return sentence(
         found.code,
-        "The shapes of {pairs} overlap in every joint vector tried, which no joint between them explains: an error of "
-        "the shapes, not of the arm. Correct their size, unit or placement in the robot's file, or allow the pair "
-        "there with a reason. Of the rest of the shapes, {percent:.1f} % of the joint space is collision-free.",
+        "The shapes of {pairs} overlap in every joint vector tried ({count}), which no joint between them explains: an "
+        "error of the shapes, not of the arm. Correct their size, unit or placement in the robot's file, or allow the "
+        "pair there with a reason. Of the rest of the shapes, {percent:.1f} % of the joint space is collision-free.",
+        count=TRIED,
         pairs=joined(listed(found.pairs[:NAMED]), ", "),
         percent=100 * found.free_ratio,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from er3a.collision.pairs import (
     BASE,
+    TRIED,
     CarriedAndLink,
     CarriedAndSolid,
     LinkAndSolid,
@@ -48,7 +49,8 @@ def _(found: PairsUnexamined) -> str:
         named.append(sentence("none_for", "{count} more", count=len(found.pairs) - NAMED))
     return sentence(
         found.code,
-        "Collisions not examined, because the shapes overlap in every joint vector tried: {pairs}.",
+        "Collisions not examined, because the shapes overlap in every joint vector tried ({count}): {pairs}.",
+        count=TRIED,
         pairs=joined(named, ", "),
     )
 

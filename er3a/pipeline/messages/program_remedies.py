@@ -50,6 +50,7 @@ REMEDIES: dict[str, str] = {
     "motion_collides": N_(
         "Go round by a via point, take another configuration or tool orientation, or move what stands in the way."
     ),
+    "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
     "zone_not_settled": N_("Make the zone smaller, or move the corner away from what is near."),
     "arc_has_no_circle": N_("Teach the arc's via point off the straight line between its ends, or use a line."),

@@ -107,13 +107,14 @@ function iterated(a, p, b, r) {
     const weights = nearestToOrigin(simplex.map((corner) => corner.w));
     if (!weights) return overlap(a, p, b, r, simplex);
     const mixed = (key) => simplex.reduce((sum, corner, i) => add(sum, scaled(corner[key], weights[i])), [0, 0, 0]);
-    near = [mixed("onA"), mixed("onB")];
+    const mixture = [mixed("onA"), mixed("onB")];
+    v = subtract(...mixture);
+    if (norm(v) >= last) break; // a flat simplex, by rounding: what was found before is nearer
+    near = mixture;
+    size = last = norm(v);
     simplex = simplex.filter((_, i) => weights[i] > 0);
-    v = subtract(...near);
-    size = norm(v);
     if (size <= TOUCHING) return { distance: 0, near, deep: true };
-    if (size * size >= last || simplex.length === 4) break;
-    last = size * size;
+    if (simplex.length === 4) break;
   }
   return { distance: size, near };
 }

@@ -11,6 +11,7 @@ import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.collision.bodies import Bodies
 from er3a.collision.core_distance import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.envelopes import arm_shapes
+from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
@@ -113,6 +114,7 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
     layout = found.layout
     return {
         "near": NEAR_TOUCH,
+        "unexamined": say(PairsUnexamined(found.unexamined)) if found.unexamined else None,
         "estimated": not arm_shapes(robot).given,
         "bodies": [
             {

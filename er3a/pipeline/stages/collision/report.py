@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.collision.pairs import TRIED
 from er3a.files.scene_file import load_scene
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
@@ -50,6 +51,7 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         robot=robot,
         robot_pages=study.pages(name),
         matrix=_matrix(robot, results.matrix),
+        tried=TRIED,
         by_pair=by_pair(results.pairs),
         pairs=_pairs(results.pairs),
         workspace=workspace(results),

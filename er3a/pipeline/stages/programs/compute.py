@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from er3a.collision.clearance import bodies_of
+from er3a.collision.pairs import PairsUnexamined
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
@@ -34,7 +35,7 @@ from er3a.pipeline.stages.trajectory.motion_demands import assumed_speeds
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
 from er3a.program_check.motion_laws import AssumedRates
-from er3a.program_check.program_check_findings import CheckFinding, Level
+from er3a.program_check.program_check_findings import CheckFinding, Level, worst_of
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.program_findings import NameTwice, NotUnderstood
@@ -103,12 +104,13 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
 def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> ProgramSummary:
     levels = [OUTCOMES[verdict.level] for verdict in check.verdicts]
     clear = [verdict.least_clearance_mm for verdict in check.verdicts if verdict.least_clearance_mm is not None]
+    found = [each for each in check.findings if not isinstance(each.finding, PairsUnexamined)]  # the verdict says it
     return ProgramSummary(
         name=entry.name,
         title=entry.title,
         file=entry.file,
         language=check.execution.program.language,
-        outcome=OUTCOMES[check.level],
+        outcome=OUTCOMES[worst_of(each.level for each in found)],
         expect=entry.expect,
         complete=check.execution.complete,
         ways=len(check.execution.endings),
@@ -118,7 +120,7 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         failed=levels.count("fail"),
         cycle=check.cycle,
         least_clearance_mm=min(clear, default=None),
-        findings=tuple(_finding_at(each, starts) for each in check.findings),
+        findings=tuple(_finding_at(each, starts) for each in found),
         not_examined=tuple(sorted({each.place.line for each in check.not_examined})),
     )
 

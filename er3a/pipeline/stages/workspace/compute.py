@@ -140,11 +140,13 @@ def _summary(
     surface = surface_of(robot, 2 * settings.proof_cells, study.seed) if lower == 0 else None
     left = 100 * proven.proof.width if proven.arm is None and proven.settles else None
     judged = judge(hull.volume, voids, counts.touched, unseen, proven.settles, left)
+    if surface:
+        judged = Verdict("caution", OnSurface(surface))
     guess = proven.estimate
     volume = Volume(lower, upper, guess.value, (guess.low, guess.high))
     reach = search_reach(robot, grid, samples.q_kept)
     return WorkspaceSummary(
-        verdict=Verdict("caution", OnSurface(surface)) if surface else judged,
+        verdict=judged.without(tool.unexamined),
         figures=_figures(reach, voids, volume, hull, settings.samples, surface),
         samples=settings.samples,
         sampling=settings.sampling,

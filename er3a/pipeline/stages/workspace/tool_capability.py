@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.kinematics.by_class import parameters_of
 from er3a.kinematics.configuration import slot_labels
@@ -50,12 +51,13 @@ CLEAR_STREAM = 11
 
 @dataclass(frozen=True, eq=False)
 class ToolCapability:
-    """This part's entries of the summary, and its tables."""
+    """This part's entries of the summary, and its tables; ``unexamined``: pairs whose collisions were not looked at."""
 
     capability: CapabilitySummary | CapabilityMissing
     placement: Placement | None
     cells: CapabilityCells
     places: BoxPlaces
+    unexamined: tuple[Pair, ...] = ()
 
 
 def tool_capability(
@@ -109,7 +111,9 @@ def tool_capability(
         clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
     placement, places = _placed(robot, settings, task, plan, scene, float(found.manipulability.max()))
-    return ToolCapability(summary, placement, table_rows.capability(middles, found, tried, frame.bar > 0), places)
+    return ToolCapability(
+        summary, placement, table_rows.capability(middles, found, tried, frame.bar > 0), places, bodies.unexamined
+    )
 
 
 def _rows(R: Reals) -> tuple[Triple, Triple, Triple]:
