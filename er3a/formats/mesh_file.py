@@ -19,6 +19,7 @@ FORMATS = (".stl", ".obj", ".dae", ".glb")
 MOST_TRIANGLES = 1_000_000
 MOST_BYTES = 200_000_000
 SMALLEST, LARGEST = 2e-3, 100.0  # m, of a mesh in all
+LARGEST_OF_LINK = 20.0  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +30,8 @@ class ClosedMesh:
     faces: Integers
 
 
-def read_mesh(path: str | Path, unit: Unit, scale: Reals | None = None) -> ClosedMesh:
-    """Read a closed mesh whose lengths are in a unit, each axis times ``scale`` (3,).
+def read_mesh(path: str | Path, unit: Unit) -> ClosedMesh:
+    """Read a closed mesh whose lengths are in a unit.
 
     Raises
     ------
@@ -38,23 +39,54 @@ def read_mesh(path: str | Path, unit: Unit, scale: Reals | None = None) -> Close
         for a file that is no such mesh, is too large, is not closed, or can only be in the other unit
     """
     path = Path(path)
+    mesh = _closed(path, _loaded(path), np.full(3, 1.0 if unit == "m" else 1e-3))
+    _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), unit)
+    return mesh
+
+
+def read_link_mesh(path: Path, scale: Reals) -> ClosedMesh:
+    """A closed mesh of a URDF's link, each axis times ``scale`` (3,); lengths and errors as of its vertices."""
     loaded = _loaded(path)
+    return _closed(path, loaded, _link_scale(path, loaded, scale))
+
+
+def read_link_vertices(path: Path, scale: Reals) -> Reals:
+    """Corners (V, 3), m, of a mesh of a URDF's link, which need not be closed, each axis times ``scale`` (3,).
+
+    Lengths of the file are in metres, those of a DAE in the unit that it states, as RViz and Gazebo take them.
+
+    Raises
+    ------
+    InputError
+        for a file that is no mesh, is too large, or has a size that no link has
+    """
+    loaded = _loaded(path)
+    return np.asarray(loaded.vertices, float) * _link_scale(path, loaded, scale)
+
+
+def _closed(path: Path, loaded: Any, scale: Reals) -> ClosedMesh:
+    """A mesh that must be closed, each axis times ``scale`` (3,)."""
     loaded.merge_vertices()
     if not loaded.is_watertight:
         edges = np.unique(loaded.edges_sorted, axis=0, return_counts=True)[1]
         problem = f"is not closed: {int((edges != 2).sum())} edges don't have two triangles"
         raise InputError(path, None, problem, "Close its holes, for example in a mesh editor")
-    if scale is not None:
-        loaded.vertices = loaded.vertices * scale
+    loaded.vertices = loaded.vertices * scale
     loaded.fix_normals()
-    vertices = np.asarray(loaded.vertices, float) * (1.0 if unit == "m" else 1e-3)
-    _check_size(path, float(np.ptp(vertices, axis=0).max()), unit)
-    return ClosedMesh(vertices, np.asarray(loaded.faces, np.int64))
+    return ClosedMesh(np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64))
 
 
-def read_vertices(path: Path) -> Reals:
-    """Corners (V, 3) of a mesh that need not be closed, in the unit of its file; :class:`InputError` as above."""
-    return np.asarray(_loaded(path).vertices, float)
+def _link_scale(path: Path, loaded: Any, scale: Reals) -> Reals:
+    """Metres (3,) for a length of 1 in the file of a link's mesh."""
+    if path.suffix.lower() == ".dae" and loaded.units is not None:
+        import trimesh  # takes a while
+
+        scale = scale * trimesh.units.unit_conversion(loaded.units, "meters")
+    longest = float((np.ptp(loaded.vertices, axis=0) * np.abs(scale)).max())
+    if longest > LARGEST_OF_LINK:
+        problem = f"its longest side is {longest:.4g} m, which no link is; its lengths can only be in a smaller unit"
+        raise InputError(path, None, problem, 'For mm write scale="0.001 0.001 0.001" in its <mesh>')
+    return scale
 
 
 def _loaded(path: Path) -> Any:

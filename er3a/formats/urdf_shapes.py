@@ -21,7 +21,7 @@ from er3a.collision.meshes import ConvexPieces, convex_pieces, hull_of
 from er3a.collision.overlap_depth import cylinder_points
 from er3a.collision.shapes import CORNERS
 from er3a.errors import Er3aError, InputError
-from er3a.formats.mesh_file import read_mesh, read_vertices
+from er3a.formats.mesh_file import read_link_mesh, read_link_vertices
 from er3a.geometry.transforms import rpy_of, transform, translation
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import ConvexPiece, Envelope, Robot
@@ -161,12 +161,12 @@ def _mesh(
     scale = numbers(path, where, shape, "scale", (1.0, 1.0, 1.0))
     if split:
         try:
-            mesh = read_mesh(file, "m", scale)
+            mesh = read_link_mesh(file, scale)
             return convex_pieces(mesh.vertices, mesh.faces, THRESHOLD, SEED)
         except Er3aError as error:
             notes.append(f"{where}: the hull of {file.name} is taken ({error})")
     try:
-        return hull_of(read_vertices(file) * scale)
+        return hull_of(read_link_vertices(file, scale))
     except Er3aError as error:
         notes.append(f"{where}: {error}; the link has no shape of it")
         return None

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
@@ -203,6 +204,21 @@ def test_a_flat_mesh_is_a_shape(tmp_path):
     assert len(piece.points) == 3
     sides = np.linalg.norm(np.diff(np.array(piece.points)[[0, 1, 2, 0]], axis=0), axis=1)
     np.testing.assert_allclose(np.sort(sides), [1, 2, np.sqrt(5)])
+
+
+@pytest.mark.parametrize(("unit", "side"), [("", 0.12), ('<unit name="mm" meter="0.001"/>', 0.12), ("", 120.0)])
+def test_a_mesh_has_the_unit_of_its_file_and_a_link_s_size(tmp_path, unit, side):
+    length = 120.0 if unit else side
+    trimesh.creation.box((length, length / 2, length / 3)).export(tmp_path / "box.dae")
+    text = (tmp_path / "box.dae").read_text(encoding="utf-8")
+    (tmp_path / "box.dae").write_text(text.replace("<up_axis>", f"{unit}<up_axis>", 1), encoding="utf-8")
+    found = import_urdf(written(tmp_path, urdf(extra=shaped('<mesh filename="box.dae"/>'))))
+    if side > 100:
+        assert found.robot.hulls == ()
+        assert any("its longest side is 120 m, which no link is" in note and "0.001" in note for note in found.notes)
+    else:
+        sides = np.ptp(np.array(found.robot.hulls[0].points), axis=0)
+        np.testing.assert_allclose(np.sort(sides), [0.04, 0.06, 0.12], atol=1e-9)
 
 
 def test_a_follower_that_leaves_its_own_limits_is_told(tmp_path):
