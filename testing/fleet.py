@@ -100,7 +100,7 @@ def urdf_files(folder: Path) -> Iterator[UrdfFile | tuple[str, str]]:
         if path.suffix == ".xacro":
             if not re.search(r"<robot[^>]*\bname=", path.read_text(encoding="utf-8")):
                 continue  # a part that others include
-            target = folder / (re.sub(r"\W+", "_", name.removesuffix(".xacro").removesuffix(".urdf")) + ".urdf")
+            target = folder / (re.sub(r"\W+", "_", name) + ".urdf")
             try:
                 target.write_text(_expanded(path, data), encoding="utf-8")
             except Exception as error:  # what xacro can't expand, because it names packages that are not there

@@ -13,6 +13,7 @@ LONGEST_FUNCTION = 80
 MOST_POSITIONAL = 6
 IN_EVERY_STAGE = {"entry", "model", "compute", "record", "report"}
 MESSAGES = "er3a/pipeline/messages"  # its modules are named after those that they speak for
+KERNELS = {"kernel", "inner_kernel"}
 
 
 @cache
@@ -26,7 +27,7 @@ def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
     """All functions that are no kernels, with the place that each begins at."""
     for path, tree in trees().items():
         for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef) and "kernel" not in map(ast.unparse, node.decorator_list):
+            if isinstance(node, ast.FunctionDef) and not KERNELS & {*map(ast.unparse, node.decorator_list)}:
                 yield f"{path}:{node.lineno} {node.name}", node
 
 

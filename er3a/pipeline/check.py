@@ -94,8 +94,8 @@ def stage_forms(robot: Robot) -> dict[str, str]:
 def check_file(path: Path) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
 
-    Of a study each file that it names is looked at too, from the folder that it is run in: that which its folder
-    ``config`` stands in, or else the working folder.
+    Of a study each file that it names is looked at too, from the folder that it is run in: that which ``config``, where
+    it stands, and ``data`` stand in, or else the working folder.
     """
     if path.suffix == ".csv" and path.parent.name == "targets":
         read_targets(path)
@@ -116,7 +116,8 @@ def check_file(path: Path) -> str:
     kind = read_yaml(path).get("kind")
     if kind == "study":
         file = path.absolute()
-        with chdir(file.parent.parent if file.parent.name == "config" else Path.cwd()):
+        own = file.parent.parent
+        with chdir(own if file.parent.name == "config" and (own / "data").is_dir() else Path.cwd()):
             check_study(Path(os.path.relpath(file)))
         return _WORDS[kind]
     if not isinstance(kind, str) or kind not in _CHECKS:

@@ -289,7 +289,7 @@ def test_collisions_that_were_not_examined_are_named(tmp_path):
 @pytest.fixture
 def xacro(tmp_path) -> Path:
     """A xacro arm whose links stand in another package beside it, with a mesh and a joint type as arguments."""
-    urdf = export_urdf(load_robot("er3_600")).replace('<?xml version="1.0"?>', "")
+    urdf = export_urdf(load_robot("er3_600").replace(envelopes=(), hulls=())).replace('<?xml version="1.0"?>', "")
     shape = '<collision><geometry><mesh filename="package://arm_shapes/meshes/$(arg mesh)"/></geometry></collision>'
     urdf = urdf.replace('<link name="link_1" />', f'<link name="link_1">{shape}</link>', 1)
     assert shape in urdf

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from er3a.files.shipped import ROOT
-from er3a.pipeline.results import read_results, read_stage
+from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.vision.model import VisionResults
@@ -71,14 +71,6 @@ def test_tables_say_what_the_summary_says(folders):
         last = results.ways.take((results.ways.target == each.name) & (results.ways.part == "approach")).q_deg[-1]
         np.testing.assert_allclose(last, each.grasp.q_deg)
         assert each.error_mm.together >= max(each.error_mm.camera, each.error_mm.calibration, each.error_mm.table)
-
-
-def test_a_robot_without_a_camera_says_so(study, tmp_path):
-    entry = study.robots["er3_600"].model_copy(update={"vision": None})
-    without = study.model_copy(update={"robots": {"er3_600": entry}})
-    told = run.compute("vision", without, "er3_600", tmp_path)
-    assert told == "The study names no vision file for this robot."
-    assert read_stage(tmp_path, STAGE).status == "not_computed"
 
 
 @pytest.mark.long
