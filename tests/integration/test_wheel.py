@@ -115,7 +115,7 @@ def test_commands_without_a_study_work_in_an_empty_folder(er3a, tmp_path):
 @pytest.fixture
 def new_cell(er3a, tmp_path):
     """Makes a study of an arm in an empty folder, with the small study's budgets."""
-    (tmp_path / "Odd arm.urdf").write_text(export_urdf(load_robot("er3a_c60")), encoding="utf-8")
+    (tmp_path / "Odd arm.urdf").write_text(export_urdf(load_robot("er3a_c60").replace(envelopes=())), encoding="utf-8")
     (tmp_path / "table.csv").write_text(DH, encoding="utf-8")
 
     def make(*given: str) -> Path:
