@@ -82,16 +82,9 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     shown = [] if own_log else logger_words(study_file, expected)
     on_this_machine = not (asked.executor or asked.profile or asked.workflow_profile)
     with job_server.running(lock) if on_this_machine else nullcontext():
-        return _snakemake(
-            [
-                *snakemake,
-                *plain,
-                *(_one_at_first() if on_this_machine and not asked.resources else ()),
-                *shown,
-                *words,
-                *study_words,
-            ]
-        )
+        first = _one_at_first() if on_this_machine and not asked.resources else []
+        # Options that take as many words as follow stand before one that takes one.
+        return _snakemake([*first, *shown, *snakemake, *plain, *words, *study_words])
 
 
 def _one_at_first() -> list[str]:

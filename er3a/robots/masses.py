@@ -163,11 +163,11 @@ def nearest_body(body: MassBody) -> MassBody:
     """The body with the same mass and centre whose inertia is the nearest that a rigid body can have.
 
     The second moments of its mass, ``trace(I) / 2 - I``, lose their negative principal values, which is the nearest
-    positive semidefinite matrix by Frobenius' norm [1]_; principal axes stay.
+    positive semidefinite matrix by Frobenius' norm [2]_; principal axes stay.
 
     References
     ----------
-    .. [1] P. M. Wensing, S. Kim, J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial
+    .. [2] P. M. Wensing, S. Kim, J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial
        parameter identification", IEEE Robotics and Automation Letters 3 (2018), section III.
     """
     moments, axes = np.linalg.eigh(body.inertia_matrix)
