@@ -67,8 +67,8 @@ def import_urdf(
 
     The flange is the tip: the link that ``tip`` names, else the end of the fixed joints behind the last joint, or that
     joint's own link if they branch. Loads, cameras and tools are mounted there.
-    What a file gets wrong of limits, speeds, shapes and inertias is mended or left out with a note that names the joint
-    or link, and the value.
+    What a file gets wrong of limits, speeds, shapes and inertias is corrected or left out, with a note that names joint
+    or link and the value.
     Joints in the chain that follow others (mimic) become a coupling; grippers, and linkages that only follow, are left
     out with a note.
 

@@ -28,7 +28,7 @@ _NORMAL_95 = 1.959963984540054
 @dataclass(frozen=True)
 class VolumeEstimate:
     """``points`` were drawn where the proof leaves open what is reached, ``reached`` of them are reached, ``undecided``
-    could not be told; m^3.
+    could not be decided; m^3.
 
     ``low`` and ``high`` are the 95 % interval: Wilson's for the reached points alone, and with all undecided ones. All
     lie within the proven bounds.
