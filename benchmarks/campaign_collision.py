@@ -9,7 +9,7 @@ import numpy as np
 
 from er3a import load_robot, load_scene
 from er3a.collision.bodies import Bodies
-from er3a.collision.distance_kernels import FREE, free_between, judge_polyline
+from er3a.collision.distances import FREE, free_between, judge_polyline
 from testing.collision_peers import SHAPES, Outsider, Peer, coal_distance, fcl_distance, own_distance
 from testing.evidence import sized
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a import forward, inverse, load_robot
-from er3a.geometry.angles import wrap_to_pi
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import panel_data, write_teach_page

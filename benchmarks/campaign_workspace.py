@@ -19,13 +19,11 @@ from er3a.robots.robot import Robot
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import tally_blocks
-from er3a.workspace.azimuths import TURN
-from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import general_arm
-from er3a.workspace.lookup import SectionMap
-from er3a.workspace.proof import judge, prove
-from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
-from er3a.workspace.volume import POINT, estimate_volume
+from er3a.workspace.general_proof import prove_general
+from er3a.workspace.proven import POINT, SectionMap, estimate_volume
+from er3a.workspace.section_arm import TURN, SectionArm, section_arm, section_frame
+from er3a.workspace.section_proof import judge, prove
 from testing.evidence import sized
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from er3a.files.by_name import calibrate as calibrate
     from er3a.files.by_name import diagnose as diagnose
     from er3a.files.by_name import evidence as evidence
+    from er3a.files.by_name import load_measurements as load_measurements
+    from er3a.files.by_name import load_table as load_table
     from er3a.files.hand_eye_file import load_hand_eye as load_hand_eye
-    from er3a.files.measurements import load_measurements as load_measurements
     from er3a.files.reference_sets import load_references as load_references
-    from er3a.files.result_table import load_table as load_table
     from er3a.files.robot_library import load_robot as load_robot
     from er3a.files.scene_file import load_scene as load_scene
     from er3a.files.target_file import load_targets as load_targets
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from er3a.kinematics.numerical import solve as solve
     from er3a.program_check.check_program import CheckOptions as CheckOptions
     from er3a.program_check.check_program import check_program as check_program
+    from er3a.programs.machine import execute as execute
     from er3a.programs.read_program import read_program as read_program
-    from er3a.programs.run_program import execute as execute
     from er3a.programs.write_program import write_program as write_program
     from er3a.programs.writing import WriteOptions as WriteOptions
     from er3a.robots.conventions import to_modified as to_modified
@@ -65,8 +65,8 @@ _PUBLIC = {
     "diagnose": "er3a.files.by_name",
     "evidence": "er3a.files.by_name",
     "calibrate": "er3a.files.by_name",
-    "load_measurements": "er3a.files.measurements",
-    "load_table": "er3a.files.result_table",
+    "load_measurements": "er3a.files.by_name",
+    "load_table": "er3a.files.by_name",
     "load_references": "er3a.files.reference_sets",
     "load_hand_eye": "er3a.files.hand_eye_file",
     "CalibrationSet": "er3a.vision.calibration_set",
@@ -76,7 +76,7 @@ _PUBLIC = {
     "import_urdf": "er3a.formats.urdf",
     "export_urdf": "er3a.formats.urdf",
     "read_program": "er3a.programs.read_program",
-    "execute": "er3a.programs.run_program",
+    "execute": "er3a.programs.machine",
     "check_program": "er3a.program_check.check_program",
     "CheckOptions": "er3a.program_check.check_program",
     "write_program": "er3a.programs.write_program",

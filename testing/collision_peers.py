@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a import export_urdf, load_robot
 from er3a.collision.bodies import Bodies
-from er3a.collision.core_distance import CYLINDER, HALF_SPACE, HULL, ROOM, pair_distance
-from er3a.collision.overlap_depth import cylinder_points, overlap_depth
+from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, ROOM, cylinder_points, overlap_depth, pair_distance
 from er3a.collision.shapes import CORNERS, WORLD, Body, layout_of
 from er3a.kinematics.forward import frames
 from er3a.robots.robot import Robot

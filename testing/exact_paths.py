@@ -13,8 +13,7 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
-from er3a.kinematics.near_singular import NearSingular
-from er3a.kinematics.singularity import TYPES
+from er3a.kinematics.singularity import TYPES, NearSingular
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
 from er3a.planning.singular_events import singular_events

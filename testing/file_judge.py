@@ -25,14 +25,12 @@ from scipy.spatial.transform import Rotation
 
 from er3a.collision.scene import Plane, Scene, Solid
 from er3a.errors import InputError
+from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_csv
 from er3a.files.hand_eye_file import POINTS, HandEyeFile, sample_rows
-from er3a.files.measurements import load_measurements
-from er3a.files.path_file import load_paths
-from er3a.files.path_table import PathTable, read_path_table
+from er3a.files.path_file import PathTable, load_paths, read_path_table
 from er3a.files.program_file import ProgramsFile
-from er3a.files.reference_documents import load_documents
-from er3a.files.reference_sets import check_reference_file
+from er3a.files.reference_sets import check_reference_file, load_documents
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SHAPES, SceneFile, load_scene

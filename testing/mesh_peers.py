@@ -19,11 +19,10 @@ import numpy as np
 import pinocchio as pin
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.distance_kernels import measure
-from er3a.collision.pairs import link_label
-from er3a.collision.shapes import arm_bodies, layout_of
+from er3a.collision.distances import measure
+from er3a.collision.shapes import arm_bodies, layout_of, link_label
 from er3a.formats.urdf import UrdfImport
-from er3a.formats.urdf_shapes import mesh_of
+from er3a.formats.urdf_tree import mesh_of
 from er3a.robots.robot import Robot
 
 APART = 1e-5  # m, by which two readers of one mesh in single precision and their placements differ

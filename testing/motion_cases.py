@@ -8,19 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.envelopes import arm_shapes
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.scene import Box, Cylinder, Plane, Sphere
+from er3a.collision.shapes import arm_shapes
 from er3a.files.path_file import PathFile
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.forward import forward
-from er3a.kinematics.near_singular import NearSingular
-from er3a.kinematics.singularity import TYPES
+from er3a.kinematics.singularity import TYPES, NearSingular
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.intervals import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.planning.tool_proof import Wanted
 from testing.dense_contacts import Contacts

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.forward import forward
-from er3a.kinematics.near_singular import NearSingular, factor_of
-from er3a.kinematics.singularity import TYPES, determinant_factors
+from er3a.kinematics.singularity import TYPES, NearSingular, determinant_factors, factor_of
 from er3a.planning.follow import follow
 from er3a.planning.moves import JointMove, line
 from er3a.planning.singular_events import SingularEvent, runs, singular_events

@@ -7,9 +7,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.calibration.calibrate import calibrate
-from er3a.calibration.measured import Measurement
-from er3a.calibration.parameters import Parameter, moved
+from er3a.calibration.calibrate import Measurement, Parameter, calibrate, moved
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Reals

@@ -8,8 +8,8 @@ import pytest
 
 from er3a.errors import ResultError
 from er3a.files.kept_files import write_checked
-from er3a.pipeline.checksums import check_checksum, write_checksum
-from er3a.pipeline.corrupted import corrupted
+from er3a.pipeline.results import check_checksum, write_checksum
+from er3a.pipeline.run_study import corrupted
 from er3a.pipeline.study import load_study
 from testing.made_stage import write
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from er3a.files.own_titles import translations_in
+from er3a.files.annotations import translations_in
 from er3a.pipeline.messages import language
 from er3a.pipeline.study import load_study
 

@@ -19,13 +19,13 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.calibration.measured import Measurement
+from er3a.by_value import Displayed, Sheet, as_html, as_text
+from er3a.calibration.calibrate import Measurement
 from er3a.collision.scene import Box, Plane, Scene
 from er3a.diagnosis.diagnose import diagnosis_of
-from er3a.display import Displayed, Sheet, as_html, as_text
 from er3a.files.reference_sets import load_references
 from er3a.kinematics import forward as forward_module
-from er3a.pipeline.stages.workspace.workspace_tables import GrowthCurve
+from er3a.pipeline.stages.workspace.model import GrowthCurve
 from er3a.robots.masses import Drives, Masses
 from er3a.robots.robot import Robot
 from er3a.robots.usable import check_robot

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from er3a.pipeline.run_log import RunLog, RunLogSettings
+from er3a.pipeline.run_study import RunLog, RunLogSettings
 
 
 @pytest.fixture

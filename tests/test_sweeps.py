@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.collision.envelopes import arm_shapes, default_envelopes
+from er3a.collision.shapes import arm_shapes, default_envelopes
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward

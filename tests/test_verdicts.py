@@ -13,8 +13,7 @@ from er3a.errors import ResultError
 from er3a.pipeline.stages import run
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts
-from er3a.pipeline.viewing.index import write_index
-from er3a.pipeline.viewing.junit import write_junit
+from er3a.pipeline.viewing.index import write_index, write_junit
 
 ROOT = Path(__file__).resolve().parents[1]
 

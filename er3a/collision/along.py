@@ -26,17 +26,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
 import scipy
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.envelopes import link_frames
-from er3a.collision.pairs import Pair
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import Pair, link_frames
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.runs import runs
+from er3a.robots.robot import Robot
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
 LOCATED = 1e-10  # share of the duration
@@ -272,3 +273,36 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
         at = times[known[a + int(np.argmin(rows.min(axis=1)))]]
         found.append(Contact(float(start), float(end), tuple(pairs), -float(deepest.min()), float(at)))
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """Least distances of arms.
+
+    Attributes
+    ----------
+    distance : (N,), m, over the pairs of bodies that can meet; negative where something overlaps, by the depth
+    pair : N, what is nearest to what; None where nothing can meet
+    """
+
+    distance: Reals
+    pair: tuple[Pair | None, ...]
+
+
+@lru_cache(maxsize=8)
+def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
+    """The bodies of an arm and a scene, kept for as long as few others are asked for."""
+    return Bodies(robot, scene)
+
+
+def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
+    """Least distance of each arm (N, n) in rad or m from the scene's solids and from itself.
+
+    Raises
+    ------
+    Er3aError
+        if the scene is none
+    """
+    bodies = bodies_of(robot, scene)
+    distance, pair = bodies.least(np.asarray(q, float).reshape(-1, robot.joints))
+    return Clearance(distance, tuple(bodies.pairs[k] if k >= 0 else None for k in pair))

@@ -9,14 +9,33 @@ from itertools import compress, product
 
 import numpy as np
 
-from er3a.collision.core_distance import CYLINDER
-from er3a.collision.distance_kernels import FREE, measure, search_boxes, some_distances, which_overlap
-from er3a.collision.envelopes import link_frames
+from er3a.collision.distances import (
+    CYLINDER,
+    FREE,
+    cylinder_points,
+    measure,
+    overlap_depth,
+    search_boxes,
+    some_distances,
+    which_overlap,
+)
 from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
-from er3a.collision.overlap_depth import cylinder_points, overlap_depth
-from er3a.collision.pairs import BASE, CarriedAndLink, CarriedAndSolid, LinkAndSolid, LinkPair, Pair, link_label
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import Body, arm_bodies, carried_bodies, layout_of, solid_bodies
+from er3a.collision.shapes import (
+    BASE,
+    Body,
+    CarriedAndLink,
+    CarriedAndSolid,
+    LinkAndSolid,
+    LinkPair,
+    Pair,
+    arm_bodies,
+    carried_bodies,
+    layout_of,
+    link_frames,
+    link_label,
+    solid_bodies,
+)
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import but_for_turns

@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.distance_kernels import FREE, free_between
+from er3a.collision.distances import FREE, free_between
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import closed_form_missing

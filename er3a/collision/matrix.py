@@ -27,22 +27,121 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import combinations, product
 from typing import Literal
 
 import numpy as np
+import scipy
 
-from er3a.collision.core_distance import ROOM, pair_distance
-from er3a.collision.distance_kernels import FREE, MEETS, Layout, measure, place, search_boxes
-from er3a.collision.envelopes import arm_shapes, link_frames
-from er3a.collision.pairs import TRIED
-from er3a.collision.shapes import Body, arm_bodies, layout_of
-from er3a.collision.trimming import ball_inside, beside_axis, girth, trimmed
+from er3a.collision.distances import FREE, MEETS, ROOM, Layout, measure, pair_distance, place, search_boxes
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import BASE, TRIED, Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.robots.derived import derived
-from er3a.robots.robot import PairRule, Robot
+from er3a.robots.robot import PairRule, Robot, derived
+
+SHORTEST = 1e-6  # m
+
+
+def girth(body: Body, centre: Reals, within: float = np.inf) -> float:
+    """How far a body stands out from the line that leads from ``centre`` (3,) through its middle, m.
+
+    Of a hull only what is nearer than ``within`` (m) in the direction of its middle counts.
+    """
+    along = body.points.mean(axis=0) - centre
+    length = float(np.linalg.norm(along))
+    hull = len(body.points) > 2
+    away = (_split(body, centre, within)[0] if hull and np.isfinite(within) else body.points) - centre
+    if not len(away):
+        return body.radius + body.disc
+    if length > SHORTEST:
+        away = away - np.outer(away @ along, along) / length**2
+    return float(np.linalg.norm(away, axis=1).max()) + body.radius + body.disc
+
+
+def ball_inside(body: Body, point: Reals) -> Body | None:
+    """The largest ball about a point (3,), m, that is inside a body; None where the point is not inside its surface."""
+    if len(body.points) > 2:
+        try:
+            faces = scipy.spatial.ConvexHull(body.points).equations
+        except scipy.spatial.QhullError:  # flat
+            return None
+        depth = -float((faces @ np.append(point, 1.0)).max())
+        depth = depth + body.radius if depth >= 0 else 0.0
+    else:
+        start, along = body.points[0], body.points[-1] - body.points[0]
+        share = np.clip((point - start) @ along / max(float(along @ along), SHORTEST**2), 0.0, 1.0)
+        depth = body.radius - float(np.linalg.norm(point - start - share * along))
+    return replace(body, points=point[None], radius=depth) if depth > 0 else None
+
+
+def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:
+    """What is left of a body without the region around a joint.
+
+    Of a line the part outside the ball about ``centre`` (3,) with ``radius`` (m), of a hull the part that is farther
+    than that in the direction of its middle.
+    """
+    if len(body.points) > 2:
+        return _clipped(body, centre, radius)
+    start, end = body.points[0], body.points[-1]
+    along, away = end - start, start - centre
+    length = float(along @ along)
+    if length <= SHORTEST**2:
+        return [body] if np.linalg.norm(away) > radius else []
+    return _outside(body, away, along, radius)
+
+
+def beside_axis(body: Body, point: Reals, axis: Reals, radius: float) -> list[Body]:
+    """What is left of a line that is farther than ``radius`` (m) from an axis through a point, both (3,)."""
+    start, along = body.points[0] - point, body.points[-1] - body.points[0]
+    away, across = start - (start @ axis) * axis, along - (along @ axis) * axis
+    if across @ across <= SHORTEST**2:
+        return [body] if np.linalg.norm(away) > radius else []
+    return _outside(body, away, across, radius)
+
+
+def _outside(body: Body, away: Reals, along: Reals, radius: float) -> list[Body]:
+    """The parts of a body's line where ``away + s along``, s from 0 to 1, is longer than ``radius``."""
+    length = float(along @ along)
+    middle, half = -float(away @ along) / length, float((away @ along) ** 2 - length * (away @ away - radius**2))
+    if half <= 0:
+        return [body]
+    half = float(np.sqrt(half)) / length
+    parts = [(0.0, min(1.0, middle - half)), (max(0.0, middle + half), 1.0)]
+    start, line = body.points[0], body.points[-1] - body.points[0]
+    return [
+        replace(body, points=np.array([start + low * line, start + high * line]))
+        for low, high in parts
+        if high > low and (high - low) ** 2 * length > SHORTEST**2
+    ]
+
+
+def _clipped(body: Body, centre: Reals, radius: float) -> list[Body]:
+    near, points = _split(body, centre, radius)
+    if not len(points):
+        return []
+    if not len(near):
+        return [body]
+    try:
+        points = points[scipy.spatial.ConvexHull(points).vertices]
+    except scipy.spatial.QhullError:  # a sliver
+        return []
+    return [replace(body, points=points)]
+
+
+def _split(body: Body, centre: Reals, radius: float) -> tuple[Reals, Reals]:
+    """Corners (n, 3) of a hull's parts nearer and farther than ``radius`` in the direction of its middle."""
+    outward = body.points.mean(axis=0) - centre
+    outward /= max(float(np.linalg.norm(outward)), SHORTEST)
+    height = (body.points - centre) @ outward - radius
+    kept, cut = body.points[height >= 0], body.points[height < 0]
+    if not (len(kept) and len(cut)):
+        return cut, kept
+    share = (height[height >= 0][:, None] / (height[height >= 0][:, None] - height[height < 0]))[..., None]
+    crossings = (kept[:, None] + share * (cut[None] - kept[:, None])).reshape(-1, 3)
+    return np.concatenate([cut, crossings]), np.concatenate([kept, crossings])
+
 
 PairState = Literal["never", "joined", "overlaps", "meets", "undecided", "allowed", "watched"]
 
@@ -350,3 +449,41 @@ def _row(first: str, second: str, found: Sequence[JudgedPair], reason: str) -> M
         sum(each.boxes for each in found),
         reason,
     )
+
+
+INSIDE = 1e-6  # m
+
+
+@dataclass(frozen=True)
+class BaseContact:
+    """A solid that a body of the base overlaps, by a depth (m; at least that if ``inside``).
+
+    ``inside``: the body's core, of a capsule its line, is in the solid, so that it is no mere mounting.
+    """
+
+    solid: str
+    depth: float
+    inside: bool
+
+
+def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
+    """Solids that the base overlaps, the deepest contact with each."""
+    base = [body for body in arm_bodies(robot) if body.link == BASE]
+    solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
+    bodies = [*base, *solids]
+    pairs = list(product(range(len(base)), range(len(base), len(bodies))))
+    if not pairs:
+        return ()
+    layout = layout_of(robot, bodies, pairs)
+    w = np.empty(layout.points.shape)
+    place(layout, np.zeros(robot.joints), np.empty(layout.links.shape), w, np.empty(layout.centre.shape))
+    shape = (layout.start, layout.kind, layout.radius, layout.disc)
+    found: dict[str, BaseContact] = {}
+    for a, b in pairs:
+        distance, deep = pair_distance(w, shape, a, b, np.empty((ROOM, 3)), np.empty((2, 3)))
+        inside = bool(deep) or distance + bodies[a].radius + bodies[b].radius < -INSIDE
+        contact = BaseContact(bodies[b].name, -float(distance), inside)
+        before = found.get(contact.solid)
+        if distance < 0 and (before is None or (contact.inside, contact.depth) > (before.inside, before.depth)):
+            found[contact.solid] = contact
+    return tuple(found.values())

@@ -15,10 +15,10 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue
-from er3a.collision.core_distance import distances_from_hull
+from er3a.collision.distances import distances_from_hull
 from er3a.errors import Er3aError
 from er3a.geometry.open3d_loader import load_open3d
-from er3a.geometry.sphere import fibonacci_sphere
+from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Envelope
 

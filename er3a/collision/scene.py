@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import ByValue
-from er3a.display import Displayed, Sheet, first_rows, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals

@@ -1,22 +1,193 @@
-"""The convex bodies of an arm, of what it carries and of a scene, in one form, and as arrays for kernels."""
+"""The convex bodies of an arm, of what it carries and of a scene, in one form, and as arrays for kernels.
+
+The shapes of an arm's links: those that its file gives, else capsules guessed from its table.
+
+A file that gives any shape gives them all: a link without one has none. Links are often left without a shape because
+the shapes of their neighbours cover them (frames in a wrist, rings between two housings), and a capsule guessed along
+the table's lengths lies inside what the file draws around the next joint, so that the two would overlap in every pose.
+Which links have none is said (``ArmShapes.bare``), because nothing that they hit is seen.
+
+The guess puts a capsule around each straight piece of a link, along its joint's axis and across to the next. Its
+radius is a share of the arm's size (the sum of all link lengths): 5.5 % at the shoulder, falling to 3 % at the wrist,
+which is about how thick small industrial arms are: an estimate. The column below axis 2 counts as base.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from er3a.collision.core_distance import CYLINDER, HALF_SPACE, HULL
-from er3a.collision.distance_kernels import WORLD, Layout
-from er3a.collision.envelopes import arm_shapes
-from er3a.collision.overlap_depth import cylinder_points
-from er3a.collision.pairs import link_label
+from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout, cylinder_points
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
-from er3a.kinematics.chain import constant_links, joint_starts
+from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
-from er3a.robots.robot import Robot
+from er3a.robots.robot import ConvexPiece, Envelope, Grade, Robot, derived
+
+BASE = 0  # number of the link that stands still
+TRIED = 1024  # joint vectors, spread over the limits, in which each pair is tried
+
+
+@dataclass(frozen=True)
+class LinkPair:
+    """Two links: 0 for the base, 1..6 for the link that joint 1..6 turns."""
+
+    first: int
+    second: int
+    code: Literal["link_pair"] = "link_pair"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.first)}/{link_label(self.second)}"
+
+
+@dataclass(frozen=True)
+class LinkAndSolid:
+    """A link and a solid of the scene, by its name."""
+
+    link: int
+    solid: str
+    code: Literal["link_and_solid"] = "link_and_solid"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.link)}/{self.solid}"
+
+
+@dataclass(frozen=True)
+class CarriedAndLink:
+    """What the tool carries, by its name, and a link."""
+
+    carried: str
+    link: int
+    code: Literal["carried_and_link"] = "carried_and_link"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.link)}/{self.carried}"
+
+
+@dataclass(frozen=True)
+class CarriedAndSolid:
+    """What the tool carries and a solid of the scene, by their names."""
+
+    carried: str
+    solid: str
+    code: Literal["carried_and_solid"] = "carried_and_solid"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{self.carried}/{self.solid}"
+
+
+Pair = LinkPair | LinkAndSolid | CarriedAndLink | CarriedAndSolid
+
+
+@dataclass(frozen=True)
+class PairOverlaps:
+    """Two bodies overlap, by a depth."""
+
+    pair: Pair
+    depth_mm: float
+    code: Literal["pair_overlaps"] = "pair_overlaps"
+
+
+@dataclass(frozen=True)
+class PairsUnexamined:
+    """Pairs whose collisions were not looked at, because their shapes overlap in all joint vectors tried
+    and so can't be right."""
+
+    pairs: tuple[Pair, ...]
+    code: Literal["pairs_unexamined"] = "pairs_unexamined"
+
+
+def link_label(number: int) -> str:
+    """A link's name in columns of text."""
+    return "base" if number == BASE else f"link_{number}"
+
+
+RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
+SHORTEST = 1e-6
+
+
+@dataclass(frozen=True)
+class ArmShapes:
+    """All shapes of an arm's links, and what they rest on.
+
+    Attributes
+    ----------
+    capsules, pieces : shapes of the links, in any order
+    given : whether the robot's file gives them; else they are guessed from its table
+    grade : how far they can be relied on: as the file grades them, ``inferred`` if it doesn't or if they are guessed
+    bare : numbers of links from 0 on that a file which gives shapes gives none; () for guessed shapes, which leave out
+        only links without length
+    """
+
+    capsules: tuple[Envelope, ...]
+    pieces: tuple[ConvexPiece, ...]
+    given: bool
+    grade: Grade
+    bare: tuple[int, ...]
+
+
+@derived
+def arm_shapes(robot: Robot) -> ArmShapes:
+    """The shapes that an arm has, for whatever asks for its shapes (see the module's text)."""
+    if not (robot.envelopes or robot.hulls):
+        return ArmShapes(default_envelopes(robot), (), False, "inferred", ())
+    source = robot.sources.get("envelopes")
+    shaped = {capsule.link for capsule in robot.envelopes} | {piece.link for piece in robot.hulls}
+    bare = tuple(link for link in range(robot.rows + 1) if link not in shaped)
+    return ArmShapes(robot.envelopes, robot.hulls, True, source.grade if source else "inferred", bare)
+
+
+def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
+    """Capsules along the table's link lengths (see the module's text)."""
+    size = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
+    parts, found = link_parts(robot), []
+    last = robot.rows
+    for k in range(last):
+        along = parts[k + 1, ALONG_Z, :3, 3]
+        across = along + parts[k + 1, TO_NEXT_AXIS, :3, 3]
+        if k == 0:
+            found += _pieces(robot, BASE, size, [(np.zeros(3), along)])
+            found += _pieces(robot, 1, size, [(along, across)])
+        else:
+            found += _pieces(robot, k + 1, size, [(np.zeros(3), along), (along, across)])
+    T = frames(robot, np.zeros(robot.joints))
+    found += _pieces(robot, last, size, [(across, (np.linalg.inv(T[last - 1]) @ T[last])[:3, 3])])
+    return tuple(found)
+
+
+def capsule_poses(robot: Robot, capsules: tuple[Envelope, ...], q: Reals) -> Reals:
+    """End points (..., n, 2, 3) of the capsules' lines in the base's surroundings, m, at joint values (..., n)."""
+    T = link_frames(robot, q)[..., [c.link for c in capsules], :, :]
+    ends = np.array([(c.start, c.end) for c in capsules])
+    placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
+    return placed
+
+
+def link_frames(robot: Robot, q: Reals) -> Reals:
+    """Frames (..., m + 1, 4, 4) of the base and the links at joint values (..., n)."""
+    T = frames(robot, q)
+    base = np.broadcast_to(robot.base, (*T.shape[:-3], 1, 4, 4))
+    return np.concatenate([base, T[..., :-1, :, :]], axis=-3)
+
+
+def _pieces(robot: Robot, link: int, size: float, lines: list[tuple[Reals, Reals]]) -> list[Envelope]:
+    return [
+        Envelope(link, tuple(start.tolist()), tuple(end.tolist()), RADIUS_RATIOS[round(link * 6 / robot.rows)] * size)
+        for start, end in lines
+        if np.linalg.norm(end - start) > SHORTEST
+    ]
+
 
 ON_AXIS = 1e-9  # m
 SIDES = 24

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.diagnosis.fault_kinds import Faults
+from er3a.diagnosis.faults import Faults
 from er3a.references.quantities import Pose, Side, Unit
 
 

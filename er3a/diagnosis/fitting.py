@@ -13,14 +13,101 @@ References
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Literal
 
 import numpy as np
 
-from er3a.diagnosis.free_numbers import FreeNumber, moved
+from er3a.diagnosis.faults import Fault, WrongAlpha, WrongLength, WrongOffset, WrongScale
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.references.quantities import MM
+
+FreeColumn = Literal["a", "d", "alpha", "offset"]
+COLUMNS: tuple[FreeColumn, ...] = ("a", "d", "alpha", "offset")
+ANGLES = ("alpha", "offset")
+
+
+@dataclass(frozen=True)
+class FreeNumber:
+    """An entry with a free value.
+
+    Attributes
+    ----------
+    column : None for the common scale of all lengths
+    joint : counted from 0; 0 for the scale
+    """
+
+    column: FreeColumn | None
+    joint: int
+
+    @property
+    def name(self) -> str:
+        """The entry's name, such as "d4"."""
+        return f"{self.column}{self.joint + 1}" if self.column else "scale"
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether the number comes round after a turn."""
+        return self.column in ANGLES
+
+    def value(self, tables: Tables) -> Reals:
+        """The entry (H,), in m or rad; 1 for the scale."""
+        if self.column is None:
+            return np.ones(len(tables))
+        column: Reals = getattr(tables, self.column)[:, self.joint]
+        return column
+
+    def fault(self, given: float, fits: float) -> Fault:
+        """What was wrong with an entry that is given with one value (m or rad; 1 for the scale) where another fits."""
+        joint = self.joint + 1
+        if self.column is None:
+            return WrongScale(fits)
+        if self.column == "alpha":
+            return WrongAlpha(joint, _degrees(given), _degrees(fits))
+        if self.column == "offset":
+            return WrongOffset(joint, _degrees(given), _degrees(fits))
+        return WrongLength(joint, self.column, given * MM, fits * MM)
+
+
+def free_numbers(joints: int) -> tuple[FreeNumber, ...]:
+    """All free numbers of a table; the scale first, so that it is applied before a length is set."""
+    entries = (FreeNumber(column, joint) for column in COLUMNS for joint in range(joints))
+    return (FreeNumber(None, 0), *entries)
+
+
+def moved(tables: Tables, numbers: Sequence[FreeNumber], which: Integers, amounts: Reals) -> Tables:
+    """Tables with amounts added to entries.
+
+    Parameters
+    ----------
+    which : (H, k), the places among ``numbers`` of the k entries to change in each table
+    amounts : (H, k), m or rad; relative for the scale
+    """
+    columns = {name: getattr(tables, name).copy() for name in COLUMNS}
+    for own, by in zip(which.T, amounts.T):
+        for place in np.unique(own):
+            rows, number = own == place, numbers[place]
+            if number.column is None:
+                for name in ("a", "d"):
+                    columns[name][rows] *= (1 + by[rows])[:, None]
+            else:
+                columns[number.column][rows, number.joint] += by[rows]
+    return replace(tables, **columns)
+
+
+def wrapped(angle: Reals) -> Reals:
+    """The same angles (rad) within (-pi, pi]."""
+    turned: Reals = np.pi - (np.pi - angle) % (2 * np.pi)
+    return turned
+
+
+def _degrees(angle: float) -> float:
+    return float(np.degrees(angle))
+
 
 PROBE = 1e-6
 MEETS = 1.0 + 1e-6
@@ -171,3 +258,85 @@ def _solved(slopes: Reals, left: Reals, weights: Reals, damping: Reals) -> Reals
 def _squares(left: Reals) -> Reals:
     squares: Reals = np.einsum("bn,bn->b", left, left)
     return squares
+
+
+@dataclass(frozen=True)
+class ScanGrid:
+    """How finely to look.
+
+    Attributes
+    ----------
+    angles : values in a turn
+    lengths : values, in units of the arm's length
+    basins : how many of the lowest places that are no neighbours are kept
+    """
+
+    angles: int
+    lengths: tuple[float, ...]
+    basins: int
+
+
+FINE = ScanGrid(24, (-1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0), 3)
+COARSE = ScanGrid(12, (-0.5, 0.0, 0.5), 2)
+PAIRED = ScanGrid(12, (-0.5, 0.0, 0.5), 3)
+DENSE = ScanGrid(24, (-1.0, -0.5, -0.25, -0.1, -0.03, 0.0, 0.03, 0.1, 0.25, 0.5, 1.0), 8)
+
+
+def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanGrid) -> Fits:
+    """The lowest places of the grid, for every start table and every combination of as many free numbers."""
+    reach, starts = arm_lengths(search.starts), len(search.starts)
+    amounts, which, sizes = list[Reals](), list[Integers](), list[tuple[int, ...]]()
+    for combination in combinations:
+        numbers = [search.numbers[place] for place in combination]
+        values = [grid_of(number, grid) for number in numbers]
+        scales = np.stack([reach if _is_length(number) else np.ones(starts) for number in numbers], axis=1)
+        points = np.array(list(product(*values)))
+        amounts.append((points * scales[:, None, :]).reshape(-1, len(combination)))
+        which.append(np.tile(np.array(combination), (starts * len(points), 1)))
+        sizes.append(tuple(len(each) for each in values))
+    start = np.concatenate([np.repeat(np.arange(starts), len(each) // starts) for each in amounts])
+    tried = search.at(start, np.concatenate(which), np.concatenate(amounts))
+    rows, before, squares = list[Integers](), 0, tried.squares
+    for combination, size in zip(combinations, sizes):
+        count = starts * math.prod(size)
+        cyclic = [search.numbers[place].is_angle for place in combination]
+        rows.append(before + _lowest(squares[before : before + count].reshape(starts, *size), cyclic, grid.basins))
+        before += count
+    return tried[np.concatenate(rows)]
+
+
+def grid_of(number: FreeNumber, grid: ScanGrid) -> Reals:
+    """Amounts to try: rad, or in units of the arm's length."""
+    if number.is_angle:
+        return 2 * np.pi * np.arange(grid.angles) / grid.angles
+    return np.array(grid.lengths if number.column else (0.0,))
+
+
+def arm_lengths(tables: Tables) -> Reals:
+    """Sum (m) of all lengths of each table, (H,)."""
+    lengths: Reals = np.abs(tables.a).sum(axis=1) + np.abs(tables.d).sum(axis=1)
+    return np.where(lengths > 0, lengths, 1.0)
+
+
+def _is_length(number: FreeNumber) -> bool:
+    return number.column in ("a", "d")
+
+
+def _lowest(heights: Reals, cyclic: Sequence[bool], count: int) -> Integers:
+    """Rows of the flattened grids ``heights`` (S, ...) that are lowest among their neighbours, ``count`` at most of
+    each grid."""
+    is_low = np.ones(heights.shape, dtype=bool)
+    for axis, around in enumerate(cyclic, start=1):
+        for shift in (1, -1):
+            neighbour = np.roll(heights, shift, axis=axis)
+            if not around:
+                edge = [slice(None)] * heights.ndim
+                edge[axis] = slice(0, 1) if shift == 1 else slice(-1, None)
+                neighbour[tuple(edge)] = np.inf
+            is_low &= heights <= neighbour
+    flat = np.where(is_low, heights, np.inf).reshape(len(heights), -1)
+    order = np.argsort(flat, axis=1, kind="stable")[:, :count]
+    kept = np.isfinite(np.take_along_axis(flat, order, axis=1))
+    rows = order + flat.shape[1] * np.arange(len(flat))[:, None]
+    lowest: Integers = rows[kept]
+    return lowest

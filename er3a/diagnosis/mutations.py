@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from er3a.diagnosis.fault_kinds import Faults, LengthColumn, WrongLength, WrongScale, entry_of
-from er3a.diagnosis.faults import repairs_of
+from er3a.diagnosis.faults import Faults, LengthColumn, WrongLength, WrongScale, entry_of, repairs_of
 from er3a.diagnosis.fitting import MEETS
 from er3a.diagnosis.ranking import Ranking, rank, usable
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.diagnosis.fault_kinds import Fault, ReversedDirection, WrongLimit
-from er3a.diagnosis.faults import SIDES
-from er3a.diagnosis.fitting import least_greatest
-from er3a.diagnosis.free_numbers import FreeNumber, moved
-from er3a.diagnosis.hypotheses import Case
+from er3a.diagnosis.diagnose import least_noticed
+from er3a.diagnosis.faults import SIDES, Fault, ReversedDirection, WrongLimit
+from er3a.diagnosis.fitting import FreeNumber, least_greatest, moved
 from er3a.diagnosis.mutations import Mutation, identifiable, left_open, moved_by, slope_of
-from er3a.diagnosis.resolution import least_noticed
+from er3a.diagnosis.ranking import Case
 from er3a.kinematics.table_batch import Tables
 from er3a.references.quantities import Limit, Side
 from er3a.references.reference import quantities_of

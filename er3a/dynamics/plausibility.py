@@ -12,8 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.dynamics.arm_model import drives_of
-from er3a.dynamics.link_shapes import WATER, LinkShape, link_shapes
+from er3a.dynamics.arm_model import WATER, LinkShape, drives_of, link_shapes
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import MassBody, NoBody, about, no_body, six_moments
 from er3a.robots.robot import Robot

@@ -17,8 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.dynamics.pose_bound import bounded_lever
-from er3a.dynamics.worst_pose import greatest_over_poses
+from er3a.dynamics.pose_bound import bounded_lever, greatest_over_poses
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals

@@ -13,7 +13,7 @@ from typing import Any
 
 from er3a.errors import InputError
 from er3a.files.yaml_file import vanished
-from er3a.formats.text_file import read_text
+from er3a.formats.mesh_file import read_text
 
 LARGEST_DIGITS = 9
 

@@ -12,7 +12,7 @@ from er3a.files.robot_library import placement_transform
 from er3a.files.units import JointsDeg, joint_values
 from er3a.files.yaml_file import StrictModel, load
 from er3a.numerics.arrays import Reals
-from er3a.programs.program_outcomes import ProgramOutcome
+from er3a.programs.syntax import ProgramOutcome
 from er3a.robots.robot import Robot
 
 

@@ -16,8 +16,8 @@ from pydantic import AfterValidator, Field
 
 from er3a.errors import InputError, InputWarning
 from er3a.numerics.arrays import Reals
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import MOST_JOINTS, Robot
-from er3a.robots.shown import meant
 
 METRES_BELOW_MM = 5.0
 FARTHEST_MM = 100_000.0

@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from yaml.composer import Composer
 
 from er3a.errors import InputError, InputWarning
-from er3a.formats.text_file import read_text
+from er3a.formats.mesh_file import read_text
 
 Model = TypeVar("Model", bound=BaseModel)
 

@@ -1,6 +1,19 @@
 """The serial chain in a URDF's tree: from a base link to a tip link, and what stands beside it.
 
 Reference: the ROS URDF specification (joint origin, axis, limit, mimic).
+
+The masses and drives that a URDF states: ``<inertial>`` of its links, ``<dynamics>`` and efforts of its joints.
+
+Links that are fixed to one another count as one. An effort of 0 means that it is unknown, as most files have it.
+
+Reference: the ROS URDF specification (an inertia is about the centre of mass, in the axes of the inertial's origin).
+
+Collision geometry of a URDF's links as capsules and convex hulls, and the way back.
+
+Boxes become hulls, cylinders prisms around them, spheres capsules without length. A mesh is taken as its hull, which
+holds it, or split into convex pieces if it is closed and that is asked for. The way back writes a mesh for each hull,
+and for a capsule its cylinder and two spheres. By how much a hull is to be taken larger stands beside its mesh as
+``<collision margin="...">`` (m), which other readers pass over.
 """
 
 from __future__ import annotations
@@ -9,15 +22,25 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+import scipy
+from scipy.spatial.transform import Rotation
 
-from er3a.errors import InputError
-from er3a.formats.text_file import read_text
-from er3a.geometry.transforms import transform
+from er3a.collision.distances import cylinder_points
+from er3a.collision.meshes import ConvexPieces, convex_pieces, hull_of
+from er3a.collision.shapes import CORNERS
+from er3a.errors import Er3aError, InputError
+from er3a.formats.mesh_file import read_link_mesh, read_link_vertices, read_text
+from er3a.geometry.transforms import rpy_of, transform, translation
+from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
+from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, NoBody, moved, nearest_body, no_body, together
+from er3a.robots.robot import ConvexPiece, Envelope, Robot
 
 MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")
@@ -374,3 +397,325 @@ def _snapped(rpy: Reals, where: str, notes: list[str]) -> Reals:
     for given, taken in zip(rpy[near], right[near]):
         notes.append(f"{where}: angle {given:.10g} rad taken as {np.degrees(taken):g} deg")
     return np.where(near, right, rpy)
+
+
+class LinkPlaces(Protocol):
+    """Where links stand, as :func:`er3a.formats.urdf.link_places` tells."""
+
+    def __call__(self, name: str, carried: bool = False, /) -> tuple[Reals, int] | None: ...
+
+
+ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def masses_from_urdf(
+    root: ElementTree.Element, robot: Robot, places: LinkPlaces, moving: Sequence[str], names: Sequence[str]
+) -> tuple[Masses, tuple[str, ...], tuple[str, ...]]:
+    """Bodies in the robot's frames, and what is known of its drives.
+
+    A link whose inertia no body can have keeps its mass and centre, with the nearest inertia that a body can have.
+
+    Parameters
+    ----------
+    robot : the arm with the table derived from the same URDF
+    places : of the links of that URDF
+    moving : names of the chain's moving joints; names : of those that the robot's joint values are of
+
+    Returns
+    -------
+    masses, notes : notes name links and what was assumed of them
+    changed : links that have another inertia than the file says
+    """
+    at_zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))[:-1]])
+    found: dict[int, list[MassBody]] = {}
+    notes: list[str] = []
+    changed: list[str] = []
+    for link in root.findall("link"):
+        inertial = link.find("inertial")
+        if inertial is None:
+            continue
+        name = link.get("name", "?")
+        place = places(name, True)
+        if place is None:
+            notes.append(f"link {name} does not move with the arm's chain; its mass was left out")
+            continue
+        body, T = _body(inertial)
+        problem = no_body(body)
+        if problem in ("not_finite", "negative_mass"):
+            notes.append(f"link {name} has {_unusable(inertial)}; its mass was left out")
+            continue
+        if problem:
+            given, body = body, nearest_body(body)
+            notes.append(_changed(name, problem, given, body))
+            changed.append(name)
+        if body.mass > 0 or any(body.inertia):
+            placed, number = place
+            found.setdefault(number, []).append(moved(body, np.linalg.inv(at_zero[number]) @ placed @ T))
+    missing = [name for k, name in enumerate(moving) if k + 1 not in found]
+    if found and missing:
+        notes.append(f"no mass is given for what moves with {', '.join(missing)}")
+    links = tuple(LinkMass(number, together(bodies)) for number, bodies in sorted(found.items()))
+    return Masses(links=links, drives=_drives(root, names)), tuple(notes), tuple(changed)
+
+
+def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) -> None:
+    """Add ``<inertial>`` to the links of a URDF whose link frames are those that move with the joints."""
+    elements = {link.get("name"): link for link in root.findall("link")}
+    for each in robot.masses.links:
+        body = moved(each.body, robot.base) if each.link == 0 else each.body
+        inertial = ElementTree.SubElement(elements[names[each.link]], "inertial")
+        ElementTree.SubElement(inertial, "origin", xyz=" ".join(map(repr, body.centre)), rpy="0 0 0")
+        ElementTree.SubElement(inertial, "mass", value=repr(body.mass))
+        ElementTree.SubElement(inertial, "inertia", {key: repr(value) for key, value in zip(ENTRIES, body.inertia)})
+
+
+def peak_torque(robot: Robot, joint: int) -> float:
+    """What a joint's (from 0) drive gives for a moment, N m or N; 0 where it is unknown."""
+    drives = robot.masses.drives
+    return 0.0 if drives is None or np.isnan(drives.peak[joint]) else float(drives.peak[joint])
+
+
+def write_friction(robot: Robot, joint: int, element: ElementTree.Element) -> None:
+    """Add ``<dynamics>`` to a URDF's joint, with what is known of the friction of a joint (from 0)."""
+    drives = robot.masses.drives
+    known = {} if drives is None else {"damping": drives.viscous[joint], "friction": drives.coulomb[joint]}
+    written = {key: repr(float(value)) for key, value in known.items() if not np.isnan(value)}
+    if written:
+        ElementTree.SubElement(element, "dynamics", written)
+
+
+def _body(inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
+    """Mass and inertia about the centre, and the frame of the centre (4, 4) in the link's."""
+    origin, mass, inertia = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
+    moments = [_number(inertia, key) for key in ENTRIES]
+    xyz, rpy = (_triple(origin, key) for key in ("xyz", "rpy"))
+    xx, yy, zz, xy, xz, yz = moments
+    body = MassBody(_number(mass, "value"), (0.0, 0.0, 0.0), (xx, yy, zz, xy, xz, yz))
+    if not np.isfinite([*xyz, *rpy]).all():
+        return MassBody(math.nan), np.eye(4)
+    return body, transform(xyz, rpy)
+
+
+def _unusable(inertial: ElementTree.Element) -> str:
+    """What of an ``<inertial>`` is no finite number, or that its mass is below 0."""
+    for element in inertial:
+        for key, text in element.items():
+            values = np.array([_float(word) for word in text.split()])
+            if not np.isfinite(values).all() or len(values) != (3 if key in ("xyz", "rpy") else 1):
+                return f"'{text[:60]}' for {key} of its {element.tag}"
+    return f"a mass of {_number(inertial.find('mass'), 'value'):g} kg, which is below 0"
+
+
+def _changed(name: str, problem: NoBody, given: MassBody, taken: MassBody) -> str:
+    """That a link has another inertia than the file says."""
+    least, middle, greatest = np.linalg.eigvalsh(given.inertia_matrix).tolist()
+    what = f"of {greatest:g} kg m2, above the sum of the other two ({least + middle:g} kg m2)"
+    what = f"of {least:g} kg m2, below 0" if problem == "negative_moment" else what
+    shown = ", ".join(f"{value:g}" for value in np.linalg.eigvalsh(taken.inertia_matrix))
+    instead = f"the nearest that a body can have was taken, with principal moments of {shown} kg m2"
+    return f"link {name} has a principal moment of inertia {what}; its mass and centre stay, and {instead}"
+
+
+def _drives(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
+    joints = {joint.get("name", "?"): joint for joint in root.findall("joint")}
+    coulomb, viscous, effort = (
+        np.array([_number(joints[name].find(tag), key, math.nan) for name in names])
+        for tag, key in (("dynamics", "friction"), ("dynamics", "damping"), ("limit", "effort"))
+    )
+    effort[~(effort > 0)] = np.nan
+    coulomb, viscous = (np.where(values >= 0, values, np.nan) for values in (coulomb, viscous))
+    if np.isnan([coulomb, viscous, effort]).all():
+        return None
+    unknown = np.full(len(names), np.nan)
+    return Drives(unknown, unknown, coulomb, viscous, rated=unknown, peak=effort)
+
+
+def _number(element: ElementTree.Element | None, key: str, default: float = 0.0) -> float:
+    text = element.get(key) if element is not None else None
+    return default if text is None else _float(text)
+
+
+def _float(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _triple(origin: ElementTree.Element | None, key: str) -> Reals:
+    words = (origin.get(key) or "0 0 0").split() if origin is not None else ["0"] * 3
+    values = np.array([_float(word) for word in words])
+    return values if values.shape == (3,) else np.full(3, np.nan)
+
+
+PRISM_SIDES = 24
+SMALLEST_SPHERE_M = 0.002
+THRESHOLD, SEED = 0.05, 0
+
+
+def collision_shapes(
+    path: Path, name: str, collision: ElementTree.Element, place: tuple[Reals, int], notes: list[str], split: bool
+) -> list[Envelope | ConvexPiece]:
+    """Shapes of one ``<collision>``.
+
+    Parameters
+    ----------
+    name : of its link in the URDF
+    place : (4, 4), from the URDF link's frame to that of our link, and the number of that link
+    notes : gets what was assumed or left out; split : whether meshes are split into convex pieces
+
+    Raises
+    ------
+    InputError
+        for numbers that make no shape, or a mesh that can't be read
+    """
+    T_link, link = place
+    origin, geometry = collision.find("origin"), collision.find("geometry")
+    where = f"collision of link {name}"
+    xyz, rpy = (numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    T = T_link @ transform(xyz, rpy)
+    shape = geometry[0] if geometry is not None and len(geometry) else None
+    match shape.tag if shape is not None else "":
+        case "box":
+            size = _sizes(path, where, numbers(path, where, shape, "size", (1.0, 1.0, 1.0)))
+            pieces = ConvexPieces((CORNERS * size,), 0.0, 0.0)
+        case "cylinder":
+            given = [numbers(path, where, shape, key, None) for key in ("radius", "length")]
+            radius, length = _sizes(path, where, np.concatenate(given)).tolist()
+            ends = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
+            pieces = ConvexPieces((cylinder_points(ends, radius, PRISM_SIDES),), 0.0, 0.0)
+        case "sphere":
+            x, y, z = T[:3, 3].tolist()
+            radius = float(_sizes(path, where, numbers(path, where, shape, "radius", None))[0])
+            if radius < SMALLEST_SPHERE_M:
+                notes.append(
+                    f"{where}: a sphere of {1000 * radius:g} mm is taken as one of {1000 * SMALLEST_SPHERE_M:g} mm"
+                )
+            return [Envelope(link, (x, y, z), (x, y, z), max(radius, SMALLEST_SPHERE_M))]
+        case "mesh":
+            found = _mesh(path, where, shape, notes, split)
+            if found is None:
+                return []
+            pieces = found
+        case tag:
+            notes.append(f"{where}: <{tag}> is no shape that er3a reads; it is left out")
+            return []
+    placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
+    stated = float(numbers(path, where, collision, "margin", None)[0]) if "margin" in collision.attrib else 0.0
+    margin = pieces.uncovered + max(stated, 0.0)
+    return [ConvexPiece(link, tuple((x, y, z) for x, y, z in piece.tolist()), margin) for piece in placed]
+
+
+def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, meshes: Path | None) -> None:
+    """Add ``<collision>`` to the links of a URDF whose link frames are those that move with the joints.
+
+    Parameters
+    ----------
+    meshes : folder beside the URDF that gets an OBJ for each convex piece; None leaves the pieces out
+    """
+    elements = {link.get("name"): link for link in root.findall("link")}
+    for capsule in robot.envelopes:
+        link, ends = elements[names[capsule.link]], _in_link(robot, capsule.link, [capsule.start, capsule.end])
+        length = float(np.linalg.norm(ends[1] - ends[0]))
+        for point in ends if length else ends[:1]:
+            _collision(link, translation(*point), "sphere", radius=repr(capsule.radius))
+        if length:
+            T = translation(*ends.mean(axis=0))
+            T[:3, :3] = Rotation.align_vectors(ends[1:] - ends[:1], [[0, 0, 1]])[0].as_matrix()
+            _collision(link, T, "cylinder", radius=repr(capsule.radius), length=repr(length))
+    if meshes is None:
+        return
+    if robot.hulls:
+        meshes.mkdir(parents=True, exist_ok=True)
+    for number, piece in enumerate(robot.hulls, start=1):
+        file = meshes / f"{names[piece.link]}_{number}.obj"
+        file.write_text(_obj(_in_link(robot, piece.link, piece.points)), encoding="utf-8")
+        link = elements[names[piece.link]]
+        collision = _collision(link, np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
+        if piece.margin:
+            collision.set("margin", repr(piece.margin))
+
+
+def _in_link(robot: Robot, link: int, points: Sequence[tuple[float, float, float]]) -> Reals:
+    """Points (n, 3) of a robot's link in the frame of the URDF's: that of link 0 is the world's."""
+    array = np.array(points)
+    return array @ robot.base[:3, :3].T + robot.base[:3, 3] if link == 0 else array
+
+
+def _collision(link: ElementTree.Element, T: Reals, shape: str, **attributes: str) -> ElementTree.Element:
+    collision = ElementTree.SubElement(link, "collision")
+    xyz, rpy = (" ".join(map(repr, values.tolist())) for values in (T[:3, 3], rpy_of(T)))
+    ElementTree.SubElement(collision, "origin", xyz=xyz, rpy=rpy)
+    ElementTree.SubElement(ElementTree.SubElement(collision, "geometry"), shape, attributes)
+    return collision
+
+
+def _obj(points: Reals) -> str:
+    """The hull of points (n, 3) as an OBJ file, or a fan of triangles if they lie in a plane."""
+    try:
+        hull = scipy.spatial.ConvexHull(points)
+    except scipy.spatial.QhullError:
+        faces = np.array([(0, k, k + 1) for k in range(1, len(points) - 1)])
+    else:
+        corners = points[hull.simplices]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        outwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) > 0
+        faces = np.where(outwards[:, None], hull.simplices, hull.simplices[:, ::-1])
+    lines = [("v", *point) for point in points.tolist()] + [("f", *face) for face in (faces + 1).tolist()]
+    return "".join(f"{kind} {x!r} {y!r} {z!r}\n" for kind, x, y, z in lines)
+
+
+def _sizes(path: Path, where: str, sizes: Reals) -> Reals:
+    """Sizes of a shape, m, none of them below 0."""
+    if (sizes < 0).any():
+        raise InputError(path, where, f"a size of {sizes.min():g} m is below 0", "Write sizes above 0")
+    return sizes
+
+
+def _mesh(
+    path: Path, where: str, shape: ElementTree.Element | None, notes: list[str], split: bool
+) -> ConvexPieces | None:
+    name = shape.get("filename", "") if shape is not None else ""
+    file = mesh_of(path, name)
+    if file is None:
+        notes.append(f"{where}: the mesh {name} was not found; the link has no shape of it")
+        return None
+    scale = numbers(path, where, shape, "scale", (1.0, 1.0, 1.0))
+    if split:
+        try:
+            mesh = read_link_mesh(file, scale)
+            return convex_pieces(mesh.vertices, mesh.faces, THRESHOLD, SEED)
+        except Er3aError as error:
+            notes.append(f"{where}: the hull of {file.name} is taken ({error})")
+    try:
+        return hull_of(read_link_vertices(file, scale))
+    except Er3aError as error:
+        notes.append(f"{where}: {error}; the link has no shape of it")
+        return None
+
+
+def mesh_of(path: Path, name: str) -> Path | None:
+    """The mesh's file that a URDF names, beside it or in a package above it; None if there is none."""
+    package, _, rest = name.removeprefix("package://").partition("/")
+    places = [path.parent / name.removeprefix("file://")]
+    if name.startswith("package://"):
+        places = [place for parent in path.resolve().parents for place in (parent / package / rest, parent / rest)]
+    return next((place for place in places if place.is_file()), None)
+
+
+def numbers(
+    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
+) -> np.ndarray:
+    """Finite numbers of an attribute: three where there is a default, else one; :class:`InputError` otherwise."""
+    text = element.get(key) if element is not None else None
+    if text is None:
+        if default is None:
+            raise InputError(path, where, f"has no {key}", f"Add {key} to it")
+        return np.array(default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.array([math.nan])
+    if len(values) != (3 if default else 1) or not np.isfinite(values).all():
+        raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not what stands there", "Write finite numbers")
+    return values

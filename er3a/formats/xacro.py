@@ -10,9 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from er3a.errors import InputError
-from er3a.formats.text_file import read_text
-from er3a.formats.urdf_shapes import mesh_of
-from er3a.formats.urdf_tree import MOST_BYTES
+from er3a.formats.mesh_file import read_text
+from er3a.formats.urdf_tree import MOST_BYTES, mesh_of
 
 COMMENT = re.compile("<!--.*?-->", re.DOTALL)
 FOLDERS_UP = 4  # in and beside which packages are looked for

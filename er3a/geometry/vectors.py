@@ -84,3 +84,35 @@ def unsigned_angle(a: Vector, b: Vector) -> float:
     c = cross(a, b)
     angle: float = np.arctan2(np.sqrt(dot(c, c)), dot(a, b))
     return angle
+
+
+TURN = 2 * np.pi
+
+
+def greatest_move(q: Reals, q_ref: Reals) -> Reals:
+    """How far (...,), rad, the joint turns that turns farthest from joint angles ``q_ref`` to ``q`` (..., 6).
+
+    By this the arm's next joint angles are *near* wherever solutions are ranked or ordered.
+    """
+    move: Reals = np.abs(q - q_ref).max(axis=-1, initial=0.0)
+    return move
+
+
+def wrap_to_pi(angle: Reals) -> Reals:
+    """The same angles (rad, any shape) in (-pi, pi]."""
+    return angle - TURN * np.ceil((angle - np.pi) / TURN)
+
+
+def fibonacci_sphere(count: int, turned_back: bool = False) -> Reals:
+    """Nearly even unit vectors (count, 3), each for the same area [1]_; ``turned_back``: mirrored at y = 0.
+
+    References
+    ----------
+    .. [1] A. Gonzalez, "Measurement of areas on a sphere using Fibonacci and latitude-longitude lattices",
+       Mathematical Geosciences 42, 2010.
+    """
+    n = np.arange(count)
+    z = 1 - (2 * n + 1) / count
+    azimuth = n * np.pi * (3 - np.sqrt(5)) if turned_back else 2 * np.pi * n * (2 / (1 + np.sqrt(5)))
+    flat = np.sqrt(1 - z * z)
+    return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), z], axis=1)

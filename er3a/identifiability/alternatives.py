@@ -2,25 +2,146 @@
 
 Only what others don't compose counts: a combination that contains another that is allowed adds nothing to it, and so
 does one whose tool moves as that of several allowed ones together.
+
+Discrete changes of a table: directions reversed, half turns, signs, the other convention.
+
+None of them is near the table, so none can be found by linearisation: they and their combinations are tried.
+
+A table that requirements leave open, looked for far from one that misses them: joints reversed, all else free.
+
+No continuous change reverses a joint, and a wrong sign leads the search for the rest astray. So the patterns of
+directions are gone through, those with few joints reversed first, and from each the search starts again. Of what is
+found, and of what discrete changes make of it that requirements leave open as well, the table nearest to the given one
+is taken.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.identifiability.entries import entries_of
-from er3a.identifiability.feasible import MET
-from er3a.identifiability.flips import Flip, changed, flips_of, sets_of
+from er3a.identifiability.entries import Column, TableNumber, entries_of
+from er3a.identifiability.feasible import MET, Region
 from er3a.identifiability.requirements import Asked
-from er3a.identifiability.tool_motion import ToolOff, ToolRange
-from er3a.kinematics.table_batch import Tables
-from er3a.numerics.arrays import Flags, Reals
+from er3a.identifiability.statements import ToolOff, ToolRange
+from er3a.kinematics.table_batch import Tables, join, robot_of
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.references.quantities import Quantity
 from er3a.references.seen import TableEntry
 from er3a.robots.robot import Robot
+
+MOST_TOGETHER = 4
+PATTERNS_UP_TO = 6
+SOME_DEG = 1e-6
+
+
+@dataclass(frozen=True)
+class Flip:
+    """One discrete change.
+
+    Attributes
+    ----------
+    entries : those that it changes; None for the convention
+    about_deg : of a direction that is reversed about another angle than 0, that angle
+    """
+
+    kind: str
+    entry: TableNumber | None
+    about_deg: float = 0.0
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Names of the entries that it changes."""
+        if self.entry is None:
+            return ("convention",)
+        if self.about_deg:
+            return self.entry.name, f"offset{self.entry.joint}"
+        return (self.entry.name,)
+
+    def apply(self, table: Tables) -> Tables:
+        """Tables with it."""
+        if self.entry is None:
+            return replace(table, modified=~table.modified)
+        j = self.entry.joint - 1
+        own: Reals = getattr(table, self.entry.column)[:, [j]]
+        if self.kind == "half_turn":
+            return table.with_column(self.entry.column, [j], half_turn(own))
+        changed = table.with_column(self.entry.column, [j], -own)
+        if self.about_deg:
+            shift = 2 * own * np.radians(self.about_deg)
+            changed = changed.with_column("offset", [j], table.offset[:, [j]] + shift)
+        return changed
+
+
+def half_turn(angle: Reals) -> Reals:
+    """Half a turn further, kept within (-pi, pi] as people write angles."""
+    turned = angle + np.pi
+    return np.where(turned > np.pi + 1e-9, turned - 2 * np.pi, turned)
+
+
+def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:
+    """The changes of a robot's table, the likeliest to be mistaken first."""
+    joints = range(1, len(robot.a) + 1)
+    found = [Flip("reversed", TableNumber("direction", j)) for j in joints]
+    for j in joints:
+        angles = {round(quantity.seen_at[j - 1], 9) for quantity in quantities} - {0.0}
+        found += [Flip("reversed", TableNumber("direction", j), angle) for angle in sorted(angles)]
+    last_first = joints[::-1]  # what only turns the flange comes before what the flange and others compose
+    found += [Flip("half_turn", TableNumber("offset", j)) for j in last_first]
+    found += [Flip("half_turn", TableNumber("alpha", j)) for j in last_first]
+    oblique = np.abs(np.sin(2 * robot.alpha)) > np.sin(np.radians(SOME_DEG))
+    found += [Flip("sign", TableNumber("alpha", j)) for j in joints if oblique[j - 1]]
+    columns: tuple[Column, ...] = ("a", "d")
+    found += [
+        Flip("sign", TableNumber(column, j)) for column in columns for j in joints if getattr(robot, column)[j - 1]
+    ]
+    return [*found, Flip("convention", None)]
+
+
+def sets_of(flips: Sequence[Flip]) -> Iterator[list[tuple[int, ...]]]:
+    """Combinations to try, by how many flips are in them: all up to four; of directions and half turns of offsets, for
+    arms of up to six joints, all that there are."""
+    basic = [i for i, flip in enumerate(flips) if not flip.about_deg and flip.entry is not None]
+    turning = [i for i in basic if flips[i].entry.column in ("direction", "offset")]  # type: ignore[union-attr]
+    most = len(turning) if len(turning) <= 2 * PATTERNS_UP_TO else MOST_TOGETHER
+    for count in range(1, max(most, MOST_TOGETHER) + 1):
+        if count <= 2:
+            chosen = list(combinations(range(len(flips)), count))
+        elif count <= MOST_TOGETHER:
+            chosen = list(combinations(basic, count))
+        else:
+            chosen = list(combinations(turning, count))
+        yield [each for each in chosen if _apart(flips, each)]
+
+
+def _apart(flips: Sequence[Flip], chosen: tuple[int, ...]) -> bool:
+    """Whether no entry is changed twice."""
+    names = [name for i in chosen for name in flips[i].entries]
+    return len(set(names)) == len(names)
+
+
+def changed(table: Tables, flips: Sequence[Flip], chosen: Sequence[tuple[int, ...]]) -> Tables:
+    """Tables with each combination of flips."""
+    batch = table[np.zeros(len(chosen), dtype=np.int64)]
+    for i, flip in enumerate(flips):
+        rows = np.array([i in each for each in chosen])
+        if rows.any():
+            own = flip.apply(batch[rows])
+            batch = _placed(batch, rows, own)
+    return batch
+
+
+def _placed(batch: Tables, rows: Flags, own: Tables) -> Tables:
+    """A batch with some of its rows replaced."""
+    order = np.empty(len(batch), dtype=np.int64)
+    order[~rows] = np.arange(int((~rows).sum()))
+    order[rows] = np.arange(int(rows.sum())) + int((~rows).sum())
+    return join([batch[~rows], own])[order]
+
 
 CHUNK = 1024
 NO_WORSE = 1e-6
@@ -186,3 +307,67 @@ def _holds(chosen: tuple[int, ...], smaller: Sequence[tuple[int, ...]], proper: 
     """Whether a combination contains one of the others (or is one of them, unless ``proper``)."""
     own = set(chosen)
     return any(set(each) <= own and not (proper and len(each) == len(own)) for each in smaller)
+
+
+ROUNDED = 6
+
+
+def open_table(asked: Asked, table: Tables, entries: Sequence[TableNumber], gauge: Reals) -> Tables | None:
+    """A table (a batch of one) that requirements leave open, with few joints reversed; None if none was found.
+
+    Parameters
+    ----------
+    entries : k that may change besides the directions; gauge : (g, k), combinations that are held
+    """
+    joints = range(table.direction.shape[1])
+    for count in range(1, len(joints) + 1):
+        found = []
+        for chosen in combinations(joints, count):
+            reversed_ = table.with_column("direction", list(chosen), -table.direction[:, list(chosen)])
+            region = Region(asked, reversed_, entries, gauge)
+            start = region.start(np.zeros(len(entries)), few_first=False)
+            if start.open:
+                found.append(region.at(start.amounts))
+        if found:
+            every = join(found)
+            return _nearest_open(every[[int(_by_distance(every, table)[0])]], table, asked)
+    return None
+
+
+def amounts_between(table: Tables, other: Tables, entries: Sequence[TableNumber]) -> Reals:
+    """What is to be added (k,) to entries of a table, in their scales, to get another; angles within half a turn."""
+    amounts = []
+    for entry in entries:
+        change = float((getattr(other, entry.column) - getattr(table, entry.column))[0, entry.joint - 1])
+        wrapped = (change + np.pi) % (2 * np.pi) - np.pi
+        amounts.append((change if entry.unit == "mm" else wrapped) / entry.scale)
+    return np.array(amounts)
+
+
+def _nearest_open(found: Tables, table: Tables, asked: Asked) -> Tables:
+    """Of an open table and those that discrete changes make of it and that are open too, the nearest to a table."""
+    flips = [flip for flip in flips_of(robot_of(found, 0, asked.robot), []) if flip.entry is not None]
+    every = [found]
+    for _, chosen in zip(range(MOST_TOGETHER), sets_of(flips)):
+        for start in range(0, len(chosen), CHUNK):
+            tables = changed(found, flips, chosen[start : start + CHUNK])
+            met = (
+                (asked.plain_violation(tables) <= MET).all(axis=1) if asked.plain else np.ones(len(tables), dtype=bool)
+            )
+            every.append(tables[np.flatnonzero(met)])
+    tables = join(every)
+    for i in _by_distance(tables, table).tolist():
+        if asked.violation(asked.off(tables[[i]], afresh=True)).max() <= MET:
+            return tables[[i]]
+    return found
+
+
+def _by_distance(tables: Tables, table: Tables) -> Integers:
+    """Places of tables, nearest to one first: by angles turned, a reversed joint being half a turn, then by lengths."""
+    turned = np.pi * (tables.direction != table.direction).sum(axis=1)
+    for name in ("alpha", "offset"):
+        apart = getattr(tables, name) - getattr(table, name)
+        turned += np.abs((apart + np.pi) % (2 * np.pi) - np.pi).sum(axis=1)
+    lengths = np.abs(tables.a - table.a).sum(axis=1) + np.abs(tables.d - table.d).sum(axis=1)
+    order: Integers = np.lexsort((lengths.round(ROUNDED), turned.round(3)))
+    return order

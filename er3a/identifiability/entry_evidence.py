@@ -7,11 +7,10 @@ from functools import cached_property
 from itertools import groupby
 from typing import Literal
 
-from er3a.by_value import ByValue
-from er3a.display import Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.identifiability.alternatives import Alternative
 from er3a.identifiability.entries import EntryUnit, column_of
-from er3a.identifiability.tool_motion import NOT_OFF, ToolOff
+from er3a.identifiability.statements import NOT_OFF, ToolOff
 from er3a.kinematics.table_batch import Tables
 from er3a.references.reference import Reference
 from er3a.robots.robot import Robot

@@ -2,36 +2,124 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isnan
+from typing import Literal
 
-from er3a.identifiability.alternatives import Alternative, alternatives_to, gauge_flips, with_readings
+import numpy as np
+
+from er3a.identifiability.alternatives import (
+    Alternative,
+    alternatives_to,
+    flips_of,
+    gauge_flips,
+    open_table,
+    with_readings,
+)
 from er3a.identifiability.continuous import Extent, Extents
 from er3a.identifiability.entries import (
+    GROUP_OF,
+    Gauge,
     TableNumber,
     column_of,
     continuous_of,
     document_of,
     entries_of,
+    gauge_of,
+    shifted,
 )
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, OtherReading, OtherTable, Status, Tolerance
 from er3a.identifiability.feasible import MET
-from er3a.identifiability.flips import flips_of
-from er3a.identifiability.gauge import Gauge, gauge_of
-from er3a.identifiability.limits import judge_limit
 from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, Requirement, requirements_of
-from er3a.identifiability.restarts import open_table
-from er3a.identifiability.tool_motion import NOT_OFF, ToolOff, ToolRange
+from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags
-from er3a.references.documents import Documents
-from er3a.references.reference import Reference, conflicts
+from er3a.references.quantities import Limit, PoseOutside, Speed
+from er3a.references.reference import Documents, Reference, conflicts
 from er3a.robots.robot import Robot
 
+LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
 ROUNDING = 1e-9
+WIDEST = 720.0
+FIRST_STEP, HALVINGS = 0.05, 12
+
+
+def judge_limit(
+    robot: Robot, entry: TableNumber, independent: Sequence[Reference], told: bool
+) -> tuple[LimitStatus, tuple[float, float]]:
+    """Status of a limit or speed, and what independent references leave open for it, in its unit.
+
+    Parameters
+    ----------
+    independent : references that react to it and rest on other documents than it does
+    told : whether any reference reacts to it
+    """
+    value = entry.value(robot)
+    direct = [r for r in independent if isinstance(r.quantity, Limit | Speed)]
+    if direct:
+        spans = [(float(r.expected or 0.0) - r.uncertainty, float(r.expected or 0.0) + r.uncertainty) for r in direct]
+        agree = [low - ROUNDING <= value <= high + ROUNDING for low, high in spans]
+        hull = min(low for low, _ in spans), max(high for _, high in spans)
+        status: LimitStatus = "settled" if all(agree) else "weak" if any(agree) else "contradicted"
+        return status, hull
+    low, high = value - WIDEST, value + WIDEST
+    if not independent:
+        return ("consistent" if told else "open"), (low, high)
+    low, high = _past_poses(entry, independent, low, high)
+    if entry.column != "speed":
+        low, high = _by_extremes(robot, entry, independent, low, high)
+    inside = low - ROUNDING <= value <= high + ROUNDING
+    return ("weak" if inside else "contradicted"), (low, high)
+
+
+def _past_poses(entry: TableNumber, independent: Sequence[Reference], low: float, high: float) -> tuple[float, float]:
+    """A limit lies beyond every pose at which a document shows the arm."""
+    for reference in independent:
+        if isinstance(reference.quantity, PoseOutside):
+            angle = reference.quantity.pose[entry.joint - 1]
+            if entry.column == "upper":
+                low = max(low, angle - reference.uncertainty)
+            else:
+                high = min(high, angle + reference.uncertainty)
+    return low, high
+
+
+def _by_extremes(
+    robot: Robot, entry: TableNumber, independent: Sequence[Reference], low: float, high: float
+) -> tuple[float, float]:
+    """How far a limit may go before reach or extents are missed, the rest of the table as it is."""
+    asked = Asked(robot, requirements_of(independent))
+    if not asked.extreme:
+        return low, high
+    value = entry.value(robot)
+    table = tables_of(robot)
+
+    def met(amount: float) -> bool:
+        changed = shifted(table, [entry], np.array([[amount / entry.in_unit]]))
+        return bool(asked.violation(asked.off(changed, afresh=True)).max() <= ROUNDING)
+
+    if not met(0.0):
+        return low, high
+    return value + max(-_reach(lambda x: met(-x), value - low), low - value), value + _reach(met, high - value)
+
+
+def _reach(met: Callable[[float], bool], most: float) -> float:
+    """How far one can go before requirements are missed, by doubling and halving steps."""
+    inside, step = 0.0, FIRST_STEP
+    while step < most and met(step):
+        inside, step = step, 2 * step
+    if step >= most:
+        return most
+    outside = step
+    for _ in range(HALVINGS):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if met(middle) else (inside, middle)
+    return inside
+
+
 SHOWN_STEP = 5.0
 
 
@@ -425,3 +513,77 @@ def _worst(found: Sequence[ToolOff]) -> ToolOff:
     for each in found:
         worst = worst.worse(each)
     return worst
+
+
+PartName = Literal["geometry", "zero_and_directions", "limits", "speeds"]
+PartStatus = Literal["settled", "consistent", "weak", "open", "contradicted", "absent"]
+PART_OF_GROUP: dict[str, PartName] = {
+    "dh": "geometry",
+    "zero": "zero_and_directions",
+    "limits": "limits",
+    "speeds": "speeds",
+}
+GRAVEST: tuple[PartStatus, ...] = ("contradicted", "open", "weak", "consistent", "settled")
+SETTLED: tuple[Status, ...] = ("settled", "gauge", "given")
+MOST_COMBINED = 256
+
+
+@dataclass(frozen=True)
+class PartEvidence:
+    """A part of the verdict.
+
+    Attributes
+    ----------
+    status : the gravest of its entries'; absent where the robot's file gives none of them
+    unsettled : its entries that aren't settled
+    off : how far the tool could be off for any one of them, or for all discrete ones together
+    code : the part's name
+    """
+
+    status: PartStatus
+    unsettled: tuple[EntryEvidence, ...]
+    off: ToolOff
+    code: PartName
+
+
+def parts_of(evidence: Evidence) -> tuple[PartEvidence, ...]:
+    """The parts of the verdict."""
+    columns = {entry.name: PART_OF_GROUP[GROUP_OF[entry.column]] for entry in entries_of(evidence.robot)}
+    found = []
+    for part in PART_OF_GROUP.values():
+        own = [each for each in (*evidence.entries, *evidence.combinations) if _part(each, columns) == part]
+        unsettled = tuple(each for each in own if each.status not in SETTLED)
+        held = {each.status for each in unsettled}
+        best: PartStatus = "settled" if own else "absent"
+        status: PartStatus = next((each for each in GRAVEST if each in held), best)
+        off = NOT_OFF
+        for each in unsettled:
+            off = off.worse(each.off)
+        if part == "zero_and_directions" and unsettled:
+            off = off.worse(together(evidence, [each.entry for each in unsettled]))
+        found.append(PartEvidence(status, unsettled, off, part))
+    return tuple(found)
+
+
+def settles_tool(evidence: Evidence) -> bool:
+    """Whether everything that moves the tool is settled."""
+    found = (*evidence.entries, *evidence.combinations)
+    return evidence.table_meets and all(each.status in SETTLED for each in found if each.moves_tool)
+
+
+def together(evidence: Evidence, names: list[str]) -> ToolOff:
+    """How far the tool is off at most if any of the discrete readings of these entries hold together."""
+    readings = [each for each in evidence.readings if set(each.names) <= set(names)]
+    tool = ToolRange(evidence.robot, tables_of(evidence.robot))
+    combined: list[tuple[Alternative, ...]] = [()]
+    for each in readings:
+        free = [own for own in combined if not {n for other in own for n in other.names} & set(each.names)]
+        combined += [(*own, each) for own in free][: MOST_COMBINED - len(combined)]
+    off = NOT_OFF
+    for own in combined[1:]:
+        off = off.worse(tool.off(with_readings(tool.table, evidence.robot, own)))
+    return off
+
+
+def _part(each: EntryEvidence, columns: dict[str, PartName]) -> PartName | None:
+    return columns.get(each.entry) or columns.get(each.entry.split()[0].lstrip("-"))

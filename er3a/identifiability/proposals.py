@@ -14,7 +14,7 @@ import numpy as np
 
 from er3a.identifiability.entries import TableNumber, entries_of, shifted
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence
-from er3a.identifiability.tool_motion import ToolRange
+from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import join, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict, predict_tables

@@ -12,10 +12,9 @@ from er3a.identifiability.entries import TableNumber, document_of, entries_of, s
 from er3a.identifiability.requirements import FollowedExtreme
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Reals
-from er3a.references.documents import Documents
 from er3a.references.predict import predict_tables
 from er3a.references.quantities import Extreme, PoseOutside, Quantity, Speed
-from er3a.references.reference import Reference, quantities_of
+from er3a.references.reference import Documents, Reference, quantities_of
 from er3a.robots.robot import Robot
 
 PROBE_M, PROBE_RAD = 0.01, np.radians(5.0)

@@ -4,24 +4,482 @@ A reference with a half-width asks for ``|off| <= half-width``; one with a stand
 Of references that contradict each other, either may be right, so they ask for no more than the hull of what they leave
 open. Extremes over the joint limits are followed along with where they are attained: their derivative with respect to
 the table is that at the maximiser (envelope theorem).
+
+How far many tables are off what references state, component by component: as each quantity says it
+(:meth:`~er3a.references.quantities.Quantity.off`), those of one kind at once.
+
+Kernels that climb to the greatest or least value of a measure of one arm, from where it was attained before.
+
+Newton's method with Levenberg's damping within the joint limits; bounds that are in the way are held. Derivatives are
+central differences.
+
+The greatest value of a smooth function over a box of joint angles.
+
+Points spread evenly over the box and its corners are looked at in one batch; from the best of them Newton's method with
+the bounds that are in the way held, its Hessian made definite by the absolute values of its eigenvalues. Nothing is
+random.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from er3a.identifiability.entries import TableNumber, shifted
-from er3a.identifiability.extreme_climb import Climber, climber, measure_code
-from er3a.identifiability.peaks import best_apart, box_points, climb, peak
-from er3a.kinematics.table_batch import Tables, frames_of
-from er3a.numerics.arrays import Flags, Reals
-from er3a.references.components import Components
-from er3a.references.quantities import FRAME_OF_POINT, MM, Extreme, Limit, PoseOutside, Quantity, Speed
+from er3a.kinematics.table_batch import Tables, fill_frames, frames_of, kernel_columns, tables_of
+from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
+from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.quasi_random import quasi_random_points
+from er3a.references.predict import TablesState
+from er3a.references.quantities import (
+    COORDINATES,
+    FRAME_OF_POINT,
+    FROM_UPRIGHT,
+    MM,
+    AxisAngle,
+    AxisCoordinate,
+    AxisDistance,
+    Extreme,
+    Limit,
+    ModelState,
+    PointCoordinate,
+    PoseOutside,
+    Quantity,
+    SectionCoordinate,
+    SectionExtent,
+    SegmentAngle,
+    Speed,
+    TurnedApart,
+    nearest_on_line,
+)
 from er3a.references.reference import Reference, conflicts
 from er3a.robots.robot import Robot
+
+Reader = Callable[[ModelState], Reals]
+"""Components (H, n, k) of n quantities of one kind."""
+
+
+class Components:
+    """Quantities, none of them an extreme over the limits, beside what is stated of them.
+
+    Parameters
+    ----------
+    expected : (n,), in the quantities' units
+
+    Attributes
+    ----------
+    sizes : (n,), how many components each has
+    """
+
+    def __init__(self, robot: Robot, quantities: Sequence[Quantity], expected: Sequence[float]):
+        self._state = TablesState(robot, quantities)
+        kinds: dict[str, list[int]] = {}
+        for i, (quantity, value) in enumerate(zip(quantities, expected)):
+            kinds.setdefault(_kind(quantity, value) or f"alone {i}", []).append(i)
+        self._readers = [
+            (own, _reader([quantities[i] for i in own], np.array([expected[i] for i in own]), self._state))
+            for own in kinds.values()
+        ]
+        own_state = self._state.of(tables_of(robot))
+        self.sizes = np.zeros(len(quantities), dtype=np.int64)
+        for own, reader in self._readers:
+            self.sizes[own] = reader(own_state).shape[-1]
+        starts = (np.cumsum(self.sizes) - self.sizes)[:, None]
+        self._columns = [(starts[own] + np.arange(self.sizes[own[0]])).ravel() for own, _ in self._readers]
+
+    def off(self, tables: Tables) -> Reals:
+        """Components (H, m), each quantity's side by side, whose length is how far tables are off, in its unit."""
+        state = self._state.of(tables)
+        off = np.empty((len(tables), int(self.sizes.sum())))
+        for columns, (_, reader) in zip(self._columns, self._readers):
+            off[:, columns] = reader(state).reshape(len(tables), -1)
+        return off
+
+
+def _kind(quantity: Quantity, expected: float) -> str:
+    """What is read together; nothing for what is read alone."""
+    if isinstance(quantity, AxisAngle):
+        return "" if expected else "angle"
+    if isinstance(quantity, SegmentAngle):
+        return "" if expected else "segment"
+    return {AxisCoordinate: "axis", PointCoordinate: "point", SectionCoordinate: "section"}.get(type(quantity), "")
+
+
+def _reader(quantities: list[Quantity], expected: Reals, states: TablesState) -> Reader:
+    first = quantities[0]
+    if isinstance(first, AxisAngle) and not expected.any():
+        return _angles([each for each in quantities if isinstance(each, AxisAngle)])
+    if isinstance(first, SegmentAngle) and not expected.any():
+        return _segments([each for each in quantities if isinstance(each, SegmentAngle)])
+    if isinstance(first, AxisCoordinate):
+        return _axis_points([each for each in quantities if isinstance(each, AxisCoordinate)], expected)
+    if isinstance(first, PointCoordinate):
+        return _points([each for each in quantities if isinstance(each, PointCoordinate)], expected, states)
+    if isinstance(first, SectionCoordinate):
+        return _sections([each for each in quantities if isinstance(each, SectionCoordinate)], expected, states)
+    return lambda state: first.off(state, float(expected[0]))[:, None]
+
+
+def _angles(quantities: list[AxisAngle]) -> Reader:
+    joints = np.array([each.joint - 1 for each in quantities])
+    toward = np.array([each.toward for each in quantities])
+    signed = np.array([each.signed for each in quantities])
+    turned = TurnedApart(toward)
+
+    def read(state: ModelState) -> Reals:
+        axis = state.frames[:, 0][:, joints][..., :3, 2] * state.direction[:, joints, None]
+        backward = ~signed & (np.einsum("hni,ni->hn", axis, toward) < 0)
+        return turned.from_these(np.where(backward[..., None], -axis, axis))
+
+    return read
+
+
+def _segments(quantities: list[SegmentAngle]) -> Reader:
+    def read(state: ModelState) -> Reals:
+        return FROM_UPRIGHT.from_these(np.stack([each.direction(state) for each in quantities], axis=1))
+
+    return read
+
+
+def _axis_points(quantities: list[AxisCoordinate], expected: Reals) -> Reader:
+    joints = np.array([each.joint - 1 for each in quantities])
+    near = np.array([each.point_mm for each in quantities])
+    coordinates = np.array([COORDINATES.index(each.coordinate) for each in quantities])
+    every = np.arange(len(quantities))
+
+    def read(state: ModelState) -> Reals:
+        T = state.frames[:, 0][:, joints]
+        axis = T[..., :3, 2] * state.direction[:, joints, None]
+        value = nearest_on_line(axis, T[..., :3, 3] * MM, near)[:, every, coordinates]
+        off: Reals = (value - expected)[..., None]
+        return off
+
+    return read
+
+
+def _points(quantities: list[PointCoordinate], expected: Reals, states: TablesState) -> Reader:
+    places = np.array([states.index[each.pose] for each in quantities])
+    frames = np.array([FRAME_OF_POINT[each.point] for each in quantities])
+    coordinates = np.array([COORDINATES.index(each.coordinate) for each in quantities])
+
+    def read(state: ModelState) -> Reals:
+        off: Reals = (state.frames[:, places, frames, coordinates, 3] * MM - expected)[..., None]
+        return off
+
+    return read
+
+
+def _sections(quantities: list[SectionCoordinate], expected: Reals, states: TablesState) -> Reader:
+    places = np.array([states.index[each.pose] for each in quantities])
+    along_x = np.array([each.coordinate == "x" for each in quantities])
+    unsigned = np.array([each.unsigned for each in quantities])
+    rows, origins = np.where(along_x, 0, 2), np.where(along_x, 0, 1)  # x is counted from axis 1, z from axis 2
+    wrist = FRAME_OF_POINT["wrist_centre"]
+
+    def read(state: ModelState) -> Reals:
+        value = (state.frames[:, places, wrist, rows, 3] - state.frames[:, places, origins, rows, 3]) * MM
+        off: Reals = (np.where(unsigned, np.abs(value), value) - expected)[..., None]
+        return off
+
+    return read
+
+
+STEP = 1e-4
+STEPS = 40
+LONGEST_STEP = 0.5
+ENOUGH_M = 1e-9
+DISTANCE, SECTION_X, SECTION_Z = 0, 1, 2
+FLANGE = FRAME_OF_POINT["flange"]
+
+Columns = tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]
+Ends = tuple[Reals, Reals]
+"""The base (4, 4), and the flange (3,), m, in the last frame of the table."""
+What = tuple[int, int, int, float]
+"""Measure, axis, frame and sign."""
+
+
+def measure_code(quantity: Extreme) -> tuple[int, int, int] | None:
+    """Which measure, of which axis and frame; None for one that the kernels don't know."""
+    frame = FRAME_OF_POINT[quantity.point]
+    if isinstance(quantity, AxisDistance):
+        return DISTANCE, quantity.axis - 1, frame
+    if isinstance(quantity, SectionExtent):
+        return (SECTION_X if quantity.coordinate == "x" else SECTION_Z), 0, frame
+    return None
+
+
+Climber = Callable[[Reals], tuple[Reals, float]]
+
+
+def climber(table: Tables, robot: Robot, code: tuple[int, int, int], sign: float, joints: Integers) -> Climber:
+    """What climbs to where a measure of a table (a batch of one) is extreme.
+
+    Parameters
+    ----------
+    robot : whose base and flange the table has
+    sign : 1 for the greatest, -1 for the least value
+    joints : (d,), those that are turned
+
+    Returns
+    -------
+    climber : takes joint vectors (P, n) and climbs from the first and, if another is higher than where that leads, from
+        the best of them; gives the joint vector (n,) where that ends, and ``sign`` times the measure there in m
+    """
+    columns, ends = kernel_columns(table), (for_kernel(robot.base), for_kernel(robot.flange[:3, 3]))
+    bounds = np.minimum(table.lower[0], table.upper[0]), np.maximum(table.lower[0], table.upper[0])
+
+    def climb(starts: Reals) -> tuple[Reals, float]:
+        q = np.ascontiguousarray(starts)
+        value = _climb(ends, columns, bounds, q, joints, (*code, sign))
+        return q[0], float(value)
+
+    return climb
+
+
+@kernel
+def _measure(ends: Ends, columns: Columns, q: Reals, what: What, out: tuple[Reals, Reals]) -> None:
+    """Fill frames and ``sign`` times the measure (P,) at joint vectors (P, n)."""
+    frames, values = out
+    base, flange = ends
+    a, alpha, beta, d, direction, offset, sliding = columns
+    fill_frames(base, a, alpha, beta, d, direction, offset, sliding, q, frames)
+    kind, axis, frame, sign = what
+    for p in range(q.shape[0]):
+        T = frames[0, p]
+        x, y, z = T[frame, 0, 3], T[frame, 1, 3], T[frame, 2, 3]
+        if frame == FLANGE:
+            x += T[frame, 0, 0] * flange[0] + T[frame, 0, 1] * flange[1] + T[frame, 0, 2] * flange[2]
+            y += T[frame, 1, 0] * flange[0] + T[frame, 1, 1] * flange[1] + T[frame, 1, 2] * flange[2]
+            z += T[frame, 2, 0] * flange[0] + T[frame, 2, 1] * flange[1] + T[frame, 2, 2] * flange[2]
+        if kind == SECTION_X:
+            values[p] = sign * (x - T[0, 0, 3])
+        elif kind == SECTION_Z:
+            values[p] = sign * (z - T[1, 2, 3])
+        else:
+            x, y, z = x - T[axis, 0, 3], y - T[axis, 1, 3], z - T[axis, 2, 3]
+            u, v, w = T[axis, 0, 2], T[axis, 1, 2], T[axis, 2, 2]
+            values[p] = sign * np.sqrt((v * z - w * y) ** 2 + (w * x - u * z) ** 2 + (u * y - v * x) ** 2)
+
+
+@kernel
+def _climb(
+    ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], starts: Reals, joints: Integers, what: What
+) -> float:
+    count = starts.shape[0]
+    frames, values = np.empty((1, count, starts.shape[1] + 1, 4, 4)), np.empty(count)
+    best = _from(ends, columns, bounds, starts[0], joints, what)
+    if count > 1:
+        _measure(ends, columns, starts, what, (frames, values))
+        other = 1 + np.argmax(values[1:])
+        if values[other] > best + ENOUGH_M:
+            second = _from(ends, columns, bounds, starts[other], joints, what)
+            if second > best:
+                starts[0] = starts[other]
+                best = second
+    return best
+
+
+@inner_kernel
+def _from(ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, joints: Integers, what: What) -> float:
+    """Climb from q (n,), which is changed to where that leads; the value there."""
+    lower, upper = bounds
+    n, k = q.shape[0], joints.shape[0]
+    points = 1 + 2 * k + k * (k - 1) // 2
+    stencil, values = np.empty((points, n)), np.empty(points)
+    frames = np.empty((1, points, n + 1, 4, 4))
+    trial, trial_value, trial_frames = np.empty((1, n)), np.empty(1), np.empty((1, 1, n + 1, 4, 4))
+    slope, curvature = np.empty(k), np.empty((k, k))
+    damping, here = 0.0, -np.inf
+    for _ in range(STEPS):
+        _fill_stencil(q, joints, stencil)
+        _measure(ends, columns, stencil, what, (frames, values))
+        here = values[0]
+        _slope_and_curvature(values, slope, curvature)
+        free = np.ones(k, np.bool_)
+        for i in range(k):
+            j = joints[i]
+            free[i] = not ((q[j] <= lower[j] and slope[i] <= 0) or (q[j] >= upper[j] and slope[i] >= 0))
+        size = np.abs(curvature).max() + 1e-9
+        gained = 0.0
+        for _ in range(8):
+            step, definite = _damped(slope, curvature, free, damping * size)
+            if definite:
+                longest = np.abs(step).max()
+                share = min(1.0, LONGEST_STEP / longest) if longest > 0 else 0.0
+                trial[0] = q
+                for i in range(k):
+                    j = joints[i]
+                    trial[0, j] = min(max(q[j] + share * step[i], lower[j]), upper[j])
+                _measure(ends, columns, trial, what, (trial_frames, trial_value))
+                gained = trial_value[0] - here
+                if gained > 0:
+                    break
+            damping = max(4 * damping, 1e-3)
+        if gained <= ENOUGH_M:
+            if gained > 0:
+                q[:] = trial[0]
+                here = trial_value[0]
+            break
+        q[:] = trial[0]
+        here = trial_value[0]
+        damping = damping / 8 if damping > 1e-3 else 0.0
+    return here
+
+
+@inner_kernel
+def _fill_stencil(q: Reals, joints: Integers, stencil: Reals) -> None:
+    k = joints.shape[0]
+    at = 1 + 2 * k
+    stencil[:] = q
+    for i in range(k):
+        stencil[1 + i, joints[i]] += STEP
+        stencil[1 + k + i, joints[i]] -= STEP
+        for j in range(i):
+            stencil[at, joints[i]] += STEP
+            stencil[at, joints[j]] += STEP
+            at += 1
+
+
+@inner_kernel
+def _slope_and_curvature(values: Reals, slope: Reals, curvature: Reals) -> None:
+    k = slope.shape[0]
+    at = 1 + 2 * k
+    for i in range(k):
+        slope[i] = (values[1 + i] - values[1 + k + i]) / (2 * STEP)
+        curvature[i, i] = (values[1 + i] - 2 * values[0] + values[1 + k + i]) / STEP**2
+        for j in range(i):
+            curvature[i, j] = (values[at] - values[1 + i] - values[1 + j] + values[0]) / STEP**2
+            curvature[j, i] = curvature[i, j]
+            at += 1
+
+
+@inner_kernel
+def _damped(slope: Reals, curvature: Reals, free: Flags, damping: float) -> tuple[Reals, bool]:
+    """Step uphill by (damping - curvature)^-1 slope over the free joints, and whether that matrix is definite."""
+    k = slope.shape[0]
+    low = np.zeros((k, k))
+    step = np.zeros(k)
+    for i in range(k):
+        for j in range(i + 1):
+            total = (damping if i == j else 0.0) - curvature[i, j]
+            if not (free[i] and free[j]):
+                total = 1.0 if i == j else 0.0
+            for m in range(j):
+                total -= low[i, m] * low[j, m]
+            if i == j:
+                if total <= 1e-12:
+                    return step, False
+                low[i, i] = np.sqrt(total)
+            else:
+                low[i, j] = total / low[j, j]
+    for i in range(k):
+        total = slope[i] if free[i] else 0.0
+        for m in range(i):
+            total -= low[i, m] * step[m]
+        step[i] = total / low[i, i]
+    for i in range(k - 1, -1, -1):
+        total = step[i]
+        for m in range(i + 1, k):
+            total -= low[m, i] * step[m]
+        step[i] = total / low[i, i]
+    return step, True
+
+
+Function = Callable[[Reals], Reals]
+"""Values (P,) at points (P, d)."""
+SCAN = 384
+CORNERS_UP_TO = 6
+STARTS = 3
+PEAK_STEPS = 25
+GAINS_NOTHING = 1e-10
+SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.01])
+
+
+def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
+    """Points (P, d) all over a box, with its middle and, of few dimensions, its corners."""
+    points = [quasi_random_points(lower, upper, count), (lower + upper)[None] / 2]
+    if len(lower) <= CORNERS_UP_TO:
+        points.append(np.array(list(product(*zip(lower, upper)))))
+    return np.concatenate(points)
+
+
+def peak(function: Function, lower: Reals, upper: Reals, points: Reals | None = None) -> tuple[Reals, float]:
+    """Where a function is greatest, and its value there.
+
+    Parameters
+    ----------
+    points : (P, d), where to look first; all over the box by default
+    """
+    points = box_points(lower, upper) if points is None else points
+    values = function(points)
+    starts = points[best_apart(points, values, STARTS)]
+    ends = [climb(function, start, lower, upper) for start in starts]
+    return max(ends, key=lambda end: end[1])
+
+
+def climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Reals, float]:
+    """From a point up to the next maximum: the point and its value."""
+    offsets = _stencil(len(q))
+    here = -np.inf
+    for _ in range(PEAK_STEPS):
+        values = function(q + offsets)
+        here = float(values[0])
+        slope, curvature = _derivatives(values, len(q))
+        held = ((q <= lower) & (slope <= 0)) | ((q >= upper) & (slope >= 0))
+        free = ~held
+        if not free.any() or np.abs(slope[free]).max() < GAINS_NOTHING:
+            break
+        step = np.zeros(len(q))
+        step[free] = _newton(slope[free], curvature[np.ix_(free, free)])
+        trials = np.clip(q + SHARES[:, None] * step, lower, upper)
+        reached = function(trials)
+        best = int(np.argmax(reached))
+        if not reached[best] > here + GAINS_NOTHING:
+            break
+        q, here = trials[best], float(reached[best])
+    return q, here
+
+
+def best_apart(points: Reals, values: Reals, count: int) -> list[int]:
+    """Places of up to ``count`` points (P, d) with the greatest values (P,), none near a better one."""
+    order = np.argsort(-values, kind="stable")
+    chosen: list[int] = []
+    for i in order:
+        if all(np.abs(points[i] - points[k]).max() > LONGEST_STEP for k in chosen):
+            chosen.append(int(i))
+        if len(chosen) == count:
+            break
+    return chosen
+
+
+def _newton(slope: Reals, curvature: Reals) -> Reals:
+    values, vectors = np.linalg.eigh(curvature)
+    size = np.maximum(np.abs(values), 1e-3 * max(float(np.abs(values).max()), float(np.abs(slope).max())) + 1e-12)
+    step: Reals = vectors @ ((vectors.T @ slope) / size)
+    length = float(np.linalg.norm(step))
+    return step * min(1.0, LONGEST_STEP / length) if length else step
+
+
+def _stencil(d: int) -> Reals:
+    unit = STEP * np.eye(d)
+    pairs = [unit[i] + unit[j] for i in range(d) for j in range(i)]
+    return np.concatenate([np.zeros((1, d)), unit, -unit, np.array(pairs).reshape(-1, d)])
+
+
+def _derivatives(values: Reals, d: int) -> tuple[Reals, Reals]:
+    here, up, down, pairs = values[0], values[1 : d + 1], values[d + 1 : 2 * d + 1], values[2 * d + 1 :]
+    slope = (up - down) / (2 * STEP)
+    curvature = np.diag((up - 2 * here + down) / STEP**2)
+    at = 0
+    for i in range(d):
+        for j in range(i):
+            curvature[i, j] = curvature[j, i] = (pairs[at] - up[i] - up[j] + here) / STEP**2
+            at += 1
+    return slope, curvature
+
 
 LIKELY = 4.0  # standard deviations, beyond which a discrete alternative is excluded
 SLIGHT = 1e-3  # of a half-width

@@ -16,8 +16,8 @@ from typing import overload
 import numpy as np
 
 from er3a.errors import ShapeError
-from er3a.geometry.angles import TURN
 from er3a.geometry.transforms import as_floats
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
 from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, LinkedRows, Redundancy
@@ -29,9 +29,8 @@ from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.numerics.threads import parallel_for
-from er3a.robots.derived import derived
 from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_way, uncoupling, uncoupling_of_linkage
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size

@@ -20,8 +20,7 @@ import numpy as np
 from er3a.errors import Er3aError
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.derived import derived
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 
 JOINTS = 6
 ALONG_Z, TO_NEXT_AXIS = 0, 1

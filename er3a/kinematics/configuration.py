@@ -19,8 +19,7 @@ from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm, wrist_partitioned_arm
-from er3a.robots.derived import derived
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 
 Side = Literal["front", "back"]
 LABELS: tuple[BranchLabel, ...] = get_args(BranchLabel)

@@ -2,7 +2,7 @@
 
 Then no signs of factors of the determinant name its branches. It is shown by an example: two solutions of one pose that
 a straight joint move joins, along which the Jacobian keeps its rank, with a bound between samples
-(:mod:`er3a.kinematics.rank_loss`). Where none is found nothing is proven.
+(:mod:`er3a.kinematics.singularity`). Where none is found nothing is proven.
 
 References
 ----------
@@ -16,13 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.geometry.angles import wrap_to_pi
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
-from er3a.kinematics.rank_loss import rank_losses, scaled_jacobian
+from er3a.kinematics.singularity import rank_losses, scaled_jacobian
 from er3a.numerics.arrays import Reals
-from er3a.robots.derived import derived
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 
 POSES, SAMPLES, SEED = 60, 41, 20261121
 CLEAR = 5e-3  # smallest singular value that the whole move must keep

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
-from er3a.geometry.angles import greatest_move, wrap_to_pi
 from er3a.geometry.transforms import check_poses
+from er3a.geometry.vectors import greatest_move, wrap_to_pi
 from er3a.kinematics.by_class import (
     LazySelfMotions,
     arm_solver,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from er3a.geometry.sphere import fibonacci_sphere
+from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import rotation_angle
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import arm_solver, parameters_of, task_mask
 from er3a.kinematics.forward import forward
-from er3a.kinematics.near_singular import NearSingular
-from er3a.kinematics.singularity import determinant_factors
+from er3a.kinematics.singularity import NearSingular, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Flags, Integers
 from er3a.robots.robot import Robot

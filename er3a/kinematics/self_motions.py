@@ -7,14 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue
-from er3a.display import Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.kinematics.chain import joint_starts, row_values
 from er3a.kinematics.classes.self_motion import PoseChain, TracedCurve
 from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.joint_limits import limit_margin, nearest_equivalent, unwound, within
+from er3a.robots.joint_limits import joint_columns, limit_margin, nearest_equivalent, shown, unwound, within
 from er3a.robots.robot import Robot
-from er3a.robots.shown import joint_columns, shown
 
 LAPS = 6  # a curve that turns a joint is followed over so many of its laps at most
 SPLIT, SPLITS = 16, 11

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import NotWristPartitionedError
-from er3a.geometry.angles import wrap_to_pi
-from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle
-from er3a.kinematics.block_constants import BlockConstants, block_constants
+from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle, wrap_to_pi
+from er3a.kinematics.block_inverse import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta, constant_links, row_values
 from er3a.kinematics.classes.four_bar import solve_near_reference
 from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
@@ -30,8 +29,7 @@ from er3a.kinematics.closed_form import (
     solve,
 )
 from er3a.numerics.arrays import Reals, for_kernel
-from er3a.robots.derived import derived
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 
 PARALLEL = 1e-9
 

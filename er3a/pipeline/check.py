@@ -11,25 +11,27 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from er3a.errors import InputError
+from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_header
 from er3a.files.dh_table import read_dh_table
 from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye
-from er3a.files.load_file import load_of
-from er3a.files.measurements import load_measurements
-from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths
-from er3a.files.path_table import read_path_table
+from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths, read_path_table
 from er3a.files.program_file import ProgramsFile, load_programs
-from er3a.files.reference_documents import FILE as DOCUMENTS
-from er3a.files.reference_documents import check_robot_origins, load_documents
-from er3a.files.reference_rows import FORMATS
-from er3a.files.reference_sets import check_reference_file, load_references
+from er3a.files.reference_sets import FILE as DOCUMENTS
+from er3a.files.reference_sets import (
+    FORMATS,
+    check_reference_file,
+    check_robot_origins,
+    load_documents,
+    load_references,
+)
 from er3a.files.robot_file import RobotFile
-from er3a.files.robot_library import load_robot
+from er3a.files.robot_library import load_of, load_robot
 from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import TargetFile, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
-from er3a.formats.text_file import read_text
+from er3a.formats.mesh_file import read_text
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.registry import STAGES

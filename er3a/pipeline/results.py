@@ -29,9 +29,9 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from er3a.by_value import ByValue
-from er3a.collision.pairs import Pair, PairsUnexamined
+from er3a.collision.shapes import Pair, PairsUnexamined
 from er3a.errors import ResultError
-from er3a.files.grades import grades_in
+from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
 from er3a.findings import Finding
 from er3a.pipeline.stages.stage import Stage
@@ -367,3 +367,26 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
 @cache
 def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
+
+
+OVERALL = ("index.html", "compare.html", "junit.xml")
+
+
+def write_checksum(path: Path) -> None:
+    """Write the checksum of a finished view beside it."""
+    checksum = sha256(path)
+    write_atomically(_checksum_file(path), lambda file: file.write_text(checksum, encoding="ascii"))
+
+
+def check_checksum(path: Path) -> None:
+    """Raise :class:`ResultError` if a view is not as it was written."""
+    try:
+        kept = _checksum_file(path).read_bytes()
+    except OSError:
+        raise ResultError(path, "no checksum of it was kept") from None
+    if kept != sha256(path).encode("ascii"):
+        raise ResultError(path, "damaged (its checksum does not agree)")
+
+
+def _checksum_file(path: Path) -> Path:
+    return path.with_name(f".{path.name}.sha256")

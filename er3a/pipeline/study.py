@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from pydantic import Field, PrivateAttr, create_model, model_validator
 
 from er3a.errors import InputError
-from er3a.files.load_file import LoadFields
-from er3a.files.own_titles import translations_in
+from er3a.files.annotations import translations_in
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
-from er3a.files.robot_library import placement_transform, read_robot, robot_of, robot_path
+from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.yaml_file import StrictModel, load, read_yaml
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.sweeps import Sweep, Variant

@@ -14,9 +14,8 @@ from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
-from er3a.planning.arcs import arc
 from er3a.planning.moves import JointMove, Segment, ToolPath, line, rotation_between
-from er3a.planning.sequences import TURN_LENGTH, JointSequence, joint_sequence, segment_path
+from er3a.planning.sequences import TURN_LENGTH, JointSequence, arc, joint_sequence, segment_path
 from er3a.planning.way_around import PlannedMove
 from er3a.robots.robot import Robot
 

@@ -1,6 +1,6 @@
 """Joint angles along a line of the tool: the sequence of closed-form branches that is best as a whole.
 
-On the grid of :mod:`er3a.planning.branch_tracking`, dynamic programming [1]_ finds for each branch at the start the
+On the grid of :mod:`er3a.planning.follow`, dynamic programming [1]_ finds for each branch at the start the
 best way to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time),
 least time outside the limits, of joints and of sums of joints, least joint travel, and among equals the greatest
 distance from the limits. Whole turns cost no states of their own: along a continuous sequence they are fixed by the
@@ -13,27 +13,382 @@ An unreachable pose interrupts the sequence; the stretch behind it is solved on 
 References
 ----------
 .. [1] R. Bellman, *Dynamic Programming*, Princeton, 1957.
+
+All closed-form branches along a line, on a grid that is refined until each branch can be told from the others.
+
+Between two grid points a branch is followed by continuity, which is safe only if no joint of it moves far between them.
+An interval where one does (a pass near a pole of the wrist or near axis 1), or where a branch begins or ends, is halved
+until the motion is small or the interval is 1e-10 of the duration.
+
+Where a joint is free (axes 4 and 6 aligned, wrist centre on axis 1) each branch keeps the value that it had before, and
+at the path's beginning the one that it has next: the value that makes the motion continuous.
+
+A line as an arm follows it: joint angles at any point of the way, and their derivatives through the Jacobian.
+
+References
+----------
+.. [1] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, sections 3.5 and 3.6 (equations 3.46, 3.98).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import product
 
 import numpy as np
 
+from er3a.by_value import ByValue
 from er3a.errors import PoseError
-from er3a.geometry.angles import TURN
+from er3a.geometry.vectors import TURN, wrap_to_pi
+from er3a.kinematics.chain import arm_length
 from er3a.kinematics.closed_form import SLOTS
+from er3a.kinematics.forward import frames, jacobian
+from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.wrist_partitioned import parallel_axes_arm, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.numerics.runs import runs
-from er3a.planning.branch_tracking import WIDE_STEP, Branches, branches_along, turned_difference, wrist_joints
-from er3a.planning.followed import BranchJump, Followed
 from er3a.planning.moves import ToolPath
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
+
+WIDE_STEP = np.radians(20.0)
+SHORTEST_INTERVAL = 1e-10
+FREE_WRIST = 1e-10  # rad; below it rounding decides joint 4
+FREE_SHOULDER = 1e-10  # m; below it rounding decides joint 1
+STRAIGHT_ELBOW = 1e-3  # rad; the angle of the elbow grows with the root of the distance from the edge of reach
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """Closed-form solutions along a line.
+
+    Attributes
+    ----------
+    t : (N,), s, rising; progress : (N,), share of the way
+    q : (N, 8, 6), rad in (-pi, pi], NaN where a branch has no solution
+    free_wrist : (N, 8) bool, whether joints 4 and 6 can turn against each other with the tool at rest (of arms with
+        parallel axes 2, 3 and 4: those with joint 6)
+    free_shoulder : (N, 8) bool, whether joint 1 can turn with the wrist centre at rest
+    straight : (N, 8) bool, whether the arm is stretched or folded, so that both elbow branches are one
+    beside : (N, 8) bool, of arms with parallel axes 2, 3 and 4, whether both shoulder branches are one
+    factors : (N, 8, 3), distances from the wrist, elbow and shoulder singularities (rad, rad, m)
+    """
+
+    t: Reals
+    progress: Reals
+    q: Reals
+    free_wrist: Flags
+    free_shoulder: Flags
+    straight: Flags
+    beside: Flags
+    factors: Reals
+
+    @property
+    def meeting(self) -> Integers:
+        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in a branch met."""
+        bits: Integers = self.free_wrist + 2 * self.straight + 4 * (self.free_shoulder | self.beside)
+        return bits
+
+    @property
+    def reached(self) -> Flags:
+        """(N, 8) bool, whether a branch has a solution."""
+        reached: Flags = np.isfinite(self.q[..., 0])
+        return reached
+
+
+def branches_along(robot: Robot, line: ToolPath, t: Reals) -> Branches:
+    """Solve a line at times (N,) in s (rising, both ends included) and at as many more as its branches need."""
+    grid = _solve_at(robot, line, t)
+    grid = _merge(grid, _solve_at(robot, line, _closest_passes(grid)))
+    while True:
+        wide = _unclear(grid, wrist_joints(robot)) & (np.diff(grid.t) > SHORTEST_INTERVAL * line.duration)
+        if not wide.any():
+            break
+        middle = (grid.t[:-1] + grid.t[1:])[wide] / 2
+        grid = _merge(grid, _solve_at(robot, line, middle))
+    _fill_free_shoulder(robot, line, grid)
+    _fill_free_wrist(robot, line, grid)
+    return grid
+
+
+def wrist_joints(robot: Robot) -> list[int]:
+    """Joints (from 0) that can turn with the tool at rest where the wrist is singular."""
+    return [3, 5] if parallel_axes_arm(robot) is None else [1, 2, 3, 5]
+
+
+def turned_difference(a: Reals, b: Reals) -> Reals:
+    """b - a with whole turns removed, in (-pi, pi]."""
+    return wrap_to_pi(b - a)
+
+
+def align_wrist(robot: Robot, q: Reals, joint_4: Reals) -> Reals:
+    """Turn joint 4 to given angles (...,) with the tool at rest, for arms q (..., 6) with axes 4 and 6 aligned."""
+    T = frames(robot, q)
+    same = np.sign(np.einsum("...i,...i->...", T[..., 3, :3, 2], T[..., 5, :3, 2]))
+    same = same * robot.direction[3] * robot.direction[5]
+    turned = q.copy()
+    turned[..., 5] += same * (q[..., 3] - joint_4)
+    turned[..., 3] = joint_4
+    return turned
+
+
+def onto_axis_1(robot: Robot, T: Reals) -> Reals:
+    """Poses (N, 4, 4) shifted so that the wrist centre, which is next to axis 1, lies exactly on it."""
+    arm = wrist_partitioned_arm(robot)
+    centre = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool
+    from_axis = centre - arm.points[0]
+    moved = T.copy()
+    moved[:, :3, 3] -= from_axis - np.outer(from_axis @ arm.axes[0], arm.axes[0])
+    return moved
+
+
+def _solve_at(robot: Robot, line: ToolPath, t: Reals) -> Branches:
+    progress = line.progress(t)[0]
+    q = solve_slots(robot, line.poses(progress), np.zeros((len(t), 6)))[0]
+    return Branches(t, progress, q, *_free(robot, q))
+
+
+def _free(robot: Robot, q: Reals) -> tuple[Flags, Flags, Flags, Flags, Reals]:
+    factors = determinant_factors(robot, q)
+    wrist, elbow, shoulder = (np.abs(value) for value in (factors.wrist, factors.elbow, factors.shoulder))
+    distances = np.stack([wrist, elbow, shoulder], axis=-1)
+    parallel = parallel_axes_arm(robot) is not None
+    beside = shoulder < STRAIGHT_ELBOW * arm_length(robot) * parallel
+    return wrist < FREE_WRIST, shoulder < FREE_SHOULDER * (not parallel), elbow < STRAIGHT_ELBOW, beside, distances
+
+
+def _merge(a: Branches, b: Branches) -> Branches:
+    t, first = np.unique(np.concatenate([a.t, b.t]), return_index=True)
+    names = [part.name for part in fields(Branches)][1:]
+    rest = (np.concatenate([getattr(a, name), getattr(b, name)])[first] for name in names)
+    return Branches(t, *rest)
+
+
+def _closest_passes(grid: Branches) -> Reals:
+    """Times at which a branch comes nearest to a singularity between grid points, by a parabola through three."""
+    found = [np.empty(0)]
+    for kind in range(3):
+        for slot in range(SLOTS):
+            y = grid.factors[:, slot, kind] ** 2
+            i = 1 + np.flatnonzero((y[1:-1] < y[:-2]) & (y[1:-1] <= y[2:]))
+            found.append(vertex(grid.t, y, i))
+    return np.unique(np.concatenate(found))
+
+
+def parabolas(x: Reals, y: Reals, i: Integers) -> tuple[Reals, Reals]:
+    """Slope at the point i, and curvature, of the parabolas through the points i - 1, i, i + 1."""
+    left, right = x[i] - x[i - 1], x[i + 1] - x[i]
+    rise, fall = (y[i + 1] - y[i]) / right, (y[i] - y[i - 1]) / left
+    return (fall * right + rise * left) / (left + right), (rise - fall) / (left + right)
+
+
+def vertex(x: Reals, y: Reals, i: Integers) -> Reals:
+    """Lowest points of the parabolas through the points i - 1, i, i + 1, each kept between its outer points."""
+    slope, curvature = parabolas(x, y, i)
+    curved = curvature > 0
+    lowest = x[i[curved]] - slope[curved] / (2 * curvature[curved])
+    return np.clip(lowest, x[i[curved] - 1], x[i[curved] + 1])
+
+
+def _unclear(grid: Branches, turned_by_wrist: list[int]) -> Flags:
+    """(N - 1,) bool: intervals where a branch begins or ends, or moves a joint that is not free by a wide step."""
+    step = np.abs(turned_difference(grid.q[:-1], grid.q[1:]))
+    for free, joints in ((grid.free_wrist, turned_by_wrist), (grid.free_shoulder, [0, 3, 4, 5])):
+        either = free[:-1] | free[1:]
+        for joint in joints:
+            step[either, joint] = 0.0
+    wide = (step > WIDE_STEP).any(axis=-1)
+    unclear: Flags = (wide | (grid.reached[:-1] != grid.reached[1:])).any(axis=-1)
+    return unclear
+
+
+def _fill_free_shoulder(robot: Robot, line: ToolPath, grid: Branches) -> None:
+    for side in (slice(0, 4), slice(4, 8)):
+        free = grid.free_shoulder[:, side].any(axis=1)
+        if not free.any():
+            continue
+        kept = _kept(grid.q[:, side.start, 0], free | ~grid.reached[:, side.start])
+        q_ref = np.zeros((int(free.sum()), 6))
+        q_ref[:, 0] = kept[free]
+        q, _, _ = solve_slots(robot, onto_axis_1(robot, line.poses(grid.progress[free])), q_ref)
+        grid.q[free, side] = q[:, side]
+
+
+def _fill_free_wrist(robot: Robot, line: ToolPath, grid: Branches) -> None:
+    for slot in range(SLOTS):
+        free = grid.free_wrist[:, slot]
+        if free.any() and parallel_axes_arm(robot) is not None:
+            rows = np.arange(len(free), dtype=float)
+            q_ref = grid.q[_kept(rows, free | ~grid.reached[:, slot]).astype(int), slot]
+            q_ref = np.where(np.isnan(q_ref), 0.0, q_ref)
+            grid.q[free, slot] = solve_slots(robot, line.poses(grid.progress[free]), q_ref[free])[0][:, slot]
+        elif free.any():
+            kept = _kept(grid.q[:, slot, 3], free | ~grid.reached[:, slot])
+            grid.q[free, slot] = wrap_to_pi(align_wrist(robot, grid.q[free, slot], kept[free]))
+
+
+def _kept(values: Reals, unknown: Flags) -> Reals:
+    """Values (N,) with the unknown ones replaced by the last known one before, else the next one, else 0."""
+    known = np.flatnonzero(~unknown)
+    if not known.size:
+        return np.zeros(len(values))
+    before = np.searchsorted(known, np.arange(len(values)), side="right") - 1
+    return values[known[np.maximum(before, 0)]]
+
+
+REGULAR = 1e-6  # smallest singular value (scaled) down to which the Jacobian is solved
+BESIDE = (1e-4, 1e-3)  # shares of the way to step aside from a singular point
+AGREE = 1e-2  # relative, between the two sides of a singular point
+JACOBIAN_STEP = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class BranchJump(ByValue):
+    """A place where the branch in use ends and no other continues it.
+
+    Attributes
+    ----------
+    t : s; joint : 1..6, the one that would have to move farthest; angle : rad
+    """
+
+    t: float
+    joint: int
+    angle: float
+
+
+@dataclass(frozen=True, eq=False)
+class Followed(ByValue):
+    """Joint angles along a line.
+
+    Attributes
+    ----------
+    t : (N,), s, rising; progress : (N,), share of the way (0..1)
+    q : (N, 6), rad, manufacturer's angles, continuous but for ``jumps``; NaN where no branch reaches the pose
+    slot : (N,) int, closed-form branch; -1 where none
+    start_turn : (6,), rad, turn at rest from the given start joints to the beginning; not 0 only at a singular start
+    jumps : changes of branch that no continuous motion makes
+    """
+
+    robot: Robot
+    line: ToolPath
+    t: Reals
+    progress: Reals
+    q: Reals
+    slot: Integers
+    start_turn: Reals
+    jumps: tuple[BranchJump, ...]
+
+    def joints(self, t: Reals) -> Reals:
+        """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable."""
+        return self.joints_at(self.line.progress(t)[0])
+
+    def joints_at(self, progress: Reals) -> Reals:
+        """Joint angles (..., 6) in rad at shares of the way (...,); NaN where unreachable."""
+        progress = np.asarray(progress, float)
+        return self._solve(progress.reshape(-1)).reshape(*progress.shape, 6)
+
+    def _solve(self, progress: Reals) -> Reals:
+        robot = self.robot
+        right = np.clip(np.searchsorted(self.progress, progress, side="right"), 1, len(self.progress) - 1)
+        left = right - 1
+        span = self.progress[right] - self.progress[left]
+        weight = np.where(span > 0, (progress - self.progress[left]) / np.where(span > 0, span, 1.0), 0.0)[:, None]
+        a, b = self.q[left], self.q[right]
+        a, b = np.where(np.isnan(a), b, a), np.where(np.isnan(b), a, b)
+        guess = (1 - weight) * a + weight * b
+        known = np.isfinite(guess[:, 0])
+        q_ref = np.where(known[:, None], guess, 0.0)
+        T = self.line.poses(progress)
+        q = self._nearest(solve_slots(robot, T, q_ref)[0], q_ref, self.slot[left], self.slot[right])
+        q[~known] = np.nan
+        if parallel_axes_arm(robot) is not None:  # the reference has told what is free
+            return q
+        factors = determinant_factors(robot, q)
+        on_axis = np.abs(factors.shoulder) < FREE_SHOULDER
+        if on_axis.any():
+            again = solve_slots(robot, onto_axis_1(robot, T[on_axis]), q_ref[on_axis])[0]
+            slots = self.slot[left][on_axis], self.slot[right][on_axis]
+            q[on_axis] = self._nearest(again, q_ref[on_axis], *slots)
+        aligned = np.abs(factors.wrist) < FREE_WRIST
+        if aligned.any():
+            q[aligned] = align_wrist(robot, q[aligned], q_ref[aligned, 3])
+            q[aligned] = q_ref[aligned] + turned_difference(q_ref[aligned], q[aligned])
+        return q
+
+    @staticmethod
+    def _nearest(q: Reals, q_ref: Reals, slot_a: Integers, slot_b: Integers) -> Reals:
+        """Of the branches (n, 8, 6) in use on either side, the nearer to q_ref (n, 6), by the nearest turns."""
+        rows = np.arange(len(q))
+        both = np.stack([q[rows, slot_a], q[rows, slot_b]], axis=1)
+        both[np.stack([slot_a, slot_b], axis=1) < 0] = np.nan
+        step = turned_difference(q_ref[:, None], both)
+        distance = np.abs(step).max(axis=-1)
+        best = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=1)
+        nearest: Reals = q_ref + step[rows, best]
+        return nearest
+
+    def derivatives(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
+        """Joint angles and their first and second derivative by progress, at shares of the way (n,) [1]_.
+
+        With the tool's twist per unit of progress, J q' = twist and J q'' = twist' - J' q'. Where the Jacobian is
+        singular, the derivatives are those just beside, if both sides agree; else NaN: no finite joint speed follows
+        the line through there.
+
+        Returns
+        -------
+        q, dq, ddq : (n, 6), rad
+        """
+        q = self.joints_at(progress)
+        dq, ddq = self.through_jacobian(q, progress)
+        for aside in BESIDE:
+            rows = np.flatnonzero(np.isnan(dq[:, 0]) & np.isfinite(q[:, 0]))
+            if rows.size:
+                dq[rows], ddq[rows] = self._beside(progress[rows], aside)
+        return q, dq, ddq
+
+    def rates(self, t: Reals) -> tuple[Reals, Reals, Reals]:
+        """Joint angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (n,) in s; each (n, 6)."""
+        progress, speed, acceleration = (part[:, None] for part in self.line.progress(np.asarray(t, float)))
+        q, dq, ddq = self.derivatives(progress[:, 0])
+        return q, dq * speed, ddq * speed**2 + dq * acceleration
+
+    @property
+    def _size(self) -> float:
+        """Size of the line in rad, for comparing derivatives."""
+        return self.line.length / characteristic_length(self.robot) + self.line.turned
+
+    def _beside(self, progress: Reals, aside: float) -> tuple[Reals, Reals]:
+        """Derivatives on both sides of points of the way, averaged where they agree; NaN elsewhere."""
+        before = np.where(progress < aside, progress + aside, progress - aside)
+        after = np.where(progress > 1 - aside, progress - aside, progress + aside)
+        sides = [self.through_jacobian(self.joints_at(side), side) for side in (before, after)]
+        merged = []
+        for a, b in zip(*sides):
+            scale = np.maximum(np.abs(a).max(axis=1), np.abs(b).max(axis=1)) + self._size
+            agree = np.abs(a - b).max(axis=1) <= AGREE * scale
+            merged.append(np.where(agree[:, None], (a + b) / 2, np.nan))
+        return merged[0], merged[1]
+
+    def through_jacobian(self, q: Reals, progress: Reals) -> tuple[Reals, Reals]:
+        """First and second derivative of joints (n, 6) by progress; NaN where the Jacobian is singular."""
+        length = characteristic_length(self.robot)
+        dq, ddq = np.full_like(q, np.nan), np.full_like(q, np.nan)
+        rows = np.flatnonzero(np.isfinite(q[:, 0]))
+        smallest = conditioning(self.robot, q[rows], length).smallest_singular_value
+        rows = rows[smallest > REGULAR]
+        scale = np.array([1 / length] * 3 + [1.0] * 3)[:, None]
+        J = jacobian(self.robot, q[rows]) * scale
+        twist, slope = (part[..., None] * scale for part in self.line.twists(progress[rows]))
+        first = np.linalg.solve(J, twist)
+        step = JACOBIAN_STEP / np.maximum(1.0, np.abs(first).max(axis=1, keepdims=True))
+        ahead = jacobian(self.robot, q[rows] + (step * first)[..., 0])
+        behind = jacobian(self.robot, q[rows] - (step * first)[..., 0])
+        dJ = (ahead - behind) * scale / (2 * step)
+        dq[rows], ddq[rows] = first[..., 0], np.linalg.solve(J, slope - dJ @ first)[..., 0]
+        return dq, ddq
+
 
 JUMP_COST = 1e7
 OUTSIDE_COST = 1e4  # for the whole duration

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from typing import Generic, Literal, TypeVar, get_args
 
 import numpy as np
 import scipy
@@ -15,8 +15,7 @@ from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
-from er3a.planning.branch_tracking import parabolas
-from er3a.planning.followed import Followed
+from er3a.planning.follow import Followed, parabolas
 from er3a.planning.singular_events import Joints
 from er3a.robots.joint_limits import CombinationExceeded, SlideExceeded
 from er3a.robots.robot import Robot
@@ -334,3 +333,19 @@ def _root(function: Callable[[float], float], t: Reals, values: Reals, a: int, b
     if not low * high < 0:
         return float(t[a] if abs(values[a]) < abs(values[b]) else t[b])
     return float(scipy.optimize.brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0])))
+
+
+PathVerdict = Literal[
+    "unreachable",
+    "none found",
+    "leaves limits",
+    "collides",
+    "too fast",
+    "singular",
+    "too fast for the assumed limits",
+    "undecided",
+    "near-singular",
+    "safe",
+]
+PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
+"""The gravest first."""

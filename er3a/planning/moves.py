@@ -107,7 +107,7 @@ class JointMove(ByValue):
 
 @dataclass(frozen=True, eq=False)
 class Segment(ByValue, ABC):
-    """What a :class:`Line` and an :class:`er3a.planning.arcs.Arc` of the tool share.
+    """What a :class:`Line` and an :class:`er3a.planning.sequences.Arc` of the tool share.
 
     Attributes
     ----------

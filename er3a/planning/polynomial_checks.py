@@ -1,4 +1,12 @@
-"""Exact checks of motions that are polynomials in time: singular poses, joint limits, speeds, accelerations, jerk."""
+"""Exact checks of motions that are polynomials in time: singular poses, joint limits, speeds, accelerations, jerk.
+
+The determinant's factors as functions of single joints, for arms with a spherical wrist and parallel axes 2 and 3.
+
+The wrist factor turns with joint 5 alone and the elbow factor with joint 3 alone: both are asin(sin(q + phase)), the
+signed distance of q + phase from the nearest multiple of pi. The shoulder factor is a constant and two sines: of q2,
+and of q2 and q3 together. Where joints are coupled, q is what the rows of the table move by. Phases and coefficients
+are read off the factors themselves.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +16,73 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from er3a.kinematics.factor_forms import ELBOW_JOINT, WRIST_JOINT, factor_forms
-from er3a.kinematics.near_singular import NearSingular
-from er3a.kinematics.singularity import TYPES, SingularityType
+from er3a.kinematics.singularity import TYPES, NearSingular, SingularityType, determinant_factors
+from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
-from er3a.planning.intervals import (
-    Interval,
-    LimitCause,
-    RateCause,
-    RateLimit,
-    joints_of,
-    limit_sides,
-    rate_interval,
-)
+from er3a.planning.intervals import Interval, LimitCause, RateCause, RateLimit, joints_of, limit_sides, rate_interval
 from er3a.planning.piecewise import Pieces, PiecewiseMotion, Polynomials, Stretch
 from er3a.planning.singular_events import LONG_STAY, ON_SET, SAME_EVENT, SingularEvent, merged
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
+
+ELBOW_JOINT, WRIST_JOINT = 2, 4
+FORM_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class FactorForms:
+    """Forms of the three factors.
+
+    Attributes
+    ----------
+    wrist_phase, elbow_phase : rad
+    sense : +1 or -1, by which joint 3 counts beside joint 2
+    shoulder : (5,), m: constant, cosine and sine of q2, cosine and sine of q2 + sense q3
+    """
+
+    wrist_phase: float
+    elbow_phase: float
+    sense: float
+    shoulder: Reals
+
+    def shoulder_at(self, q2: Reals, q23: Reals) -> Reals:
+        """The shoulder factor (...,) in m at angles q2 and q2 + sense q3 (...,) in rad."""
+        c = self.shoulder
+        value: Reals = c[0] + c[1] * np.cos(q2) + c[2] * np.sin(q2) + c[3] * np.cos(q23) + c[4] * np.sin(q23)
+        return value
+
+    @property
+    def shoulder_slopes(self) -> tuple[float, float]:
+        """Greatest slopes, m per rad, of the shoulder factor in q2 and in q2 + sense q3."""
+        return float(np.hypot(*self.shoulder[1:3])), float(np.hypot(*self.shoulder[3:5]))
+
+
+@derived
+def factor_forms(robot: Robot) -> FactorForms:
+    """The forms of an arm.
+
+    Raises
+    ------
+    NotWristPartitionedError
+        if the arm's determinant does not factor this way
+    """
+    arm = wrist_partitioned_arm(robot)
+    back = np.eye(6) if robot.coupling is None else np.linalg.inv(robot.coupling)
+    phases = []
+    for joint, kind in ((WRIST_JOINT, "wrist"), (ELBOW_JOINT, "elbow")):
+        q = np.zeros((2, 6))
+        q[1, joint] = np.pi / 2
+        at_0, at_90 = np.sin(getattr(determinant_factors(robot, q @ back.T), kind))
+        phases.append(float(np.arctan2(at_0, at_90)))
+    sense = float(robot.direction[1] * robot.direction[2] * arm.elbow_sign)
+    q = np.zeros((25, 6))
+    q[:, 1:3] = np.stack(np.meshgrid(*[np.linspace(0, 5, 5)] * 2), axis=-1).reshape(-1, 2)
+    both = q[:, 1] + sense * q[:, 2]
+    columns = np.stack([np.ones(25), np.cos(q[:, 1]), np.sin(q[:, 1]), np.cos(both), np.sin(both)], axis=1)
+    shoulder = np.linalg.lstsq(columns, determinant_factors(robot, q @ back.T).shoulder, rcond=None)[0]
+    return FactorForms(phases[0], phases[1], sense, shoulder)
+
 
 LONGEST_TURN = 1.0  # rad within one series of the shoulder's distance
 DEGREE = 24  # by which a sine of so short a turn is met to rounding

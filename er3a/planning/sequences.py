@@ -1,9 +1,21 @@
 """Lines and arcs one after another, their corners rounded or stopped at.
 
 The whole runs on one parameter: the way of each segment, where a turn counts as TURN_LENGTH per radian if that is
-more. Position and orientation are both rounded at a corner (:mod:`er3a.planning.curves`); the orientation as rotation
+more. Position and orientation are both rounded at a corner (:mod:`er3a.planning.sequences`); the orientation as rotation
 vector about the corner's own, in which each side is straight. A corner that is not rounded is a halt, unless the
 sides run on into each other.
+
+Curves put together from pieces of fifth degree, and the pieces that round their corners.
+
+A corner is rounded by the quintic that leaves the one side and joins the other with their point, velocity and
+acceleration, so that the whole has two continuous derivatives there. Between two straight sides that turn by an angle
+g, a rounding over the length r on either side passes the corner at 3/8 r sin(g/2).
+
+Rates of an orientation that is written as a rotation vector: R(s) = exp(w(s)) R_0.
+
+References
+----------
+.. [1] T. D. Barfoot, *State Estimation for Robotics*, 2nd ed., section 8.1.5 (left Jacobian of SO(3)).
 """
 
 from __future__ import annotations
@@ -16,14 +28,206 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue
-from er3a.errors import PathError
-from er3a.numerics.arrays import Flags, Reals
-from er3a.planning.arcs import Arc
-from er3a.planning.curves import GAUSS_POINTS, GAUSS_WEIGHTS, POWERS, Curve, joining, straight
-from er3a.planning.moves import Segment
+from er3a.errors import PathError, PoseError
+from er3a.geometry.transforms import check_poses
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.planning.moves import Segment, rotation_between
 from er3a.planning.piecewise import MotionInParts, PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import FromRestToRest, Rates, TimeLaw, Times, Timetable, times_at
-from er3a.planning.rotation_curves import spin
+
+ON_A_LINE = 1e-6  # rad; three points this near to a straight line fix no circle
+
+
+@dataclass(frozen=True, eq=False)
+class Arc(Segment):
+    """A circular arc of the tool point.
+
+    Attributes
+    ----------
+    centre, normal : (3,), m and unit vector, of the circle; the arc turns about the normal
+    angle : rad, greater than 0; of an arc to a pose less than a full circle
+    """
+
+    centre: Reals
+    normal: Reals
+    angle: float
+
+    @property
+    def radius(self) -> float:
+        """Radius of the circle, m."""
+        return float(np.linalg.norm(self.T_start[:3, 3] - self.centre))
+
+    @property
+    def length(self) -> float:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        return self.radius * self.angle
+
+    @property
+    def bend(self) -> float:
+        """See :class:`er3a.planning.moves.Segment`."""
+        return self.angle
+
+    def points(self, progress: Reals) -> Reals:
+        """See :class:`er3a.planning.moves.Segment`."""
+        return self.centre + self._spokes(np.asarray(progress, float))
+
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
+        """See :class:`er3a.planning.moves.ToolPath`."""
+        spokes = self._spokes(np.asarray(progress, float))
+        turning = np.broadcast_to(self.rotation, spokes.shape)
+        first = np.concatenate([self.angle * np.cross(self.normal, spokes), turning], axis=-1)
+        return first, np.concatenate([-(self.angle**2) * spokes, np.zeros_like(spokes)], axis=-1)
+
+    def _spokes(self, progress: Reals) -> Reals:
+        """From the centre to the tool point, (..., 3)."""
+        spoke = self.T_start[:3, 3] - self.centre
+        turn = (self.angle * progress)[..., None]
+        return np.cos(turn) * spoke + np.sin(turn) * np.cross(self.normal, spoke)
+
+
+def arc(
+    T_start: Reals,
+    via: Reals,
+    T_end: Reals,
+    duration: float,
+    half_turn_axis: Reals | None = None,
+    ramp: float | None = None,
+) -> Arc:
+    """The arc from a pose of the tool through a point ``via`` (3,) in m to another pose.
+
+    The rest is as for :func:`er3a.planning.moves.line`.
+
+    Raises
+    ------
+    PoseError
+        if the three points fix no circle, a pose is no rigid transform, or ``half_turn_axis`` can't choose
+    """
+    T_start, T_end = check_poses(T_start, "T_start"), check_poses(T_end, "T_end")
+    start = T_start[:3, 3]
+    a, b = np.asarray(via, float) - start, T_end[:3, 3] - start
+    normal = np.cross(a, b)
+    far = max(np.linalg.norm(a), np.linalg.norm(b))
+    apart = min(np.linalg.norm(a), np.linalg.norm(b), np.linalg.norm(a - b))
+    if not apart > ON_A_LINE * far:
+        raise PoseError("two of the arc's three points are one; a full circle takes two arcs")
+    if np.linalg.norm(normal) < ON_A_LINE * apart * far:
+        raise PoseError("the arc's three points lie on a straight line")
+    to_centre = np.cross((a @ a) * b - (b @ b) * a, normal) / (2 * normal @ normal)
+    normal = normal / np.linalg.norm(normal)
+    last = b - to_centre
+    angle = np.arctan2(normal @ np.cross(-to_centre, last), -to_centre @ last) % (2 * np.pi)
+    rotation, half_turn = rotation_between(T_start, T_end, half_turn_axis)
+    return Arc(T_start, rotation, duration, half_turn, ramp, start + to_centre, normal, float(angle))
+
+
+POWERS = 6
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Pieces over a parameter that runs from 0 to 1.
+
+    Attributes
+    ----------
+    edges : (n + 1,), rising from 0 to 1
+    coefficients : (n, 6, k), of the powers 0 to 5 of each piece's own share
+    """
+
+    edges: Reals
+    coefficients: Reals
+
+    def piece(self, s: Reals) -> tuple[Integers, Reals]:
+        """Number of the piece, and the share of it, at parameters (...,)."""
+        s = np.asarray(s, float)
+        i = np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, len(self.coefficients) - 1)
+        return i, (s - self.edges[i]) / (self.edges[i + 1] - self.edges[i])
+
+    def __call__(self, s: Reals) -> tuple[Reals, Reals, Reals]:
+        """Value, first and second derivative by the parameter, each (..., k), at parameters (...,)."""
+        i, u = self.piece(s)
+        c, u = self.coefficients[i], u[..., None]
+        span = (self.edges[i + 1] - self.edges[i])[..., None]
+        x, dx, ddx = c[..., 5, :], 5 * c[..., 5, :], 20 * c[..., 5, :]
+        for power in range(4, -1, -1):
+            x = c[..., power, :] + u * x
+            if power >= 1:
+                dx = power * c[..., power, :] + u * dx
+            if power >= 2:
+                ddx = power * (power - 1) * c[..., power, :] + u * ddx
+        return x, dx / span, ddx / span**2
+
+
+def straight(start: Reals, end: Reals) -> Reals:
+    """Coefficients (6, k) of the straight piece between two points (k,)."""
+    found = np.zeros((POWERS, len(start)))
+    found[0], found[1] = start, np.subtract(end, start)
+    return found
+
+
+def joining(before: tuple[Reals, Reals, Reals], after: tuple[Reals, Reals, Reals], span: float) -> Reals:
+    """Coefficients (6, k) of the piece that takes over value and derivatives (k,) ``before`` and ends with ``after``.
+
+    Parameters
+    ----------
+    span : how much of the parameter, by which the derivatives are meant, the piece takes
+    """
+    x0, v0, a0 = before[0], before[1] * span, before[2] * span**2
+    x1, v1, a1 = after[0], after[1] * span, after[2] * span**2
+    value, velocity, acceleration = x1 - x0 - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
+    return np.stack(
+        [
+            x0,
+            v0,
+            a0 / 2,
+            10 * value - 4 * velocity + acceleration / 2,
+            -15 * value + 7 * velocity - acceleration,
+            6 * value - 3 * velocity + acceleration / 2,
+        ]
+    )
+
+
+SMALL = 1e-2  # rad^2; below it the series are exact to rounding
+
+
+def spin(w: Reals, dw: Reals, ddw: Reals) -> tuple[Reals, Reals]:
+    """Angular velocity J(w) w' and its derivative, by the left Jacobian J [1]_.
+
+    Parameters
+    ----------
+    w, dw, ddw : (..., 3), rad: rotation vector and its derivatives by the curve's parameter
+
+    Returns
+    -------
+    omega, its derivative : (..., 3), in the frame that the rotation vector is written in
+    """
+    x = (w * w).sum(axis=-1, keepdims=True)
+    a, b, da, db = _coefficients(x)
+    dx = 2 * (w * dw).sum(axis=-1, keepdims=True)
+    first = np.cross(w, dw)
+    second = np.cross(w, first)
+    omega = dw + a * first + b * second
+    third = np.cross(w, ddw)
+    slope = ddw + da * dx * first + a * third + db * dx * second + b * (np.cross(dw, first) + np.cross(w, third))
+    return omega, slope
+
+
+def _coefficients(x: Reals) -> tuple[Reals, Reals, Reals, Reals]:
+    """(1 - cos) / x and (angle - sin) / (x angle) of the squared angle x, and their derivatives by x."""
+    small = x < SMALL
+    y = np.where(small, 1.0, x)
+    angle = np.sqrt(y)
+    s, c = np.sin(angle), np.cos(angle)
+    a, b = (1 - c) / y, (angle - s) / (y * angle)
+    da, db = (s / (2 * angle) - a) / y, ((1 - c) / (2 * y) - 1.5 * b) / y
+    z = np.where(small, x, 0.0)
+    return (
+        np.where(small, 1 / 2 - z / 24 * (1 - z / 30 * (1 - z / 56 * (1 - z / 90))), a),
+        np.where(small, 1 / 6 - z / 120 * (1 - z / 42 * (1 - z / 72 * (1 - z / 110))), b),
+        np.where(small, -1 / 24 + z / 360 * (1 - 3 * z / 112 * (1 - 2 * z / 135)), da),
+        np.where(small, -1 / 120 + z / 2520 * (1 - z / 48 * (1 - 2 * z / 165)), db),
+    )
+
 
 TURN_LENGTH = 0.1  # m per rad
 NO_WAY = 1e-12  # m; shorter segments are left out

@@ -18,9 +18,15 @@ from typing import Any
 import numpy as np
 import scipy
 
-from er3a.kinematics.near_singular import NearSingular, factor_of
-from er3a.kinematics.rank_loss import rank_losses
-from er3a.kinematics.singularity import TYPES, EventType, SingularityType, determinant_factors
+from er3a.kinematics.singularity import (
+    TYPES,
+    EventType,
+    NearSingular,
+    SingularityType,
+    determinant_factors,
+    factor_of,
+    rank_losses,
+)
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Reals
 from er3a.numerics.runs import runs

@@ -30,18 +30,16 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.kinematics.chain import arm_length
-from er3a.kinematics.factor_forms import ELBOW_JOINT, WRIST_JOINT, factor_forms
 from er3a.kinematics.forward import frames, jacobian
-from er3a.kinematics.near_singular import NearSingular
-from er3a.kinematics.singularity import TYPES, SingularityType, characteristic_length, determinant_factors
+from er3a.kinematics.singularity import TYPES, NearSingular, SingularityType, characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
-from er3a.planning.follow import follow
-from er3a.planning.followed import Followed
+from er3a.planning.follow import Followed, follow
 from er3a.planning.intervals import Interval, RateCause, RateLimit, rate_interval
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, greatest_between, polynomial_motion
+from er3a.planning.polynomial_checks import ELBOW_JOINT, WRIST_JOINT, factor_forms
 from er3a.planning.profiles import TimeLaw, times_at
 from er3a.planning.singular_events import singular_events
 from er3a.robots.robot import Robot

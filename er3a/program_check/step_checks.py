@@ -1,45 +1,530 @@
-"""Follows the steps of a program that was run, and checks each motion from where the one before left the arm."""
+"""Follows the steps of a program that was run, and checks each motion from where the one before left the arm.
+
+The ways round a corner between two lines: joints at poses of a triangle of the tool, and by how much they bend.
+
+The poses have two coordinates from 0, at most 1 in sum: shares of the ways back to where the zone begins and on to
+where it ends; the tool turns with the same shares. Along a straight way of the coordinates J q' = v. From a pose that
+is solved, with J0 there, all bounds are taken joint by joint: as long as the joints have moved by no more than d,
+``|J0^-1 (J - J0)| <= E(d)``, of the derivatives of J at that pose and a bound of the second ones (no derivative of a
+column is longer than the longest column). Then ``|q'| <= (I - E)^-1 |J0^-1 v|`` [1]_; where that comes out no greater
+than d, all poses of the triangle are solved, on one branch. Second derivatives follow from J q'' = v' - J' q'. The
+error of linear interpolation over a triangle is half the mean, by the shares of its corners, of the second derivatives
+towards them: at most an eighth of the sum that two of its sides give.
+
+References
+----------
+.. [1] A. Neumaier, *Interval Methods for Systems of Equations*, 1990, sections 3.6 and 4.1.
+
+Whether an arm stays clear however it rounds a corner within its zone.
+
+Round a corner with a joint motion, the ways lie in the triangle of joint values between where the zone begins, the
+corner, and where it ends, but for ``bend``: the joints of a line leave the straight way between its ends. Round a
+corner of two lines the tool's poses lie in a triangle, and joints are solved at the corners of each part of it. A part
+is free if at its middle each pair of bodies is farther apart than they can come nearer to each other within it; else it
+is cut in four. How near they can come is bounded by levers: no point of a body is farther from a joint's axis than the
+links between and the body are long.
+"""
 
 from __future__ import annotations
 
+import heapq
+import math
+from collections import defaultdict
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from er3a.by_value import ByValue
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
-from er3a.geometry.angles import TURN
-from er3a.kinematics.forward import forward
+from er3a.collision.shapes import link_frames
+from er3a.errors import PoseError
+from er3a.geometry.vectors import TURN
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.chain import row_values
+from er3a.kinematics.forward import forward, jacobian
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.singularity import characteristic_length
+from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots
 from er3a.numerics.arrays import Reals
-from er3a.program_check.motion_laws import is_given
+from er3a.planning.follow import turned_difference
+from er3a.planning.tool_proof import inverse_and_reach
+from er3a.program_check.motion_checks import CheckRules, MotionWay, is_given, joint_way, limit_findings, tool_way
 from er3a.program_check.program_check_findings import (
     ArcGoesOn,
     ArcHasNoCircle,
     CheckFinding,
+    ConfigurationNotRead,
     ExternalAxesLeftOut,
+    FrameNotGiven,
+    FrameTakenAsFlange,
     LoopComesBackOtherwise,
     MoreThanFullSpeed,
     MotionCollides,
     SpeedNotGiven,
     SplineAsLine,
+    TargetNotGiven,
     TargetOutOfReach,
+    TurnNotMet,
     WayNotKnown,
     WayOutOfReach,
+    ZoneCollides,
+    ZoneNotSettled,
     ZoneTooLarge,
     ZoneWithoutSize,
 )
-from er3a.program_check.rest_targets import target_findings
-from er3a.program_check.target_joints import Arms, Goal, PlacedMotion, goal_of
-from er3a.program_check.ways import CheckRules, MotionWay, joint_way, limit_findings, tool_way
-from er3a.program_check.zone_clearance import zone_clearance
-from er3a.program_check.zone_patch import bend_of_line, patch_of
 from er3a.programs.execution import Ending, Execution
-from er3a.programs.instructions import ArmMotion, JointTarget, Pause, PoseTarget, Target, Unknown
+from er3a.programs.instructions import ArmMotion, JointTarget, Pause, PoseTarget, Target, Unknown, UnresolvedTarget
+from er3a.robots.joint_limits import joint_shown, within
 from er3a.robots.robot import Robot
-from er3a.robots.shown import joint_shown
+
+FLANGE = "tool0"
+SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedMotion(ByValue):
+    """A motion with the arm that carries its tool.
+
+    Attributes
+    ----------
+    arm : the robot with the motion's tool; without one where the tool is not known
+    base : T_world_base of the targets (4, 4); None where the base is not known
+    missing, taken : frames that are not given
+    """
+
+    motion: ArmMotion
+    arm: Robot
+    base: Reals | None
+    missing: tuple[FrameNotGiven, ...]
+    taken: tuple[FrameTakenAsFlange, ...]
+
+    @property
+    def needed(self) -> tuple[FrameNotGiven, ...]:
+        """The frames that are not given, for a motion that needs them."""
+        return tuple(replace(each, needed=True) for each in self.missing)
+
+
+class Arms:
+    """The robot with each tool of a program, made once."""
+
+    def __init__(self, robot: Robot):
+        self.robot = robot
+        self._by_tool: dict[bytes, Robot] = {robot.tool.tobytes(): robot}
+
+    def placed(self, motion: ArmMotion) -> PlacedMotion:
+        """A motion with its arm; frames that are not given are named."""
+        missing: list[FrameNotGiven] = []
+        taken: tuple[FrameTakenAsFlange, ...] = ()
+        arm, base = self.robot, motion.base.pose
+        if motion.tool.pose is not None:
+            arm = self._with(motion.tool.pose)
+        elif motion.tool.name == FLANGE:
+            arm, taken = self._with(np.eye(4)), (FrameTakenAsFlange(FLANGE),)
+        elif motion.tool.name:
+            missing.append(FrameNotGiven(motion.tool.name, "tool", needed=False))
+        if base is None and motion.base.name:
+            missing.append(FrameNotGiven(motion.base.name, "base", needed=motion.kind != "joint"))
+        known = None if base is None and motion.base.name else self.robot.base @ (np.eye(4) if base is None else base)
+        return PlacedMotion(motion, arm, known, tuple(missing), taken)
+
+    def _with(self, tool: Reals) -> Robot:
+        key = tool.tobytes()
+        if key not in self._by_tool:
+            self._by_tool[key] = self.robot.replace(tool=tool)
+        return self._by_tool[key]
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Where a motion goes.
+
+    Attributes
+    ----------
+    joints : (n,), rad; None where no solution is known
+    pose : T_world_tool (4, 4), m, of a target that is a pose
+    known : whether the target itself is known
+    """
+
+    joints: Reals | None
+    pose: Reals | None
+    known: bool
+    findings: tuple[CheckFinding, ...] = ()
+
+
+def goal_of(placed: PlacedMotion, target: Target | None, before: Reals | None) -> Goal:
+    """What a target means, from joints (n,) in rad; of several solutions the nearest within the limits."""
+    if isinstance(target, UnresolvedTarget) and target.reason == "position_unknown" and placed.missing:
+        return Goal(None, None, False, placed.needed)
+    if target is None or isinstance(target, UnresolvedTarget):
+        unknown = TargetNotGiven("", "undefined") if target is None else TargetNotGiven(target.text, target.reason)
+        return Goal(None, None, False, (unknown,))
+    if isinstance(target, JointTarget):
+        open_ = np.isnan(target.joints)
+        if not open_.any():
+            return Goal(target.joints, None, True)
+        if before is None:
+            stays = bool(open_.all())
+            return Goal(None, None, stays, () if stays else (TargetNotGiven("", "position_unknown"),))
+        return Goal(np.where(open_, before, target.joints), None, True)
+    if placed.missing or placed.base is None:
+        return Goal(None, None, False, placed.needed)
+    pose = placed.base @ target.pose
+    return _solved(placed, target, pose, before)
+
+
+def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals | None) -> Goal:
+    reference = target.near if target.near is not None else before
+    try:
+        found = inverse(placed.arm, pose, reference, self_motion_rows=True)
+    except PoseError:
+        return Goal(None, None, False, (TargetNotGiven("", "not_finite"),))
+    if not len(found.q):
+        return Goal(None, pose, True, (*placed.taken, TargetOutOfReach(found.unsolved)))
+    rows = found.q[found.within_limits] if found.within_limits.any() else found.q
+    findings: list[CheckFinding] = list(placed.taken)
+    given = dict(target.configuration)
+    turn = given.get("T")
+    if isinstance(turn, (int, float)) and placed.motion.kind == "joint":
+        met = _with_signs(rows, int(turn))
+        rows = rows if met is None else met
+        if met is None:
+            findings.append(TurnNotMet(int(turn)))
+    elif given and "S" not in given and placed.motion.kind == "joint":
+        findings.append(ConfigurationNotRead(", ".join(f"{value}" for value in given.values())))
+    start = np.zeros(rows.shape[1]) if reference is None else reference
+    away = np.abs(rows - start).max(axis=1)
+    return Goal(rows[int(away.argmin())], pose, True, tuple(findings))
+
+
+def _with_signs(rows: Reals, turn: int) -> Reals | None:
+    """The solutions whose joints have the signs that KRL's Turn gives: bit i - 1 is set where axis i is below 0."""
+    below = np.array([(turn >> i) & 1 for i in range(rows.shape[1])], bool)
+    met = ((rows < 0) == below) | (np.abs(rows) < SIGN_ZERO)
+    kept = met.all(axis=1)
+    return rows[kept] if kept.any() else None
+
+
+MOST_REASONS = 1000  # targets out of reach for which it is told why
+
+
+def target_findings(
+    arms: Arms, motions: Mapping[int, ArmMotion], keys: Mapping[int, Hashable]
+) -> tuple[int, dict[int, tuple[CheckFinding, ...]]]:
+    """How many targets were looked at, and what is wrong with them, by the number of the step.
+
+    Parameters
+    ----------
+    keys : equal for motions that are the same in all numbers
+    """
+    first: dict[Hashable, int] = {}
+    for number in motions:
+        first.setdefault(keys[number], number)
+    told: dict[int, tuple[CheckFinding, ...]] = {}
+    poses: dict[int, list[tuple[int, PlacedMotion]]] = defaultdict(list)
+    for number in first.values():
+        placed = arms.placed(motions[number])
+        target = placed.motion.target
+        if isinstance(target, JointTarget):
+            known = np.where(np.isnan(target.joints), placed.arm.lower, target.joints)
+            told[number] = limit_findings(placed.arm, known)
+        elif not isinstance(target, PoseTarget) or placed.base is None or placed.missing:
+            told[number] = goal_of(placed, target, None).findings
+        elif closed_form_missing(placed.arm) is None and placed.arm.coupling is None:  # others take too long
+            poses[id(placed.arm)].append((number, placed))
+    for group in poses.values():
+        told |= _of_poses(group)
+    looked = [number for number in motions if first[keys[number]] in told]
+    return len(looked), {number: found for number in looked if (found := told[first[keys[number]]])}
+
+
+def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[CheckFinding, ...]]:
+    """Findings of targets that are poses, of one arm."""
+    arm = group[0][1].arm
+    told: dict[int, tuple[CheckFinding, ...]] = {number: () for number, _ in group}
+    try:
+        found = inverse_batch(arm, np.stack([_pose(placed) for _, placed in group]))
+    except PoseError:  # one of them is no pose
+        return {number: goal_of(placed, placed.motion.target, None).findings for number, placed in group}
+    away = np.where(found.solved, np.abs(found.q).max(axis=2), np.inf)
+    inside = (found.solved & within(arm, found.q)).any(axis=1)
+    reasons = 0
+    for i in np.flatnonzero(~inside).tolist():
+        number, placed = group[i]
+        if found.solved[i].any():
+            told[number] = limit_findings(arm, found.q[i, int(away[i].argmin())])
+        elif (reasons := reasons + 1) <= MOST_REASONS:
+            told[number] = goal_of(placed, placed.motion.target, None).findings
+        else:
+            told[number] = (TargetOutOfReach(()),)
+    return told
+
+
+def _pose(placed: PlacedMotion) -> Reals:
+    assert placed.base is not None
+    assert isinstance(placed.motion.target, PoseTarget)
+    found: Reals = placed.base @ placed.motion.target.pose
+    return found
+
+
+MOST_TURN = 1.0  # rad, to which the twist of a rotation vector that changes has been bounded
+MOST_GROWN = 0.7
+STEP, BLUR = 1e-5, 1e-8  # rad, of differences of the Jacobian; their error
+ATTEMPTS = 6
+SAME = 1e-7  # rad
+MOST_INVERSE = 1e6  # of the scaled Jacobian; beyond, nothing is proven
+
+
+@dataclass(frozen=True, eq=False)
+class ZonePatch:
+    """The poses round a corner.
+
+    Attributes
+    ----------
+    corner : T_world_tool (4, 4), m
+    sides : (2, 3), m, from the corner to where the zone begins and to where it ends
+    turns : (2, 3), rotation vectors, likewise, in the world's frame
+    slack : m, by which the tool point may be off the triangle
+    """
+
+    arm: Robot
+    corner: Reals
+    sides: Reals
+    turns: Reals
+    slack: float
+
+    def poses(self, at: Reals) -> Reals:
+        """T_world_tool (k, 4, 4) at coordinates (k, 2)."""
+        found = np.tile(self.corner, (len(at), 1, 1))
+        found[:, :3, 3] += at @ self.sides
+        found[:, :3, :3] = Rotation.from_rotvec(at @ self.turns).as_matrix() @ self.corner[:3, :3]
+        return found
+
+    def joints(self, at: Reals, near: Reals) -> Reals:
+        """Solutions (k, n), rad, nearest to joints (k, n) at coordinates (k, 2); NaN where there is none."""
+        solved = solve_slots(self.arm, self.poses(at), near)[0]
+        steps = turned_difference(near[:, None], solved)
+        away = np.where(np.isnan(steps).any(axis=-1), np.inf, np.abs(steps).max(axis=-1))
+        best = away.argmin(axis=1)
+        rows = np.arange(len(at))
+        return np.where(np.isfinite(away[rows, best])[:, None], near + steps[rows, best], np.nan)
+
+    def bend(self, at: Reals, q: Reals) -> tuple[Reals, Reals]:
+        """By how much joints (n,) are off the flat triangle at most, and off it by slack alone, rad.
+
+        Parameters
+        ----------
+        at : (3, 2), coordinates; q : (3, n), rad, solutions there
+
+        Returns
+        -------
+        bend, slack : the first infinite where nothing is proven of so large a part
+        """
+        n = q.shape[1]
+        open_ = np.full(n, np.inf), np.zeros(n)
+        turned = float(np.linalg.norm(self.turns, axis=1).sum())
+        near = _Near.of(self.arm, q[0]) if np.isfinite(q).all() and turned <= MOST_TURN else None
+        if near is None:
+            return open_
+        edges = at[1:] - at[0]
+        turning = edges @ self.turns
+        angles = np.linalg.norm(turning, axis=1)
+        twists = np.concatenate([edges @ self.sides / near.length, turning], axis=1)
+        # a twist turns with the tool, by no more than the tool does; slack adds to what has to be gone
+        aside = [near.size @ np.repeat([self.slack / near.length, turned * angle], 3) for angle in angles]
+        first = np.abs(twists @ near.inverse.T) + np.stack(aside)
+        moved = 1.2 * np.maximum(first.max(axis=0), first.max() / 5)
+        for _ in range(ATTEMPTS):
+            grown = near.grown(moved)
+            if grown is None:
+                return open_
+            rates = first @ grown.T
+            if (rates <= moved).all():
+                break
+            moved = np.maximum(moved, 1.1 * rates.max(axis=0))
+        else:
+            return open_
+        if (np.abs(q[1:] - q[0]) > rates * (1 + 1e-6) + SAME).any():  # another branch
+            return open_
+        bent = sum(
+            near.second(moved, rates[i], rates[j]) + near.size @ np.repeat([0.0, angles[i] * angles[j]], 3)
+            for i in range(2)
+            for j in range(2)
+        )
+        slack: Reals = grown @ near.size @ np.repeat([self.slack / near.length, 0.0], 3)
+        return grown @ bent / 8 + slack, slack
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """The scaled Jacobian J0 near solved joints.
+
+    Attributes
+    ----------
+    inverse : (n, 6), of J0; size : its absolute values
+    changes : (n, n, n), sizes of J0^-1 dJ/dq_i, by i
+    weights : (n,), by which rows of the table move per joint, in sum
+    reach : greatest lever of the tool point, over ``length`` (m)
+    """
+
+    inverse: Reals
+    size: Reals
+    changes: Reals
+    weights: Reals
+    reach: float
+    length: float
+
+    @classmethod
+    def of(cls, arm: Robot, q: Reals) -> _Near | None:
+        """At joints (n,) in rad; None where J0 has no inverse to speak of."""
+        n, length = len(q), characteristic_length(arm)
+        (b,), (reach,) = inverse_and_reach(arm, q[None], length)
+        if not b < MOST_INVERSE:
+            return None
+        steps = STEP * np.eye(n)
+        J = jacobian(arm, np.concatenate([q[None], q + steps, q - steps]))
+        J[:, :3] /= length
+        inverse = np.linalg.inv(J[0])
+        changes = np.abs(inverse @ (J[1 : n + 1] - J[n + 1 :]) / (2 * STEP)) + BLUR * np.abs(inverse).max()
+        weights = np.ones(n) if arm.coupling is None else np.abs(arm.coupling).sum(axis=0)
+        return cls(inverse, np.abs(inverse), changes, weights, float(reach), length)
+
+    @property
+    def norms(self) -> Reals:
+        """Lengths (n,) of the rows of J0^-1."""
+        return np.asarray(np.sqrt((self.inverse**2).sum(axis=1)), np.float64)
+
+    def column(self, moved: Reals) -> tuple[Reals, float]:
+        """Greatest length of the columns (n,) of J while joints move by (n,), and by how much rows do in sum."""
+        rows = float(self.weights @ moved)
+        longest = math.hypot(1.0, self.reach * math.exp(min(rows, 1.0)))
+        return longest * self.weights, rows
+
+    def grown(self, moved: Reals) -> Reals | None:
+        """(I - E)^-1 (n, n) while joints move by no more than (n,), rad; None if E is too great."""
+        columns, rows = self.column(moved)
+        E = np.tensordot(moved, self.changes, 1) + self.norms[:, None] * columns * rows**2 / 2
+        if rows >= 1.0 or np.abs(np.linalg.eigvals(E)).max() >= MOST_GROWN:
+            return None
+        return np.asarray(np.linalg.inv(np.eye(len(E)) - E), np.float64)
+
+    def second(self, moved: Reals, one: Reals, other: Reals) -> Reals:
+        """Sizes (n,) of J0^-1 D_J[one] other while joints move by no more than ``moved``, rates (n,) at most."""
+        columns, rows = self.column(moved)
+        rest = self.norms * rows * (self.weights @ one) * float(columns @ other)
+        found = np.asarray(np.einsum("iac,i,c->a", self.changes, one, other) + rest, np.float64)
+        return found
+
+
+def patch_of(arm: Robot, corners: Reals, slack: float) -> ZonePatch:
+    """The poses between joints (3, n) where the zone begins, at the corner, and where it ends."""
+    poses = forward(arm, corners)
+    turns = Rotation.from_matrix(poses[[0, 2], :3, :3] @ poses[1, :3, :3].T).as_rotvec()
+    return ZonePatch(arm, poses[1], poses[[0, 2], :3, 3] - poses[1, :3, 3], turns, slack)
+
+
+def bend_of_line(arm: Robot, q: Reals, slack: float) -> Reals:
+    """By how much joints (n,) are off the chord at most on a line through solved joints (k, n), rad.
+
+    ``slack`` (m) is by how far the way may be off the straight lines between them; infinite where nothing is proven.
+    """
+    shares = np.linspace(0, 1, len(q))[:, None]
+    nodes = np.abs(q - q[0] - shares * (q[-1] - q[0])).max(axis=0)
+    at = np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    parts = [
+        patch_of(arm, np.stack([a, a, b]), slack).bend(at, np.stack([a, b, a]))[0]
+        if np.isfinite([a, b]).all()
+        else np.full(q.shape[1], np.inf)
+        for a, b in pairwise(q)
+    ]
+    found: Reals = nodes + np.max(parts, axis=0)
+    return found
+
+
+MOST_POSES, MOST_SOLVED = 4000, 500
+WHOLE = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])  # shares of where the zone begins and ends
+PARTS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of corners and of the middles between them
+
+
+def zone_clearance(
+    bodies: Bodies, corners: Reals, tolerance: float, bend: Reals | None = None, patch: ZonePatch | None = None
+) -> ZoneCollides | ZoneNotSettled | None:
+    """Look for a way round a corner that collides; None if all are free.
+
+    Parameters
+    ----------
+    corners : (3, n), rad, joints where the zone begins, at the corner, where it ends
+    tolerance : m; no overlap deeper than this goes unnoticed
+    bend : (n,), rad, by which joints may be off the triangle of joint values; None for not at all
+    patch : the triangle of poses instead, round a corner of two lines
+    """
+    every = np.arange(len(bodies.pairs))
+    if not every.size:
+        return None
+    levers = pair_levers(bodies, corners)
+    coupling = bodies.robot.coupling
+    per_joint = levers if coupling is None else levers @ np.abs(coupling)
+    bend = np.zeros(corners.shape[1]) if bend is None else bend
+    waiting: list[tuple[float, int, Reals, Reals]] = [(0.0, 0, WHOLE, corners)]
+    most = MOST_POSES if patch is None else MOST_SOLVED
+    measured, least, settled = 0, np.inf, True
+    while waiting:
+        _, _, at, triangle = heapq.heappop(waiting)  # the nearest to anything first
+        middle = triangle.mean(axis=0)
+        if not np.isfinite(middle).all():
+            settled = False
+            continue
+        bent, lasting = (bend, bend) if patch is None else patch.bend(at, triangle)
+        proven = bool(np.isfinite(bent).all())
+        off = per_joint @ bent if proven else np.full(len(every), np.inf)
+        distances = bodies.told(bodies.distances(bodies.ends(middle), every))
+        measured += 1
+        worst = int(np.argmin(distances))
+        least = min(least, float(distances[worst]))
+        if distances[worst] < -tolerance - (0.0 if patch is None else off[worst]):
+            return ZoneCollides(bodies.pairs[worst], -1000 * float(distances[worst]))
+        nearer = (levers @ np.abs(row_values(bodies.robot, triangle - middle)).T).max(axis=1)
+        open_ = distances <= nearer + off - tolerance
+        if not open_.any():
+            continue
+        if measured >= most or (proven and (open_ & (nearer < np.maximum(per_joint @ lasting, tolerance))).any()):
+            settled = False  # smaller parts would not tell more
+            if measured >= most:
+                break
+            continue
+        between = (at + at[[1, 2, 0]]) / 2
+        halves = (triangle + triangle[[1, 2, 0]]) / 2
+        solved = halves if patch is None else patch.joints(between, halves)
+        places, joints = np.concatenate([at, between]), np.concatenate([triangle, solved])
+        for i, part in enumerate(PARTS):
+            heapq.heappush(waiting, (float(distances[worst]), 4 * measured + i, places[part], joints[part]))
+    return None if settled else ZoneNotSettled(1000 * least)
+
+
+def pair_levers(bodies: Bodies, corners: Reals) -> Reals:
+    """By how much a pair of bodies can come nearer per motion of each row of the table: (P, m), m/rad or m/m.
+
+    Of two links only the rows between them count. Holds for joints (n,) between the corners (k, n).
+    """
+    robot = bodies.robot
+    origins = link_frames(robot, corners)[..., :3, 3]
+    along = np.linalg.norm(np.diff(origins, axis=-2), axis=-1).max(axis=0)  # of a slide the longest is at a corner
+    before = np.concatenate([[0.0], np.cumsum(along)])
+    links = np.array([body.link for body in bodies.capsules], dtype=int)
+    size = np.array([np.linalg.norm(body.points, axis=1).max() for body in bodies.capsules])
+    row = np.arange(robot.rows)
+    reach = before[links][:, None] - before[row + 1] + size[:, None]  # a link's origin is on its joint's axis
+    reach = np.where(robot.sliding, 1.0, reach) * (row < links[:, None])
+    own = bodies.second >= 0
+    far = np.where(own, bodies.second, bodies.first)
+    base = np.where(own, links[bodies.first], 0)
+    found: Reals = reach[far] * (row >= base[:, None])
+    return found
+
 
 MOST_OF_A_MOTION = 0.5  # that a zone may take
 TOLERANCE = 1e-9

@@ -21,8 +21,8 @@ from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
+from er3a.programs.lexing import ProgramText
 from er3a.programs.program_findings import NothingMoves, ProgramFinding
-from er3a.programs.program_text import ProgramText
 from er3a.programs.syntax import Fixed, Program
 
 TIME = "t_s"

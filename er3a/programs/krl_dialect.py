@@ -5,24 +5,325 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from er3a.programs.angle_conventions import pose_of
+import numpy as np
+
+from er3a.numerics.arrays import Reals
 from er3a.programs.evaluation import IN_DEGREES, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
     Aside,
     Instruction,
+    JointTarget,
     MotionKind,
     NamedFrame,
     Output,
+    PoseTarget,
     Rate,
+    Target,
     Unknown,
+    UnresolvedTarget,
     Zone,
+    numbers_of,
+    pose_of,
 )
-from er3a.programs.krl_settings import base_of, keep_setting, set_by_bas, tool_of
-from er3a.programs.krl_targets import FRAME_KEYS, frame_record, is_frame, record_pose, relative, target
-from er3a.programs.syntax import Doing, Expression, Invocation, Move, Variable
-from er3a.programs.values import Record, Unclear, Value, number, numbers, shown
+from er3a.programs.syntax import (
+    Doing,
+    Expression,
+    Invocation,
+    Move,
+    Record,
+    Unclear,
+    Value,
+    Variable,
+    finite,
+    number,
+    numbers,
+    shown,
+)
+
+FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
+AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
+AXIS_KINDS = ("AXIS", "E6AXIS")
+EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
+NOT_NUMBERS = ("NAN", "INF", "INFINITY")
+Frames = tuple[NamedFrame, NamedFrame]
+
+
+def _has_axes(value: Record) -> bool:
+    return value.kind in AXIS_KINDS or any(key in AXIS_KEYS for key, _ in value.items)
+
+
+def is_frame(value: Value | None) -> bool:
+    """Whether a value has a coordinate of a frame."""
+    return isinstance(value, Record) and any(value.get(key) is not None for key in FRAME_KEYS)
+
+
+def record_pose(value: Value | None) -> Reals | None:
+    """The transform (4, 4) in m of a frame, with 0 for what it leaves out; None for anything else."""
+    if not isinstance(value, Record):
+        return None
+    given = [0.0 if value.get(key) is None else number(value.get(key)) for key in FRAME_KEYS]
+    plain = tuple(each for each in given if each is not None)
+    return pose_of(plain, "kuka") if len(plain) == 6 and finite(plain) else None
+
+
+def frame_record(pose: Reals, kind: str = "FRAME") -> Record:
+    """A transform (4, 4) in m as a frame."""
+    return Record(kind, tuple(zip(FRAME_KEYS, numbers_of(pose, "kuka"))))
+
+
+def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
+    """What a position in a motion means; ``said`` is the line, and whether a relative position is meant by the tool."""
+    text = said[0]
+    if isinstance(value, Unclear):
+        return _unresolved(value)
+    if not isinstance(value, Record):
+        return UnresolvedTarget(text, "not_understood")
+    if memory.read("$IPO_MODE") == "#TCP":
+        return UnresolvedTarget(text, "external_tool")
+    if _has_axes(value):
+        return UnresolvedTarget(text, "not_understood") if is_frame(value) else _joints(memory, value, text)
+    return _pose(memory, value, frames, text)
+
+
+def relative(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
+    """A target given by its difference from where the arm stands."""
+    text, in_tool = said
+    if isinstance(value, Unclear) or not isinstance(value, Record):
+        return _unresolved(value) if isinstance(value, Unclear) else UnresolvedTarget(text, "not_understood")
+    if _has_axes(value):
+        change = _joints(memory, value, text, missing=0.0)
+        if memory.here.joints is None or not isinstance(change, JointTarget):
+            return UnresolvedTarget(text, "position_unknown")
+        return JointTarget(memory.here.joints + change.joints)
+    moved, seen = record_pose(value), memory.here.seen(*frames, memory.cell.flange)
+    if moved is None or seen is None:
+        return UnresolvedTarget(text, "position_unknown")
+    if in_tool:
+        return PoseTarget(seen @ moved)
+    found = seen.copy()
+    found[:3, 3] += moved[:3, 3]
+    found[:3, :3] = moved[:3, :3] @ seen[:3, :3]
+    return PoseTarget(found)
+
+
+def _unresolved(value: Unclear) -> UnresolvedTarget:
+    reason = value.text.upper().lstrip("+-") in NOT_NUMBERS
+    return UnresolvedTarget(value.text, "not_finite" if reason else "undefined")
+
+
+def _components(value: Record, keys: tuple[str, ...], text: str) -> list[float | None] | UnresolvedTarget:
+    """Numbers of a record, None for what it leaves out."""
+    found: list[float | None] = []
+    given = dict(value.items)
+    for key in keys:
+        part = given.get(key)
+        if isinstance(part, Unclear):
+            return _unresolved(part)
+        plain = number(part)
+        if part is not None and plain is None:
+            return UnresolvedTarget(text, "not_understood")
+        if plain is not None and not math.isfinite(plain):
+            return UnresolvedTarget(text, "not_finite")
+        found.append(plain)
+    return found
+
+
+def _external(value: Record) -> tuple[tuple[str, float], ...]:
+    parts = dict(value.items)
+    given = ((key, number(parts[key])) for key in EXTERNAL_KEYS if key in parts)
+    return tuple((key, part) for key, part in given if part)
+
+
+def _joints(memory: ProgramMemory, value: Record, text: str, missing: float | None = None) -> Target:
+    degrees = _components(value, AXIS_KEYS, text)
+    if isinstance(degrees, UnresolvedTarget):
+        return degrees
+    count = memory.cell.joints
+    if any(degrees[count:]):
+        return UnresolvedTarget(text, "too_many_joints")
+    here = memory.here.joints
+    kept = np.full(count, np.nan) if here is None else here
+    if missing is not None:
+        kept = np.full(count, missing)
+    joints = [kept[i] if each is None else math.radians(each) for i, each in enumerate(degrees[:count])]
+    return JointTarget(np.array(joints), _external(value))
+
+
+def _pose(memory: ProgramMemory, value: Record, frames: Frames, text: str) -> Target:
+    given = _components(value, FRAME_KEYS, text)
+    if isinstance(given, UnresolvedTarget):
+        return given
+    if None in given:
+        seen = memory.here.seen(*frames, memory.cell.flange)
+        if seen is None:
+            return UnresolvedTarget(text, "position_unknown")
+        given = [old if each is None else each for each, old in zip(given, numbers_of(seen, "kuka"))]
+    plain = tuple(each for each in given if each is not None)
+    configuration = tuple((key, part) for key in ("S", "T") if (part := number(value.get(key))) is not None)
+    return PoseTarget(pose_of(plain, "kuka"), configuration, external=_external(value))
+
+
+def tool_of(memory: ProgramMemory) -> NamedFrame:
+    """The tool that is set."""
+    return _frame(memory, "$TOOL")
+
+
+def base_of(memory: ProgramMemory) -> NamedFrame:
+    """The base that is set."""
+    return _frame(memory, "$BASE")
+
+
+def _frame(memory: ProgramMemory, variable: str) -> NamedFrame:
+    value = memory.read(variable)
+    if value is None:
+        return NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base)
+    said = memory.read(variable + "%name")
+    name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
+    pose = record_pose(value) if is_frame(value) else None
+    if isinstance(value, Unclear):
+        name = name or value.text
+    return NamedFrame(name, memory.cell.frames.get(name) if pose is None else pose)
+
+
+def set_by_bas(memory: ProgramMemory, call: Invocation) -> bool:
+    """Carry ``BAS(#COMMAND, value)`` out; False if the command is none that sets anything."""
+    values = [memory.value(each) for each in call.arguments if each is not None]
+    command = values[0] if values else ""
+    given: Value = values[1] if len(values) > 1 else Unclear("BAS")
+    match command:
+        case "#INITMOV":
+            pass  # values of the controller's own, which no program tells
+        case "#VEL_PTP":
+            _all_axes(memory, "$VEL_AXIS", given)
+        case "#ACC_PTP":
+            _all_axes(memory, "$ACC_AXIS", given)
+        case "#VEL_CP":
+            memory.write("$VEL.CP", given)
+        case "#ACC_CP":
+            memory.write("$ACC.CP", given)
+        case "#TOOL":
+            _number(memory, "$TOOL", "TOOL_DATA", given)
+        case "#BASE":
+            _number(memory, "$BASE", "BASE_DATA", given)
+        case "#FRAMES":
+            _frames(memory)
+        case "#PTP_DAT" | "#PTP_PARAMS":
+            _joint_data(memory, memory.read("PDAT_ACT"))
+            if command == "#PTP_PARAMS":
+                _frames(memory)
+                _all_axes(memory, "$VEL_AXIS", given)
+        case "#CP_DAT" | "#CP_PARAMS":
+            _line_data(memory, memory.read("LDAT_ACT"))
+            if command == "#CP_PARAMS":
+                _frames(memory)
+                memory.write("$VEL.CP", given)
+        case _:
+            return False
+    return True
+
+
+def keep_setting(memory: ProgramMemory, name: str, expression: Expression) -> None:
+    """One item of a WITH."""
+    if not isinstance(expression, Invocation):
+        value = memory.value(expression)
+        if name in ("$VEL_AXIS[1]", "$ACC_AXIS[1]"):
+            _all_axes(memory, name[:-3], value)
+        else:
+            memory.write(name, value)
+            memory.shared.pop(name + "%name", None)
+        return
+    first = expression.arguments[0] if expression.arguments else None
+    given = Unclear(name) if first is None else memory.value(first)
+    match expression.function:
+        case "SVEL_CP":
+            memory.write("$VEL.CP", given)
+        case "SVEL_JOINT":
+            _all_axes(memory, "$VEL_AXIS", given)
+        case "SACC_JOINT" if isinstance(given, Record):
+            _all_axes(memory, "$ACC_AXIS", given.get("ACC") or Unclear(name))
+        case "SACC_CP":
+            _share(memory, given)
+        case "SAPO":
+            _zone_data(memory, given, "#CDIS")
+        case "SAPO_PTP":
+            _zone_data(memory, given, "#CPTP")
+        case "STOOL2" if isinstance(given, Record):
+            _tool_data(memory, given)
+        case "SBASE":
+            _number(memory, "$BASE", "BASE_DATA", given)
+        case "SIPO_MODE":
+            memory.write("$IPO_MODE", given)
+        case _:
+            if name in ("$TOOL", "$BASE"):
+                memory.write(name, Unclear(f"{expression.function}(...)"))
+                memory.shared.pop(name + "%name", None)
+
+
+def _all_axes(memory: ProgramMemory, name: str, value: Value) -> None:
+    for axis in range(1, 7):
+        memory.write(f"{name}[{axis}]", value)
+
+
+def _number(memory: ProgramMemory, variable: str, array: str, given: Value) -> None:
+    """Set tool or base by its number; 0 is the null frame."""
+    plain = number(given)
+    memory.shared.pop(variable + "%name", None)
+    if plain is None:
+        memory.write(variable, Unclear(f"{array}[?]"))
+        return
+    name = f"{array}[{plain:g}]" if plain else "$NULLFRAME"
+    memory.write(variable, memory.read(name) or Unclear(name))
+    memory.write(variable + "%name", name)
+
+
+def _tool_data(memory: ProgramMemory, data: Record) -> None:
+    _number(memory, "$TOOL", "TOOL_DATA", data.get("TOOL_NO") or 0)
+    memory.write("$IPO_MODE", data.get("IPO_FRAME") or "#BASE")
+
+
+def _frames(memory: ProgramMemory) -> None:
+    data = memory.read("FDAT_ACT")
+    if isinstance(data, Record):
+        _tool_data(memory, data)
+        _number(memory, "$BASE", "BASE_DATA", data.get("BASE_NO") or 0)
+    elif isinstance(data, Unclear):
+        for variable in ("$TOOL", "$BASE"):
+            memory.write(variable, Unclear(f"{variable[1:]} of {data.text}"))
+            memory.shared.pop(variable + "%name", None)
+
+
+def _joint_data(memory: ProgramMemory, data: Value | None) -> None:
+    if isinstance(data, Record):
+        _all_axes(memory, "$ACC_AXIS", data.get("ACC") or Unclear("ACC"))
+        _zone_data(memory, data, "#CPTP")
+
+
+def _line_data(memory: ProgramMemory, data: Value | None) -> None:
+    if isinstance(data, Record):
+        _share(memory, data)
+        _zone_data(memory, data, "#CDIS")
+
+
+def _share(memory: ProgramMemory, data: Value) -> None:
+    percent = number(data.get("ACC")) if isinstance(data, Record) else None
+    if percent is not None:
+        memory.write("$ACC.CP", Record("", (("share", percent / 100),)))
+
+
+def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
+    """``APO_DIST`` of motion data: mm, or percent of a joint motion."""
+    distance = number(data.get("APO_DIST")) if isinstance(data, Record) else None
+    if not isinstance(data, Record) or distance is None:
+        return
+    mode = data.get("APO_MODE") or usual
+    if mode == "#CPTP":
+        memory.write("$APO.CPTP", distance)
+    else:
+        memory.write("$APO.CDIS", distance)
+        memory.shared.pop("$APO.CPTP", None)
+
 
 KINDS: dict[str, MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE")

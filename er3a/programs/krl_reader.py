@@ -5,19 +5,469 @@ Lines that are not understood are kept; blocks and texts without an end are erro
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
-from er3a.programs.code_builder import CodeBuilder, fault
+from er3a.errors import InputError
+from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, not_understood, within
 from er3a.programs.instructions import Place
-from er3a.programs.krl_modules import apart, modules_of
-from er3a.programs.krl_statements import statement
-from er3a.programs.krl_words import KrlWords
-from er3a.programs.lexing import MisreadError
-from er3a.programs.linking import linked, not_understood
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
-from er3a.programs.program_text import ProgramText, read_program_text
-from er3a.programs.syntax import Assign, Expression, Program, Routine, RoutineParameter, Variable
+from er3a.programs.syntax import (
+    Aggregate,
+    Assign,
+    Constant,
+    Doing,
+    Element,
+    Expression,
+    Invocation,
+    Member,
+    Move,
+    Opaque,
+    Operation,
+    Program,
+    Record,
+    Return,
+    Routine,
+    RoutineParameter,
+    Variable,
+    Waiting,
+)
+
+KRL = Lexicon(
+    re.compile(
+        rf"""(?P<text>"[^"]*")|(?P<number>{NUMBER})|(?P<enum>\#\s*[A-Za-z_]\w*)|(?P<whole>'[HhBb][0-9A-Fa-f]+')"""
+        r"""|(?P<name>[A-Za-z_$][\w$]*)|(?P<mark>==|<>|<=|>=|\.\.|\S)"""
+    ),
+    ranks={
+        **dict.fromkeys(("==", "<>", "<", ">", "<=", ">="), 1),
+        **dict.fromkeys(("OR", "B_OR"), 2),
+        **dict.fromkeys(("EXOR", "B_EXOR"), 3),
+        **dict.fromkeys(("AND", "B_AND"), 4),
+        "+": 5,
+        "-": 5,
+        "*": 6,
+        "/": 6,
+        ":": 7,
+    },
+    right={"NOT": 8, "B_NOT": 8, "+": 8, "-": 8},
+    constants={"TRUE": True, "FALSE": False},
+    folds=True,
+)
+
+PLAIN = re.compile(
+    r"(?i)(PTP|LIN|SPTP|SLIN|SPL)\s*\{\s*(?:(E6POS|E6AXIS|POS|FRAME|AXIS)\s*:)?([^{}\"]*)\}\s*((?:C_\w+(?:\s+|$))*)$"
+)
+PLAIN_DATA = re.compile(r"(?i)DECL\s+(?:GLOBAL\s+)?(\w+)\s+(\w+)\s*=\s*\{([^{}\"]*)\}$")
+
+
+class KrlWords(Words):
+    """Words of a line of KRL."""
+
+    def __init__(self, text: str):
+        super().__init__(KRL, text)
+
+    def special(self) -> Expression | None:
+        """Aggregates, enumerations, numbers in other bases, the point that is to be taught."""
+        if self.kind == "enum":
+            return Constant("#" + self.take()[1:].strip().upper())
+        if self.kind == "whole":
+            word = self.take()
+            try:
+                return Constant(int(word[2:-1], 16 if word[1] in "Hh" else 2))
+            except ValueError:
+                raise MisreadError(f"{word} is no number") from None
+        if self.accept("{"):
+            return self._aggregate()
+        return Opaque(self.take()) if self.next in ("?", "!") else None
+
+    def _aggregate(self) -> Expression:
+        kind = ""
+        if self.kind == "name" and self.texts[self.at + 1] == ":":
+            kind = self.take()
+            self.take()
+        items: list[tuple[str, Expression]] = []
+        if self.accept("}"):
+            return Aggregate(kind, ())
+        while True:
+            name = self.name()
+            if any(name == other for other, _ in items):
+                raise MisreadError(f"{name} is given twice")
+            if self.accept("["):
+                self.expect("]")
+            items.append((name, self.expression()))
+            if not self.accept(","):
+                self.expect("}")
+                return Aggregate(kind, tuple(items))
+
+
+def plain_record(kind: str | None, items: str) -> Constant | None:
+    """A record of numbers and enumerations alone, without a look at its words."""
+    words = items.replace(",", " ").split()
+    names, texts = words[::2], words[1::2]
+    if len(names) != len(texts) or len(names) != items.count(",") + 1 or "_" in "".join(texts):
+        return None
+    try:
+        found = [(name.upper(), text.upper() if text[0] == "#" else float(text)) for name, text in zip(names, texts)]
+    except ValueError:
+        return None
+    if len(dict(found)) < len(found) or not all(isinstance(value, str) or math.isfinite(value) for _, value in found):
+        return None
+    return Constant(Record((kind or "").upper(), tuple(found)))
+
+
+MOTIONS = frozenset(
+    [
+        "PTP",
+        "LIN",
+        "CIRC",
+        "PTP_REL",
+        "LIN_REL",
+        "CIRC_REL",
+        "SPTP",
+        "SLIN",
+        "SCIRC",
+        "SPL",
+        "SPTP_REL",
+        "SLIN_REL",
+        "SCIRC_REL",
+        "SPL_REL",
+    ]
+)
+ASIDES = frozenset(
+    [
+        "EXT",
+        "EXTFCT",
+        "IMPORT",
+        "ENUM",
+        "STRUC",
+        "CONTINUE",
+        "TRIGGER",
+        "ANIN",
+        "ANOUT",
+        "RESUME",
+        "BRAKE",
+        "TIME_BLOCK",
+        "CONST_VEL",
+        "ON_ERROR_PROCEED",
+        "STOP",
+    ]
+)
+OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
+Handler = Callable[["_Statement"], None]
+
+
+def statement(builder: CodeBuilder, place: Place, text: str, signals: dict[str, Expression], inside_data: bool) -> None:
+    """Add a line to the code of its routine; one that is not understood is kept as such."""
+    if (plain := PLAIN.match(text)) is not None and (target := plain_record(plain[2], plain[3])) is not None:
+        builder.add(Move(place, plain[1].upper(), (target,), text, tuple(plain[4].upper().split())))
+        return
+    if inside_data and (plain := PLAIN_DATA.match(text)) is not None and (found := plain_record("", plain[3])):
+        builder.add(Assign(place, Variable(plain[2].upper()), found, text, plain[1].upper()))
+        return
+    reading = _Statement(builder, place, text, signals, inside_data)
+    try:
+        reading.read()
+    except MisreadError as error:
+        if reading.words.texts[0] in ("FOR", "CASE"):  # without which the lines behind would mean something else
+            problem = f"this {reading.words.texts[0]} can't be read ({error})"
+            raise fault(place, problem, "Write FOR i=1 TO 9, or CASE 1, 2") from None
+        builder.unknown(place, text, may_move=not inside_data)
+    except RecursionError:
+        raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+
+
+class _Statement:
+    """One line."""
+
+    def __init__(
+        self, builder: CodeBuilder, place: Place, text: str, signals: dict[str, Expression], inside_data: bool
+    ):
+        self.builder, self.place, self.text, self.signals = builder, place, text, signals
+        self.inside_data = inside_data
+        self.words = KrlWords(text)
+
+    def read(self) -> None:
+        words, first = self.words, self.words.next
+        if words.kind == "end":
+            raise MisreadError("no words")
+        if first in MOTIONS:
+            words.take()
+            self._motion(first)
+        elif first in HANDLERS and words.texts[words.at + 1] != "=":
+            words.take()
+            HANDLERS[first](self)
+        elif first in ASIDES:
+            self.builder.aside(self.place, self.text)
+        elif first in OUTER_AXES:
+            self.builder.unknown(self.place, self.text, may_move=False)
+        elif first in ("DECL", "GLOBAL", "CONST", "SIGNAL") or self._declares():
+            self._declaration()
+        elif words.texts[words.at + 1] == ":" and words.kinds[words.at + 2] == "end":
+            self.builder.label(first)
+        else:
+            self._assignment()
+
+    def condition(self, end: str = "") -> Expression:
+        """A condition up to a word or the end; one that is not understood is kept."""
+        start = self.words.at
+        try:
+            found = self.words.expression()
+            if end:
+                self.words.expect(end)
+            self.words.finish()
+        except MisreadError:
+            texts = self.words.texts[start:-1]
+            return Opaque(" ".join(text for text in texts if text.upper() != end))
+        return found
+
+    def _declares(self) -> bool:
+        kinds, texts = self.words.kinds, self.words.texts
+        return kinds[0] == "name" == kinds[1] and len(texts) > 2 and texts[2] in ("", "=", ",", "[")
+
+    def _declaration(self) -> None:
+        words = self.words
+        while words.next in ("DECL", "GLOBAL", "CONST"):
+            words.take()
+        if words.next in ("STRUC", "ENUM", "INTERRUPT"):
+            self.builder.aside(self.place, self.text)
+            return
+        if words.accept("SIGNAL"):
+            name = words.name()
+            self.signals[name] = words.expression()
+            self.builder.aside(self.place, self.text)
+            return
+        kind = words.name()
+        if words.accept("["):
+            words.arguments("]")
+        while True:
+            target: Expression = Variable(words.name())
+            if words.accept("["):
+                words.arguments("]")
+            value = words.expression() if words.accept("=") else None
+            local = not self.inside_data
+            self.builder.add(Assign(self.place, target, value, self.text, kind, local))
+            if not words.accept(","):
+                break
+        words.finish()
+
+    def _assignment(self) -> None:
+        words = self.words
+        left = self._known(words.expression())
+        if words.accept("="):
+            value = words.expression()
+            words.finish()
+            self.builder.add(Assign(self.place, left, value, self.text))
+            return
+        words.finish()
+        if not isinstance(left, Invocation):
+            raise MisreadError("neither an assignment nor a call")
+        self.builder.add(Doing(self.place, left, self.text))
+
+    def _known(self, expression: Expression) -> Expression:
+        """The signal that a name stands for."""
+        if isinstance(expression, Variable):
+            return self.signals.get(expression.name, expression)
+        return expression
+
+    def _motion(self, form: str) -> None:
+        words = self.words
+        arguments: list[Expression | None] = [words.expression()]
+        settings: list[tuple[str, Expression]] = []
+        flags: list[str] = []
+        while words.kind != "end":
+            if words.accept(","):
+                if not words.accept("CA"):
+                    arguments.append(words.expression())
+                    continue
+                settings.append(("CA", words.expression()))
+            elif words.accept("CA"):
+                settings.append(("CA", words.expression()))
+            elif words.accept("WITH"):
+                settings += self._with()
+            elif words.kind == "enum":
+                flags.append("#" + words.take()[1:].strip().upper())
+            elif words.next.startswith("C_"):
+                flags.append(words.take())
+            else:
+                raise MisreadError(f"'{words.next}' not expected")
+        self.builder.add(Move(self.place, form, tuple(arguments), self.text, tuple(flags), tuple(settings)))
+
+    def _with(self) -> list[tuple[str, Expression]]:
+        settings = []
+        while True:
+            name = _text_of(self.words.reference())
+            self.words.expect("=")
+            settings.append((name, self.words.expression()))
+            if not self.words.accept(","):
+                return settings
+
+
+def _text_of(expression: Expression) -> str:
+    match expression:
+        case Variable(name=name):
+            return name
+        case Member(of=of, name=name):
+            return f"{_text_of(of)}.{name}"
+        case Element(of=of):
+            return f"{_text_of(of)}[1]"
+        case _:
+            return ""
+
+
+def _if(reading: _Statement) -> None:
+    reading.builder.open_if(reading.place, reading.condition("THEN"), reading.text)
+
+
+def _for(reading: _Statement) -> None:
+    words = reading.words
+    name = words.name()
+    words.expect("=")
+    first = words.expression()
+    words.expect("TO")
+    last = words.expression()
+    step = words.expression() if words.accept("STEP") else None
+    words.finish()
+    reading.builder.open_for(reading.place, name, first, last, step, reading.text)
+
+
+def _case(reading: _Statement) -> None:
+    values = [reading.words.expression()]
+    while reading.words.accept(","):
+        values.append(reading.words.expression())
+    reading.builder.case(reading.place, values, reading.text)
+
+
+def _wait(reading: _Statement) -> None:
+    words = reading.words
+    if words.accept("SEC"):
+        seconds = words.expression()
+        words.finish()
+        reading.builder.add(Waiting(reading.place, "seconds", seconds, reading.text))
+        return
+    words.expect("FOR")
+    text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
+    reading.builder.add(Waiting(reading.place, "condition", reading.condition(), text))
+
+
+def _return(reading: _Statement) -> None:
+    value = None if reading.words.kind == "end" else reading.words.expression()
+    reading.words.finish()
+    reading.builder.add(Return(reading.place, value))
+
+
+def _interrupt(reading: _Statement) -> None:
+    if reading.words.accept("DECL") and " DO " in reading.text.upper():
+        routine = re.split(r"(?i)\bDO\b", reading.text)[-1]
+        if "IR_STOPM" not in routine.upper() and "(" in routine:
+            reading.builder.unknown(reading.place, reading.text, may_move=False)  # not here, but whenever it is met
+            return
+    reading.builder.aside(reading.place, reading.text)
+
+
+def _goto(reading: _Statement) -> None:
+    reading.builder.goto(reading.place, reading.words.name())
+
+
+def _simple(action: Callable[[CodeBuilder, Place], None]) -> Handler:
+    return lambda reading: action(reading.builder, reading.place)
+
+
+HANDLERS: dict[str, Handler] = {
+    "IF": _if,
+    "ELSE": _simple(lambda builder, place: builder.next_arm(place, None, "")),
+    "ENDIF": _simple(lambda builder, place: builder.close("if", place)),
+    "WHILE": lambda reading: reading.builder.open_while(reading.place, reading.condition(), reading.text),
+    "ENDWHILE": _simple(lambda builder, place: builder.close("while", place)),
+    "LOOP": _simple(lambda builder, place: builder.open_loop(place)),
+    "ENDLOOP": _simple(lambda builder, place: builder.close("loop", place)),
+    "FOR": _for,
+    "ENDFOR": _simple(lambda builder, place: builder.close("for", place)),
+    "REPEAT": _simple(lambda builder, place: builder.open_repeat(place)),
+    "UNTIL": lambda reading: reading.builder.close("repeat", reading.place, reading.condition(), reading.text),
+    "SWITCH": lambda reading: reading.builder.open_switch(reading.place, reading.condition()),
+    "CASE": _case,
+    "DEFAULT": _simple(lambda builder, place: builder.case(place, None, "")),
+    "ENDSWITCH": _simple(lambda builder, place: builder.close("switch", place)),
+    "EXIT": _simple(lambda builder, place: builder.leave_loop(place)),
+    "GOTO": _goto,
+    "RETURN": _return,
+    "HALT": lambda reading: reading.builder.add(Waiting(reading.place, "operator", None, "HALT")),
+    "WAIT": _wait,
+    "INTERRUPT": _interrupt,
+    "SPLINE": lambda reading: _spline(reading),
+    "PTP_SPLINE": lambda reading: _spline(reading),
+    "ENDSPLINE": lambda reading: _spline(reading),
+}
+
+
+def _spline(reading: _Statement) -> None:
+    """Begin and end of a spline are moves without target: the run numbers its blocks by them."""
+    form = "ENDSPLINE" if reading.text.upper().startswith("ENDSPLINE") else "SPLINE"
+    call = Invocation(f"%{form}", ())
+    reading.builder.add(Doing(reading.place, call, reading.text))
+
+
+CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
+GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
+GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
+MOST_MODULES = 200
+
+
+def modules_of(path: Path) -> tuple[Path, ...]:
+    """The modules that a .src file calls, and those that these call, in the order in which they are met."""
+    beside = {
+        each.stem.upper(): each
+        for each in sorted(path.parent.iterdir())
+        if each.suffix.lower() == ".src" and each.is_file()
+    }
+    beside.pop(path.stem.upper(), None)
+    found: list[Path] = []
+    waiting = [path]
+    while beside and waiting and len(found) < MOST_MODULES:
+        called = dict.fromkeys(name.upper() for name in CALL.findall(read_program_text(waiting.pop(0)).text))
+        new = [beside.pop(name) for name in called if name in beside]
+        found += new
+        waiting += new
+    return tuple(found)
+
+
+def apart(
+    source: ProgramText, routines: Iterable[Routine], data: Iterable[Assign]
+) -> tuple[list[Routine], list[Assign]]:
+    """A module's routines and data under names that no other module has, its global ones apart.
+
+    In KRL a routine is seen by other modules if it is named as its file or declared ``GLOBAL``, a name of a .dat file
+    if it is declared ``GLOBAL``.
+    """
+    routines, data, module = list(routines), list(data), source.path.stem.upper()
+    seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
+    own = {each.target.name for each in data if isinstance(each.target, Variable) and not GLOBAL_NAME.search(each.text)}
+    own |= {routine.name for routine in routines} - seen
+    names = {name: f"{module}/{name}" for name in own if not name.startswith("$")}
+
+    def code(operations: Iterable[Operation]) -> tuple[Operation, ...]:
+        return tuple(_renamed(operation, names) for operation in operations)
+
+    placed = [replace(each, name=names.get(each.name, each.name), code=code(each.code)) for each in routines]
+    return placed, [each for each in code(data) if isinstance(each, Assign)]
+
+
+def _renamed(operation: Operation, names: Mapping[str, str]) -> Operation:
+    def each(expression: Expression) -> Expression:
+        expression = within(expression, each)
+        if isinstance(expression, Variable):
+            return replace(expression, name=names.get(expression.name, expression.name))
+        if isinstance(expression, Invocation):
+            return replace(expression, function=names.get(expression.function, expression.function))
+        return expression
+
+    operation = mapped(operation, each)
+    return replace(operation, target=each(operation.target)) if isinstance(operation, Assign) else operation
+
 
 HEAD = re.compile(r"(?i)\s*(?:GLOBAL\s+)?(DEF|DEFFCT)\s+(.*)")
 

@@ -11,12 +11,28 @@ import math
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.angle_conventions import numbers_of
-from er3a.programs.instructions import ArmMotion, JointTarget, Listing, NamedFrame, Output, Pause, PoseTarget, Zone
-from er3a.programs.krl_targets import AXIS_KEYS, FRAME_KEYS
-from er3a.programs.rates import share_of_greatest, tool_speed
-from er3a.programs.resolving import ReadyMotion
-from er3a.programs.writing import WriteOptions, Writer, ascii_text, fixed, short
+from er3a.programs.instructions import (
+    ArmMotion,
+    JointTarget,
+    Listing,
+    NamedFrame,
+    Output,
+    Pause,
+    PoseTarget,
+    Zone,
+    numbers_of,
+)
+from er3a.programs.krl_dialect import AXIS_KEYS, FRAME_KEYS
+from er3a.programs.writing import (
+    ReadyMotion,
+    WriteOptions,
+    Writer,
+    ascii_text,
+    fixed,
+    share_of_greatest,
+    short,
+    tool_speed,
+)
 
 DIGITS = 6
 KNOWN_FRAMES = ("TOOL_DATA[", "BASE_DATA[", "$NULLFRAME", "$WORLD", "$ROBROOT")

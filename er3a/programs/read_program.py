@@ -10,10 +10,9 @@ from pathlib import Path
 from er3a.errors import InputError
 from er3a.programs.csv_program import read_csv_program
 from er3a.programs.instructions import ArmMotion
-from er3a.programs.krl_modules import modules_of
-from er3a.programs.krl_reader import data_file_of, read_krl, shared_data_of
+from er3a.programs.krl_reader import data_file_of, modules_of, read_krl, shared_data_of
+from er3a.programs.lexing import ProgramText, read_program_text
 from er3a.programs.program_findings import NothingMoves
-from er3a.programs.program_text import ProgramText, read_program_text
 from er3a.programs.rpl_reader import read_rpl
 from er3a.programs.syntax import Fixed, Language, Move, Program
 from er3a.programs.urscript_reader import read_urscript

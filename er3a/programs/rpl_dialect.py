@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 
-from er3a.programs.angle_conventions import pose_of
 from er3a.programs.evaluation import IN_DEGREES, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
@@ -21,10 +20,22 @@ from er3a.programs.instructions import (
     Unknown,
     UnresolvedTarget,
     Zone,
+    pose_of,
 )
-from er3a.programs.rpl_words import CONFIGURATION, FIELDS, JOINTS, OUTER, POSITION
-from er3a.programs.syntax import Doing, Expression, Invocation, Move
-from er3a.programs.values import Record, Unclear, Value, finite, number, numbers, shown
+from er3a.programs.rpl_reader import CONFIGURATION, FIELDS, JOINTS, OUTER, POSITION
+from er3a.programs.syntax import (
+    Doing,
+    Expression,
+    Invocation,
+    Move,
+    Record,
+    Unclear,
+    Value,
+    finite,
+    number,
+    numbers,
+    shown,
+)
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
 ZONE = re.compile(r"z(\d+(?:\.\d+)?)$", re.IGNORECASE)

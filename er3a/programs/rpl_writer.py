@@ -15,13 +15,9 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.angle_conventions import numbers_of
-from er3a.programs.circle import chords
-from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone
-from er3a.programs.rates import share_of_greatest, tool_speed
-from er3a.programs.resolving import ReadyMotion
+from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone, chords, numbers_of
 from er3a.programs.rpl_dialect import SPEED, ZONE
-from er3a.programs.writing import WriteOptions, Writer, fixed, short
+from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, fixed, share_of_greatest, short, tool_speed
 
 DIGITS = 6
 PERCENTS = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 70, 75, 80, 90, 100)

@@ -11,7 +11,6 @@ import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
-from er3a.programs.angle_conventions import numbers_of, pose_of
 from er3a.programs.evaluation import ProgramMemory
 from er3a.programs.instructions import (
     FINE,
@@ -28,9 +27,23 @@ from er3a.programs.instructions import (
     Unknown,
     UnresolvedTarget,
     Zone,
+    numbers_of,
+    pose_of,
 )
-from er3a.programs.syntax import Doing, Invocation, Move
-from er3a.programs.values import POSE_KEYS, Record, Solved, Unclear, Value, finite, number, numbers, shown
+from er3a.programs.syntax import (
+    POSE_KEYS,
+    Doing,
+    Invocation,
+    Move,
+    Record,
+    Solved,
+    Unclear,
+    Value,
+    finite,
+    number,
+    numbers,
+    shown,
+)
 
 KINDS: dict[str, MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
 PARAMETERS = {

@@ -9,12 +9,11 @@ import re
 from collections.abc import Iterator
 
 from er3a.errors import InputError
-from er3a.programs.code_builder import CodeBuilder, fault
+from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, Words, as_number
-from er3a.programs.linking import linked
-from er3a.programs.program_text import ProgramText
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, as_number
 from er3a.programs.syntax import (
+    POSE_KEYS,
     START,
     Assign,
     Call,
@@ -28,12 +27,12 @@ from er3a.programs.syntax import (
     Move,
     Opaque,
     Program,
+    Record,
     Return,
     Routine,
     RoutineParameter,
     Waiting,
 )
-from er3a.programs.values import POSE_KEYS, Record
 
 UR = Lexicon(
     re.compile(

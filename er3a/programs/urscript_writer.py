@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.angle_conventions import numbers_of
-from er3a.programs.instructions import Output, Pause, PoseTarget
-from er3a.programs.rates import duration, leading_joint_speed, tool_speed
-from er3a.programs.resolving import ReadyMotion
+from er3a.programs.instructions import Output, Pause, PoseTarget, numbers_of
 from er3a.programs.urscript_dialect import DEFAULTS
-from er3a.programs.writing import Writer, fixed, short
+from er3a.programs.writing import ReadyMotion, Writer, duration, fixed, leading_joint_speed, short, tool_speed
 
 DIGITS = 9
 

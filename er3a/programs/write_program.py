@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from er3a.errors import InputError
-from er3a.programs.arm_joints import not_expressed, other_count
 from er3a.programs.instructions import JointTarget, Listing
 from er3a.programs.krl_writer import KrlWriter
 from er3a.programs.rpl_writer import RplWriter, XplWriter
 from er3a.programs.syntax import Language
 from er3a.programs.urscript_writer import UrScriptWriter
-from er3a.programs.writing import WriteOptions, Writer, WrittenProgram
+from er3a.programs.writing import WriteOptions, Writer, WrittenProgram, not_expressed, other_count
 
 WRITERS: dict[Language, type[Writer]] = {
     "krl": KrlWriter,

@@ -1,7 +1,7 @@
 """The kinds of reference tables and what their rows state: the one registry of both, and of groups.
 
 All coordinates are in the manufacturer's base frame; angles are the manufacturer's joint angles. A new kind is a row
-class here, listed in ``KINDS``, its columns in :mod:`er3a.files.reference_rows`, and, for a new group or subject, its
+class here, listed in ``KINDS``, its columns in :mod:`er3a.files.reference_sets`, and, for a new group or subject, its
 words in :mod:`er3a.pipeline.messages.references`.
 """
 
@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from er3a.references.documents import Documents
 from er3a.references.quantities import (
     COORDINATES,
     ZERO_POSE,
@@ -33,7 +32,7 @@ from er3a.references.quantities import (
     Speed,
     Vector,
 )
-from er3a.references.reference import Reference, ReferenceSet, Row, Scalar
+from er3a.references.reference import Documents, Reference, ReferenceSet, Row, Scalar
 from er3a.references.seen import Seen, SeenMotion, TableEntry
 from er3a.references.subjects import (
     AxisDirection,

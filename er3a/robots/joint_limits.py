@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.errors import Er3aError
-from er3a.geometry.angles import TURN, wrap_to_pi
+from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_way, turns_in, whole_turns
@@ -216,3 +216,39 @@ def _beyond(value: float, lower: float, upper: float) -> list[tuple[Literal["abo
         ("below", lower - value, lower),
     )
     return [(side, excess, limit) for side, excess, limit in sides if excess > LIMIT_TOLERANCE]
+
+
+def shown(robot: Robot, q: Reals) -> Reals:
+    """Joint values, rates or their derivatives (..., n) in rad or m, as degrees or mm."""
+    values: Reals = np.where(robot.slides, 1000.0 * q, np.degrees(q)) if robot.sliding.any() else np.degrees(q)
+    return values
+
+
+def joint_shown(robot: Robot, joint: int, value: float) -> tuple[float, bool]:
+    """A value of one joint (from 0) in rad or m, as degrees or mm, and whether it slides."""
+    slides = bool(robot.slides[joint])
+    return 1000.0 * value if slides else float(np.degrees(value)), slides
+
+
+def meant(robot: Robot, values: Reals) -> Reals:
+    """Values (..., n) in degrees or mm, as rad or m."""
+    values = np.asarray(values, float)
+    q: Reals = (
+        np.where(robot.slides, values / 1000.0, np.radians(values)) if robot.sliding.any() else np.radians(values)
+    )
+    return q
+
+
+def joint_names(robot: Robot) -> tuple[str, ...]:
+    """Names of the joints in q: ``J1 ... Jn``."""
+    return tuple(f"J{k + 1}" for k in range(robot.joints))
+
+
+def joint_columns(robot: Robot) -> tuple[str, ...]:
+    """Names of the joints with the unit they are shown in: ``q1_deg``, of those that slide ``q3_mm``."""
+    return tuple(f"q{k + 1}_{'mm' if slides else 'deg'}" for k, slides in enumerate(robot.slides))
+
+
+def size_of(robot: Robot) -> float:
+    """A length (m) to scale drawings with: the sum of all link lengths."""
+    return float(np.abs(robot.a).sum() + np.abs(robot.d).sum())

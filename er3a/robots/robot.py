@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_args
+from functools import update_wrapper
+from typing import Any, Concatenate, Literal, ParamSpec, TypeVar, get_args
 
 import numpy as np
 
-from er3a.by_value import ByValue, ReadOnly
-from er3a.display import Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, ReadOnly, Sheet, shortly
 from er3a.errors import RobotError, ShapeError
 from er3a.geometry.transforms import as_floats, rpy_of
 from er3a.numerics.arrays import Flags, Reals
@@ -119,7 +119,7 @@ class Robot(ByValue, Displayed):
     envelopes, hulls : capsules around the links, and convex pieces of them; both empty where the file gives none
     pair_rules : which pairs of links a person decided on
     masses : of links and what drives and wrist can do, as far as known
-    derived : what :func:`er3a.robots.derived.derived` keeps of this robot
+    derived : what :func:`er3a.robots.robot.derived` keeps of this robot
     sources : per group of values ("dh", "zero", "limits", "speeds", "base", "flange", "tool", "envelopes",
         "inertia", "drives", "wrist_load", "weight") its source and grade
     origins : documents of single entries ("d4", "direction2", "lower6") that have another one than their group
@@ -277,3 +277,22 @@ _PLACED = "base", "flange", "tool"
 def _placement(T: Reals) -> str:
     xyz, rpy = (shortly(tuple(values.tolist())) for values in (1000 * T[:3, 3], np.degrees(rpy_of(T))))
     return f"xyz_mm {xyz}; rpy_deg {rpy}"
+
+
+Rest = ParamSpec("Rest")
+Value = TypeVar("Value")
+
+
+def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Concatenate[Robot, Rest], Value]:
+    """Keep what a function gives for a robot (and further hashable arguments) as long as the robot is there."""
+
+    def once(robot: Robot, /, *rest: Rest.args, **named: Rest.kwargs) -> Value:
+        key = (function, *rest, *named.items())
+        kept = robot.derived
+        if key not in kept:
+            kept[key] = function(robot, *rest, **named)
+        value: Value = kept[key]
+        return value
+
+    update_wrapper(once, function)
+    return once

@@ -14,8 +14,7 @@ import numpy as np
 from er3a.errors import ArgumentError, InputWarning, PoseError, RobotError, ShapeError
 from er3a.geometry.transforms import as_floats, check_poses
 from er3a.numerics.arrays import Reals
-from er3a.robots.derived import derived
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 
 FINITE = (
     ("a", "m"),

@@ -19,11 +19,10 @@ from itertools import combinations
 
 import numpy as np
 
-from er3a.geometry.angles import TURN
+from er3a.geometry.vectors import TURN
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
-from er3a.robots.derived import derived
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 
 LIMIT_TOLERANCE = 1e-9  # rad, m
 WHOLE = 1e-12  # parts of a turn

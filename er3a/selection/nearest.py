@@ -1,7 +1,7 @@
 """Which of several joint solutions is nearest to where the arm comes from, and why it is taken, or why none is.
 
 Of the admissible solutions the one is taken whose greatest joint move from the reference is least
-(:func:`er3a.geometry.angles.greatest_move`, the measure of *nearest* wherever solutions are ranked): where all joints
+(:func:`er3a.geometry.vectors.greatest_move`, the measure of *nearest* wherever solutions are ranked): where all joints
 start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the least root of the
 summed squares of all joint moves decides, then the lower branch number.
 """
@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.pairs import PairOverlaps
-from er3a.geometry.angles import greatest_move
+from er3a.collision.shapes import PairOverlaps
+from er3a.geometry.vectors import greatest_move
 from er3a.kinematics.solutions import Label, Solutions, Unsolved
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.joint_limits import LimitsExceeded, limit_margin

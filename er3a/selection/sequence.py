@@ -17,16 +17,15 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from er3a.by_value import ByValue
-from er3a.collision.clearance import bodies_of
+from er3a.by_value import ByValue, Displayed, Sheet, first_rows
+from er3a.collision.along import bodies_of
 from er3a.collision.scene import Scene
-from er3a.display import Displayed, Sheet, first_rows
 from er3a.errors import Er3aError
 from er3a.kinematics.inverse import checked_reference
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
-from er3a.selection.rules import RULES
+from er3a.selection.select import RULES
 
 MoveRule = Literal["nearest", "weighted", "time"]
 MOVES: tuple[MoveRule, ...] = get_args(MoveRule)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -22,8 +23,27 @@ from numpy.typing import NDArray
 from er3a.by_value import ByValue
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Reals
-from er3a.vision.opencv import opencv
-from er3a.vision.tangent import exp_rotation, inverse_right_jacobian, log_rotation, posed
+from er3a.vision.calibration_set import exp_rotation, inverse_right_jacobian, log_rotation, posed
+
+
+@lru_cache(maxsize=1)
+def opencv() -> Any:
+    """The module ``cv2``, on one thread, so that equal images give equal numbers.
+
+    Raises
+    ------
+    Er3aError
+        saying what to install
+    """
+    try:
+        import cv2
+    except ImportError:
+        raise Er3aError("images of boards need OpenCV: install er3a[vision]; sets of poses do without") from None
+    if not hasattr(cv2, "aruco") or not hasattr(cv2.aruco, "CharucoDetector"):
+        raise Er3aError(f"OpenCV {cv2.__version__} has no detector of ChArUco boards: install er3a[vision]")
+    cv2.setNumThreads(1)
+    return cv2
+
 
 Pattern = Literal["chessboard", "charuco", "apriltag"]
 LEAST_CORNERS = 6

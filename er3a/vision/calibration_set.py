@@ -1,4 +1,16 @@
-"""What was recorded for a hand-eye calibration, as arrays."""
+"""What was recorded for a hand-eye calibration, as arrays.
+
+Rotations in their tangent space, over batches: R = exp([v]x) with v (..., 3) in rad.
+
+References
+----------
+.. [1] J. Sola, J. Deray, D. Atchuthan, "A micro Lie theory for state estimation in robotics", 2018, section B.
+
+Two streams of poses with clocks of their own: by how much one clock is ahead, and which poses belong together.
+
+Hand and eye turn by equal angles over equal times. The offset is the one at which the angles that the board turned by
+over short times agree best with the arm's over the same times; it is searched on a grid and then refined.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +18,86 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import scipy
 
-from er3a.by_value import ByValue
-from er3a.display import Displayed, Sheet, first_rows
+from er3a.by_value import ByValue, Displayed, Sheet, first_rows
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.vision.tangent import inverted
+
+SMALL = 1e-4  # rad; below, series replace quotients of vanishing numbers
+
+
+def exp_rotation(v: Reals) -> Reals:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad."""
+    R: Reals = scipy.spatial.transform.Rotation.from_rotvec(v.reshape(-1, 3)).as_matrix().reshape(*v.shape, 3)
+    return R
+
+
+def log_rotation(R: Reals) -> Reals:
+    """Rotation vectors (..., 3) in rad, no longer than pi, of rotation matrices (..., 3, 3)."""
+    v: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-1])
+    return v
+
+
+def skew(v: Reals) -> Reals:
+    """Matrices (..., 3, 3) with ``skew(v) @ w = cross(v, w)`` for vectors (..., 3)."""
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return out
+
+
+def inverse_right_jacobian(v: Reals) -> Reals:
+    """J (..., 3, 3) with ``log(exp(v) exp(d)) = v + J d`` for small d [1]_ (equation 144), v (..., 3) in rad."""
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    safe = np.where(angle < SMALL, 1.0, angle)
+    factor = np.where(angle < SMALL, 1 / 12, 1 / safe**2 - 1 / (2 * safe * np.tan(safe / 2)))
+    S = skew(v)
+    J: Reals = np.eye(3) + S / 2 + factor * (S @ S)
+    return J
+
+
+def transposed(R: Reals) -> Reals:
+    """The last two axes swapped."""
+    return np.swapaxes(R, -1, -2)
+
+
+def inverted(T: Reals) -> Reals:
+    """Inverses (..., 4, 4) of rigid transforms."""
+    out = np.zeros_like(T)
+    out[..., :3, :3] = transposed(T[..., :3, :3])
+    out[..., :3, 3] = -np.einsum("...ji,...j->...i", T[..., :3, :3], T[..., :3, 3])
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def posed(R: Reals, t: Reals) -> Reals:
+    """Transforms (..., 4, 4) of rotations (..., 3, 3) and positions (..., 3) in m."""
+    T = np.zeros((*R.shape[:-2], 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
+    return T
+
+
+def moved(T: Reals, step: Reals) -> Reals:
+    """Transforms (..., 4, 4) after small steps (..., 6): m along, rad about, the axes of the parent frame."""
+    return posed(exp_rotation(step[..., 3:]) @ T[..., :3, :3], T[..., :3, 3] + step[..., :3])
+
+
+def step_between(T_from: Reals, T_to: Reals) -> Reals:
+    """The steps (..., 6) by which :func:`moved` takes one transform (..., 4, 4) to the other."""
+    turn = log_rotation(T_to[..., :3, :3] @ transposed(T_from[..., :3, :3]))
+    return np.concatenate([T_to[..., :3, 3] - T_from[..., :3, 3], turn], axis=-1)
+
+
+def quaternion_of(T: Reals) -> Reals:
+    """Unit quaternions (..., 4), real part first and not negative, of transforms (..., 4, 4)."""
+    R = T[..., :3, :3]
+    q: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(
+        canonical=True, scalar_first=True
+    )
+    return q.reshape(*R.shape[:-2], 4)
+
 
 Setup = Literal["eye_in_hand", "eye_to_hand"]
 
@@ -89,3 +174,87 @@ class CalibrationSet(ByValue, Displayed):
             camera_covariance=None if covariance is None else covariance[rows],
             q=None if self.q is None else self.q[rows],
         )
+
+
+GRID_S = 0.02
+SPAN_S = 0.4  # over which turns are compared
+INLIER = 3.0
+MOST_PAIRS = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """Poses T (N, 4, 4), m, at rising times t (N,), s."""
+
+    t: Reals
+    T: Reals
+
+
+@dataclass(frozen=True)
+class TimeOffset:
+    """The camera's time plus ``offset`` is the arm's, s, with half its 95 % interval; angles differ by ``rms``, rad."""
+
+    offset: float
+    half_width: float
+    rms: float
+    pairs: int
+
+
+def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
+    """Estimate the offset within +-``widest`` s.
+
+    Robust: a half of the compared turns may be wrong.
+    """
+    arm = scipy.spatial.transform.Slerp(hand.t, scipy.spatial.transform.Rotation.from_matrix(hand.T[:, :3, :3]))
+    later = np.searchsorted(eye.t, eye.t + SPAN_S)
+    first = np.flatnonzero(later < len(eye.t))
+    first = first[eye.t[later[first]] - eye.t[first] < 2 * SPAN_S]
+    first = first[:: max(1, len(first) // MOST_PAIRS)]
+    last = later[first]
+    R = scipy.spatial.transform.Rotation.from_matrix(eye.T[:, :3, :3])
+    turned = (R[last] * R[first].inv()).magnitude()
+    low, high = eye.t[first] - widest > hand.t[0], eye.t[last] + widest < hand.t[-1]
+    kept = low & high
+    first, last, turned = first[kept], last[kept], turned[kept]
+
+    def off(offset: float) -> Reals:
+        there = arm(eye.t[last] + offset) * arm(eye.t[first] + offset).inv()
+        difference: Reals = there.magnitude() - turned
+        return difference
+
+    grid = np.arange(-widest, widest + GRID_S / 2, GRID_S)
+    best = float(grid[int(np.argmin([np.median(np.abs(off(offset))) for offset in grid]))])
+    scale = max(float(np.median(np.abs(off(best)))) / 0.674, 1e-9)
+
+    def cost(offset: float) -> float:
+        return float(np.sum(np.minimum((off(offset) / scale) ** 2, INLIER**2)))
+
+    found = float(scipy.optimize.minimize_scalar(cost, bounds=(best - GRID_S, best + GRID_S), method="bounded").x)
+    rest, slope = off(found), (off(found + 1e-3) - off(found - 1e-3)) / 2e-3
+    inlier = np.abs(rest) < INLIER * scale
+    deviation = np.sqrt((rest[inlier] ** 2).mean() / max((slope[inlier] ** 2).sum(), 1e-300))
+    return TimeOffset(found, float(1.96 * deviation), float(np.sqrt((rest[inlier] ** 2).mean())), int(inlier.sum()))
+
+
+def paired(hand: Stream, eye: Stream, offset: float, count: int) -> tuple[Reals, Reals, Reals]:
+    """So many poses (count, 4, 4) of hand and eye at equal times (count,), spread over rotations, the arm's between.
+
+    Chosen one after another, each the farthest in angle from those chosen before; of the half of all times at which
+    the arm moves least, so that what is left of the offset matters least.
+    """
+    inside = np.flatnonzero((eye.t + offset > hand.t[0]) & (eye.t + offset < hand.t[-1]))
+    t = eye.t[inside] + offset
+    arm = scipy.spatial.transform.Slerp(hand.t, scipy.spatial.transform.Rotation.from_matrix(hand.T[:, :3, :3]))
+    near = np.clip(t, hand.t[0] + 0.05, hand.t[-1] - 0.05)
+    speed = (arm(near + 0.05) * arm(near - 0.05).inv()).magnitude()
+    slow = np.argsort(speed, kind="stable")[: max(count, len(t) // 2)]
+    inside, t = inside[np.sort(slow)], t[np.sort(slow)]
+    R = arm(t)
+    chosen = [0]
+    distance = (R * R[0].inv()).magnitude()
+    while len(chosen) < min(count, len(t)):
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, (R * R[chosen[-1]].inv()).magnitude())
+    rows = np.sort(chosen)
+    position = np.stack([np.interp(t[rows], hand.t, hand.T[:, k, 3]) for k in range(3)], axis=1)
+    return posed(R[rows].as_matrix(), position), eye.T[inside[rows]], t[rows]

@@ -29,7 +29,7 @@ import numpy as np
 import scipy
 
 from er3a.numerics.arrays import Reals
-from er3a.vision.tangent import inverted, log_rotation, posed, skew
+from er3a.vision.calibration_set import inverted, log_rotation, posed, skew
 
 MethodName = Literal["park", "horaud", "tsai", "andreff", "daniilidis", "shah", "li"]
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)

@@ -23,8 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.vision.calibration_set import Setup
-from er3a.vision.tangent import inverse_right_jacobian, log_rotation, moved, skew, transposed
+from er3a.vision.calibration_set import Setup, inverse_right_jacobian, log_rotation, moved, skew, transposed
 
 UNKNOWNS = 12
 MOST_STEPS = 60

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.collision.clearance import clearance
+from er3a.collision.along import clearance
 from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
+from er3a.vision.calibration_set import inverted, skew
 from er3a.vision.hand_eye import HandEye
 from er3a.vision.likelihood import residuals
 from er3a.vision.point_error import error_sizes
-from er3a.vision.tangent import inverted, skew
 
 CANDIDATES = 4000
 MEASURED_FOR_CLEARANCE = 25

@@ -16,8 +16,8 @@ from er3a.kinematics.chain import JOINTS
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
+from er3a.vision.calibration_set import skew, step_between
 from er3a.vision.hand_eye import HandEye
-from er3a.vision.tangent import skew, step_between
 
 DRAWS = 4000
 DRAW_SEED = 9283

@@ -15,10 +15,9 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import CombinedLimit, Robot
-from er3a.workspace.cavities import Cavity
-from er3a.workspace.proof import in_space, ring_volumes, unfilled_arcs
+from er3a.workspace.proven import Cavity, reach_points
 from er3a.workspace.section_arm import FULL_TURN, section_arm
-from er3a.workspace.witness import reach_points
+from er3a.workspace.section_proof import in_space, ring_volumes, unfilled_arcs
 
 InSection = Callable[[Reals], tuple[Reals, Reals, Reals]]
 InBase = Callable[[Reals], Reals]

@@ -15,8 +15,7 @@ from er3a.kinematics.classes.chain_solvers import LockedJoint
 from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, Completed
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.robots.derived import derived
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 from er3a.sampling.grid import tool_bound
 from er3a.workspace.general_arm import general_arm

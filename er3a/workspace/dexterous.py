@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.geometry.sphere import fibonacci_sphere
-from er3a.kinematics.block_constants import BlockConstants
+from er3a.geometry.vectors import fibonacci_sphere
+from er3a.kinematics.block_inverse import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Reals, Words
@@ -21,8 +21,8 @@ from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import SECTORS, cell_frame
 from er3a.workspace.directions import Roll, left_to_roll, point_tool, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, theta_ranges
-from er3a.workspace.proof import ring_volumes
 from er3a.workspace.section_arm import section_frame
+from er3a.workspace.section_proof import ring_volumes
 
 _MOST_LEVEL = 6
 _STACK = 256

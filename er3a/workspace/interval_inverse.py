@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.geometry.vectors import Vector, cross, in_frame_of
-from er3a.kinematics.block_constants import BlockConstants
-from er3a.kinematics.block_inverse import in_frame_1, seen_by_wrist
+from er3a.kinematics.block_inverse import BlockConstants, in_frame_1, seen_by_wrist
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import theta_limits

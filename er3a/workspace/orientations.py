@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from er3a.geometry.sphere import fibonacci_sphere
+from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.numerics.arrays import Reals

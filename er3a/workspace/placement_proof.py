@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.kinematics.block_constants import BlockConstants
+from er3a.kinematics.block_inverse import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Reals

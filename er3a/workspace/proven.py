@@ -1,26 +1,384 @@
-"""What the proof says of a robot: its cells, a joint vector that reaches into each, and an estimate of the volume."""
+"""What the proof says of a robot: its cells, a joint vector that reaches into each, and an estimate of the volume.
+
+The reached volume as an estimate: what is proven, and uniform points in what the proof leaves open, searched for.
+
+References
+----------
+.. [1] E. B. Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22, 1927.
+
+Voids of a proof: what the arm can't reach, joined over cells and azimuths.
+
+The arcs that are not proven filled are nodes; two of them touch if their cells share a border and their azimuths
+overlap, or across azimuth 0. Proven filled cells are the only walls: a component of nodes that does not reach the outer
+border is enclosed for certain. Its volume lies between what of it is proven empty and all of it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from er3a.kinematics.chain import constant_links
-from er3a.kinematics.wrist_partitioned import ClosedFormMissing, CoupledJoints, closed_form_missing
-from er3a.numerics.arrays import Flags, Reals
+from er3a.kinematics.forward import forward
+from er3a.kinematics.numerical import solve
+from er3a.kinematics.wrist_partitioned import (
+    ClosedFormMissing,
+    CoupledJoints,
+    closed_form_missing,
+    wrist_partitioned_arm,
+)
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import tool_bound
-from er3a.workspace.azimuths import MOST_ARCS, TURN
-from er3a.workspace.cavities import cavities, rim
-from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import coupled, general_arm
-from er3a.workspace.lookup import EMPTY, OUTSIDE, SectionMap
-from er3a.workspace.proof import Proof, in_section, prove, sharpen
-from er3a.workspace.section_arm import SectionArm, section_arm, section_frame
-from er3a.workspace.volume import VolumeEstimate, estimate_volume
-from er3a.workspace.witness import lies_in_cell, reach_points, witness_joints
+from er3a.workspace.general_proof import prove_general
+from er3a.workspace.section_arm import MOST_ARCS, TURN, SectionArm, section_arm, section_frame
+from er3a.workspace.section_proof import MOST_LEVEL, Proof, in_section, in_space, judge, prove, ring_volumes, sharpen
+
+OUTSIDE = -1
+FILLED, EMPTY, UNDECIDED = 0, 1, 2
+
+
+class SectionMap:
+    """A raster as fine as the smallest cell, with the number of the cell that covers it.
+
+    Attributes
+    ----------
+    proof : the cells
+    size : m, edge of the raster; low : (2,), m, its lowest (rho, z)
+    steps : (2,), m, the raster's steps along rho and z: the edge, unless the proof is one ring that is no square
+    owner : (n_rho, n_z), number of the cell
+    """
+
+    def __init__(self, proof: Proof):
+        self.proof = proof
+        cells = proof.cells
+        self.size, height = float((cells[:, 1] - cells[:, 0]).min()), float((cells[:, 3] - cells[:, 2]).min())
+        self.steps = np.array([self.size, self.size if np.isclose(self.size, height) else height])
+        self.low = np.array([cells[:, 0].min(), cells[:, 2].min()])
+        low = np.rint((cells[:, [0, 2]] - self.low) / self.steps).astype(np.int64)
+        high = np.rint((cells[:, [1, 3]] - self.low) / self.steps).astype(np.int64)
+        self.owner = np.full(high.max(axis=0), OUTSIDE, dtype=np.int32)
+        for n, ((a, c), (b, d)) in enumerate(zip(low.tolist(), high.tolist())):
+            self.owner[a:b, c:d] = n
+
+    def cell_of(self, rho: Reals, z: Reals) -> NDArray[np.int32]:
+        """Numbers (n,) of the cells that hold points of the section, ``OUTSIDE`` where none does."""
+        index = (np.stack([rho - self.low[0], z - self.low[1]]) // self.steps[:, None]).astype(np.int64)
+        inside = ((index >= 0) & (index < np.array(self.owner.shape)[:, None])).all(axis=0)
+        index = np.where(inside, index, 0)
+        return np.where(inside, self.owner[index[0], index[1]], OUTSIDE)
+
+    def status(self, rho: Reals, azimuth: Reals, z: Reals) -> Integers:
+        """FILLED, EMPTY or UNDECIDED for points (n,) about axis 1 (m, rad, m); outside of all cells is empty."""
+        cell, azimuth = self.cell_of(rho, z), np.asarray(azimuth) % TURN
+        unfilled = holds_azimuth(self.proof.unfilled[cell], azimuth)
+        empty = holds_azimuth(self.proof.empty[cell], azimuth) | (cell == OUTSIDE)
+        return np.where(empty, EMPTY, np.where(unfilled, UNDECIDED, FILLED))
+
+    @cached_property
+    def neighbours(self) -> NDArray[np.int32]:
+        """Pairs (m, 2) of cells that share a stretch of border."""
+        across, along = (self.owner[:-1], self.owner[1:]), (self.owner[:, :-1], self.owner[:, 1:])
+        found = np.concatenate([np.reshape(pair, (2, -1)) for pair in (across, along)], axis=1)
+        found = np.sort(found[:, found[0] != found[1]], axis=0)
+        return np.unique(found, axis=1).T
+
+    @cached_property
+    def outermost(self) -> Flags:
+        """Whether each cell (n,) lies on the outer border of the map (the axis of rings is none)."""
+        touches = np.zeros(len(self.proof.cells), dtype=bool)
+        for edge in (self.owner[-1], self.owner[:, 0], self.owner[:, -1]):
+            touches[edge] = True
+        if self.proof.bar > 0:
+            touches[self.owner[0]] = True
+        return touches
+
+
+def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
+    """Whether azimuths (n,) in rad lie in sets of arcs (n, MOST_ARCS, 2)."""
+    return np.asarray(((arcs[..., 0] <= azimuth[:, None]) & (azimuth[:, None] <= arcs[..., 1])).any(axis=1))
+
+
+POINT = 1e-7
+"""Edge (m) of the cell that stands for a point in a search."""
+FEW = 200
+"""Points at least, where that many are asked for."""
+_NORMAL_95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class VolumeEstimate:
+    """``points`` were drawn where the proof leaves open what is reached, ``reached`` of them are reached, ``undecided``
+    could not be decided; m^3.
+
+    ``low`` and ``high`` are the 95 % interval: Wilson's for the reached points alone, and with all undecided ones. All
+    lie within the proven bounds.
+    """
+
+    points: int
+    reached: int
+    undecided: int
+    value: float
+    low: float
+    high: float
+
+
+def estimate_volume(
+    search: SectionArm | Callable[[Reals], Flags],
+    proof: Proof,
+    points: int,
+    seed: int,
+) -> VolumeEstimate:
+    """Estimate the reached volume: what is proven, and of what the proof leaves open the share that points tell.
+
+    Parameters
+    ----------
+    search : what decides a point: an arm in its section form, or a function of points (n, 3) about axis 1 (m) that
+        tells which are reached for certain
+    points : how many all cells would get; those that are left open get as many to their volume, but no fewer than
+        ``FEW``
+    """
+    lower, upper = proof.bounds
+    left = upper - lower
+    if not left > 0:
+        return VolumeEstimate(0, 0, 0, lower, lower, upper)
+    count = min(points, max(FEW, int(np.ceil(points * left / proof.volumes.sum()))))
+    random = np.random.Generator(np.random.Philox(key=seed))
+    rho, azimuth, z = _open_points(proof, random.random((count, 4)))
+    status = np.full(count, UNDECIDED)
+    if isinstance(search, SectionArm):
+        _decide(search, rho, azimuth, z, status)
+    else:
+        status[search(in_space(rho, azimuth, z, proof.bar))] = FILLED
+    reached, undecided = int((status == FILLED).sum()), int((status == UNDECIDED).sum())
+    shares = wilson(reached, count)[0], (reached + undecided / 2) / count, wilson(reached + undecided, count)[1]
+    low, value, high = (lower + left * float(share) for share in shares)
+    return VolumeEstimate(count, reached, undecided, value, low, high)
+
+
+def _open_points(proof: Proof, unit: Reals) -> tuple[Reals, Reals, Reals]:
+    """Radius (m), azimuth (rad) and height (m) of points, uniform in what a proof leaves open, from uniform numbers
+    (n, 4)."""
+    weights = np.cumsum(proof.volumes * np.maximum(proof.unfilled_ratio - proof.empty_ratio, 0.0))
+    cell = np.minimum(np.searchsorted(weights, unit[:, 0] * weights[-1], side="right"), len(weights) - 1)
+    inner, outer, low, high = proof.cells[cell].T
+    along = inner + (outer - inner) * unit[:, 1]
+    rho = along if proof.bar > 0 else np.sqrt(inner**2 + (outer**2 - inner**2) * unit[:, 1])
+    # the azimuth below which that share of the open arcs lies: their length grows evenly between their ends
+    arcs = np.stack([proof.unfilled[cell], proof.empty[cell]])
+    ends = np.sort(np.nan_to_num(np.concatenate(arcs, axis=1).reshape(len(cell), -1), nan=TURN), axis=1)
+    start, stop = np.nan_to_num(arcs[..., 0]), np.nan_to_num(arcs[..., 1])
+    below = np.empty_like(ends)
+    for k in range(ends.shape[1]):
+        covered = (np.clip(ends[:, k, None], start, stop) - start).sum(axis=2)
+        below[:, k] = covered[0] - covered[1]
+    wanted = below[:, -1] * unit[:, 2]
+    after = np.clip((below <= wanted[:, None]).sum(axis=1), 1, ends.shape[1] - 1)
+    row = np.arange(len(cell))
+    before, length = below[row, after - 1], below[row, after] - below[row, after - 1]
+    share = np.divide(wanted - before, length, out=np.zeros_like(wanted), where=length > 0)
+    azimuth = ends[row, after - 1] + share * (ends[row, after] - ends[row, after - 1])
+    return rho, azimuth, low + (high - low) * unit[:, 3]
+
+
+def _decide(arm: SectionArm, rho: Reals, azimuth: Reals, z: Reals, status: Integers) -> None:
+    """Judge open points as cells of next to no size."""
+    for n in range(2):
+        left = np.flatnonzero((status != FILLED) & (status != EMPTY))
+        if not len(left):
+            return
+        half = POINT * 10.0 ** (-n) / 2
+        r, h = np.maximum(rho[left], 2 * half), z[left]
+        looked = judge(arm, np.stack([r - half, r + half, h - half, h + half], axis=1))
+        unfilled, empty = (holds_azimuth(arcs, azimuth[left]) for arcs in (looked.unfilled, looked.empty))
+        status[left] = np.where(empty, EMPTY, np.where(unfilled, status[left], FILLED))
+
+
+def wilson(hits: int, points: int) -> tuple[float, float]:
+    """95 % interval of a share from ``hits`` out of ``points`` [1]_."""
+    share, z2 = hits / points, _NORMAL_95**2
+    middle = (share + z2 / (2 * points)) / (1 + z2 / points)
+    half = _NORMAL_95 / (1 + z2 / points) * np.sqrt(share * (1 - share) / points + z2 / (4 * points**2))
+    return (max(0.0, middle - half) if hits else 0.0), (min(1.0, middle + half) if hits < points else 1.0)
+
+
+POSITION_ONLY = np.array([1, 1, 1, 0, 0, 0])
+_RESTARTS, _TOLERANCE = 10, 1e-9
+
+
+def reach_points(robot: Robot, points: Reals, starts: Reals, restarts: int = _RESTARTS) -> Reals:
+    """Joint vectors (n, 6), rad, within the limits, that bring the tool point to ``points`` (n, 3), m; NaN where the
+    iteration finds none from ``starts`` (n, 6) and from random starts."""
+    T = np.tile(np.eye(4), (len(points), 1, 1))
+    T[:, :3, 3] = points
+    found = solve(robot, T, starts, mask=POSITION_ONLY, restarts=restarts, position_tolerance=_TOLERANCE)
+    return np.where(found.solved[:, None], found.q, np.nan)
+
+
+def witness_joints(robot: Robot, arm: SectionArm, proof: Proof) -> Reals:
+    """Joint vectors (cells, 6), rad, that reach into the cells; NaN where none is known.
+
+    The proof's configurations give joints 2 and 3 and the angle phi between arm and cell, from which the rest is found
+    by iteration towards the middle of the cell. Each one is checked: it lies within the limits and in its cell.
+    """
+    q = np.full((len(proof.cells), 6), np.nan)
+    known = np.flatnonzero(proof.witness[:, 3] > 0)
+    if not len(known):
+        return q
+    theta_2, tau, phi, _ = proof.witness[known].T
+    theta = np.zeros((len(known), 6))
+    middle = (robot.lower + robot.upper) / 2
+    theta[:] = robot.direction * middle + robot.offset
+    theta[:, 1], theta[:, 2] = theta_2, wrist_partitioned_arm(robot).elbow_sign * tau
+    turns = 2 * np.pi
+    starts = robot.direction * (theta - robot.offset)
+    starts = np.clip(starts + turns * np.round((middle - starts) / turns), robot.lower, robot.upper)
+    R, origin = section_frame(robot)
+    rho, z = proof.cells[known].reshape(-1, 2, 2).mean(axis=2).T
+    azimuth = theta[:, 0] + phi
+    points = np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=1) @ R + origin
+    q[known] = reach_points(robot, points, starts)
+    return np.where(lies_in_cell(robot, q, proof, R, origin)[:, None], q, np.nan)
+
+
+def lies_in_cell(robot: Robot, q: Reals, proof: Proof, R: Reals, origin: Reals) -> Flags:
+    """Whether each joint vector (cells, 6) brings the tool point into its own cell; False for NaN."""
+    rho, _, z = in_section((forward(robot, np.nan_to_num(q))[:, :3, 3] - origin) @ R.T, proof.bar)
+    a, b, c, d = proof.cells.T
+    inside: Flags = np.isfinite(q[:, 0]) & (a <= rho) & (rho <= b) & (c <= z) & (z <= d)
+    return inside
+
+
+@dataclass(frozen=True, eq=False)
+class Cavity:
+    """A connected set of arcs.
+
+    Attributes
+    ----------
+    enclosed : whether filled cells cut it off from the outside
+    cells : (n, 4), m, sections; arcs : (n, 2), rad, one arc of azimuth each
+    empty : (n,), share of each arc that is proven empty
+    bar : m, length of the cells, 0 for rings; see :class:`er3a.workspace.section_proof.Proof`
+    lower, upper : bounds of its volume, m^3
+    """
+
+    enclosed: bool
+    cells: Reals
+    arcs: Reals
+    empty: Reals
+    bar: float = 0.0
+
+    @property
+    def volumes(self) -> Reals:
+        """Volume of each arc's piece of ring, (n,), m^3."""
+        volumes: Reals = ring_volumes(self.cells, self.bar) * (self.arcs[:, 1] - self.arcs[:, 0]) / TURN
+        return volumes
+
+    @property
+    def lower(self) -> float:
+        """Volume proven empty, m^3."""
+        return float(self.volumes @ self.empty)
+
+    @property
+    def upper(self) -> float:
+        """Volume not proven filled, m^3."""
+        return float(self.volumes.sum())
+
+    def part(self, chosen: Flags | Integers, enclosed: bool) -> Cavity:
+        """Some of its arcs."""
+        return Cavity(enclosed, self.cells[chosen], self.arcs[chosen], self.empty[chosen], self.bar)
+
+    def centroid(self) -> Reals:
+        """Centroid (3,) in the frame about axis 1, m, weighted by what is proven empty."""
+        weight = self.volumes * self.empty
+        low, high, z = self.arcs[:, 0], self.arcs[:, 1], self.cells[:, 2:].mean(axis=1)
+        if self.bar > 0:
+            middles = in_space(self.cells[:, :2].mean(axis=1), (low + high) / 2, z, self.bar)
+            return np.asarray(weight @ middles / weight.sum())
+        a, b = self.cells[:, 0], self.cells[:, 1]
+        rho = 2 / 3 * (b**3 - a**3) / (b**2 - a**2)
+        width = high - low
+        x = rho * (np.sin(high) - np.sin(low)) / width
+        y = rho * (np.cos(low) - np.cos(high)) / width
+        centroid: Reals = np.array([x @ weight, y @ weight, z @ weight]) / weight.sum()
+        return centroid
+
+    def box(self) -> tuple[Reals, Reals]:
+        """Lowest and highest corner (3,), m, of what holds something proven empty, in the frame about axis 1."""
+        kept = self.empty > 0
+        cells, arcs = self.cells[kept], self.arcs[kept]
+        share = np.linspace(0, 1, 49)
+        azimuth = arcs[:, :1] + (arcs[:, 1:] - arcs[:, :1]) * share
+        x, y, _ = np.moveaxis(in_space(cells[:, 1:2], azimuth, cells[:, 3:], self.bar), -1, 0)
+        left = cells[:, 0] if self.bar > 0 else x
+        low = np.array([left.min(), y.min(), cells[:, 2].min()])
+        return low, np.array([x.max(), y.max(), cells[:, 3].max()])
+
+
+def cavities(section: SectionMap) -> tuple[list[Cavity], Cavity]:
+    """Enclosed cavities, the largest first, and everything that is open to the outside."""
+    proof = section.proof
+    cell, slot = np.nonzero(np.isfinite(proof.unfilled[..., 0]))
+    arcs = proof.unfilled[cell, slot]
+    number = np.full(proof.unfilled.shape[:2], -1)
+    number[cell, slot] = np.arange(len(cell))
+    edges = [_overlaps(section.neighbours, proof.unfilled, number), _across_zero(cell, arcs)]
+    rows, columns = np.concatenate(edges, axis=1)
+    graph = scipy.sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(cell), len(cell)))
+    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    ends = (proof.bar > 0) & ((arcs[:, 0] <= 0) | (arcs[:, 1] >= TURN))
+    outside = np.unique(label[section.outermost[cell] | ends])
+    share = _empty_ratio(arcs, proof.empty[cell])
+    is_open = np.isin(label, outside)
+    cells = proof.cells[cell]
+    everything = Cavity(False, cells, arcs, share, proof.bar)
+    enclosed = [everything.part(label == n, True) for n in np.unique(label[~is_open])]
+    enclosed = [cavity for cavity in enclosed if cavity.lower > 0]
+    return sorted(enclosed, key=lambda cavity: -cavity.lower), everything.part(is_open, False)
+
+
+def rim(section: SectionMap, enclosed: list[Cavity]) -> Flags:
+    """Which cells (n,) of the proof are undecided and belong to enclosed cavities."""
+    chosen = np.zeros(len(section.proof.cells), dtype=bool)
+    splittable = section.proof.level < MOST_LEVEL
+    for cavity in enclosed:
+        middle = cavity.cells.reshape(-1, 2, 2).mean(axis=2)
+        open_arcs = cavity.empty < 1 - 1e-9
+        chosen[section.cell_of(*middle[open_arcs].T)] = True
+    return chosen & splittable
+
+
+def _overlaps(neighbours: NDArray[np.int32], arcs: Reals, number: Integers) -> Integers:
+    """Pairs (2, m) of arcs of neighbouring cells whose azimuths overlap."""
+    a, b = neighbours.T
+    first, second = arcs[a][:, :, None, :], arcs[b][:, None, :, :]
+    with np.errstate(invalid="ignore"):
+        meet = (first[..., 0] < second[..., 1]) & (second[..., 0] < first[..., 1])
+    pair, i, j = np.nonzero(meet)
+    return np.stack([number[a[pair], i], number[b[pair], j]])
+
+
+def _across_zero(cell: Integers, arcs: Reals) -> Integers:
+    """Pairs (2, m) of arcs of one cell that end at azimuth 2 pi and begin at 0."""
+    ends, begins = np.flatnonzero(arcs[:, 1] >= TURN - 1e-12), np.flatnonzero(arcs[:, 0] <= 1e-12)
+    begin_of = dict(zip(cell[begins].tolist(), begins.tolist()))
+    pairs = [(node, begin_of[c]) for node, c in zip(ends.tolist(), cell[ends].tolist()) if c in begin_of]
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+
+
+def _empty_ratio(arcs: Reals, empty: Reals) -> Reals:
+    low = np.maximum(arcs[:, None, 0], empty[..., 0])
+    high = np.minimum(arcs[:, None, 1], empty[..., 1])
+    ratio: Reals = np.nansum(np.maximum(0, high - low), axis=1) / (arcs[:, 1] - arcs[:, 0])
+    return ratio
+
 
 CellState = Literal["filled", "touched", "empty", "undecided", "partly_filled"]
 

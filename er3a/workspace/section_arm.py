@@ -15,6 +15,11 @@ where U and M turn about axis 2 and C is constant.
 References
 ----------
 .. [1] K. C. Gupta, B. Roth, "Design considerations for manipulator workspace", J. Mech. Design 104, 1982.
+
+Sets of azimuths as lists of arcs, for kernels.
+
+A set is an array (n, 2) of disjoint intervals ``[from, to]`` within [0, 2 pi], and a count; an arc across 0 is held in
+two pieces.
 """
 
 from __future__ import annotations
@@ -247,3 +252,78 @@ def along_change(
     second = rho * e1 * e1 + away * (e2 + e3) ** 2 + arm.upper_length * e3 * e3
     bound: float = first + 0.5 * second + rho * e1 * (e2 + e3)
     return bound
+
+
+MOST_ARCS = 12
+TURN = 2 * np.pi
+
+
+@kernel
+def _cut(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
+    """Take the interval [low, high] within [0, 2 pi] out of the set; see :func:`remove`."""
+    n = 0
+    while n < count:
+        a, b = arcs[n, 0], arcs[n, 1]
+        if high <= a or low >= b:
+            n += 1
+        elif low <= a and high >= b:
+            count -= 1
+            arcs[n, 0], arcs[n, 1] = arcs[count, 0], arcs[count, 1]
+        elif low > a and high < b:
+            if count == MOST_ARCS and not more:
+                return count
+            arcs[n, 1] = low
+            if count == MOST_ARCS:
+                return count
+            arcs[count, 0], arcs[count, 1] = high, b
+            count += 1
+            n += 1
+        else:
+            if low <= a:
+                arcs[n, 0] = high
+            else:
+                arcs[n, 1] = low
+            n += 1
+    return count
+
+
+@kernel
+def remove(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
+    """Take the arc from ``low`` up to ``high`` (any turn) out of the set; returns the new count.
+
+    Where the list has no room for one more piece, ``more`` says whether to take out too much or too little.
+    """
+    if high <= low:
+        return count
+    if high - low >= TURN:
+        return 0
+    shift = np.floor(low / TURN) * TURN
+    low, high = low - shift, high - shift
+    if high <= TURN:
+        return _cut(arcs, count, low, high, more)
+    count = _cut(arcs, count, low, TURN, more)
+    return _cut(arcs, count, 0.0, high - TURN, more)
+
+
+@kernel
+def meets(arcs: Reals, count: int, low: float, high: float) -> bool:
+    """Whether the arc from ``low`` to ``high`` (any turn) meets the set."""
+    if high - low >= TURN:
+        return count > 0
+    shift = np.floor(low / TURN) * TURN
+    low, high = low - shift, high - shift
+    for n in range(count):
+        if arcs[n, 0] <= high and arcs[n, 1] >= low:
+            return True
+        if arcs[n, 0] <= high - TURN:
+            return True
+    return False
+
+
+@kernel
+def measure(arcs: Reals, count: int) -> float:
+    """Sum of the arcs' lengths, rad."""
+    total = 0.0
+    for n in range(count):
+        total += arcs[n, 1] - arcs[n, 0]
+    return total

@@ -19,8 +19,8 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
-from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import general_arm
+from er3a.workspace.general_proof import prove_general
 
 SurfaceKind = Literal["plane", "sphere", "other"]
 

@@ -27,9 +27,8 @@ from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.derived import derived
 from er3a.robots.joint_limits import row_limits
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import whole_turns
 from er3a.workspace.cell_frame import CLOSED_FORMS, is_quick, joint_1_alone
 from er3a.workspace.general_arm import coupled

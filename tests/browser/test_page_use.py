@@ -8,7 +8,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
-from er3a.pipeline.viewing.figure_3d import WORDS
+from er3a.pipeline.viewing.figures import WORDS
 from testing import chromium
 from tests.browser.pages import PAGES_WITH_EACH_CONTROL, STAGE_PAGES, STAGE_PAGES_OF_EACH_KIND
 

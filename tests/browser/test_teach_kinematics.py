@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
-from er3a.geometry.angles import wrap_to_pi
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.closed_form import REACHED
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse

@@ -17,7 +17,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
-from er3a.collision.clearance import clearance
+from er3a.collision.along import clearance
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
@@ -28,12 +28,12 @@ from er3a.pipeline.messages.kinematics import BRANCHES
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach import panel as teach_page
-from er3a.pipeline.teach.words import WORDS
+from er3a.pipeline.teach.panel import WORDS
 from er3a.planning.commands import CommandSource
+from er3a.programs.machine import execute
 from er3a.programs.read_program import read_program
-from er3a.programs.resolving import Resolver
-from er3a.programs.run_program import execute
-from er3a.robots.shown import meant
+from er3a.programs.writing import Resolver
+from er3a.robots.joint_limits import meant
 from testing.arms import five_axis, gantry, make_arm, palletiser, pose_errors, scara
 from testing.small_study import ROOT
 

@@ -8,7 +8,7 @@ import time
 import pytest
 from selenium.common.exceptions import TimeoutException
 
-from er3a.pipeline.viewing.web_viewer import address, server
+from er3a.pipeline.viewing.viewer import address, server
 from testing import chromium
 from tests.viewing.pictures import joints_seen
 

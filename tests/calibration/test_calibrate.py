@@ -10,11 +10,10 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 import er3a
-from er3a.calibration.measured import observed
+from er3a.calibration.calibrate import jacobian, observed, parallel_pairs, parameters_of
 from er3a.calibration.outcomes import CalibrationError, MorePositions, MovesNothing, NoCorrectionFits, NotToldApart
-from er3a.calibration.parameters import jacobian, parallel_pairs, parameters_of
 from er3a.errors import InputError
-from er3a.files.measurements import COLUMNS, load_measurements
+from er3a.files.by_name import COLUMNS, load_measurements
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.table_batch import tables_of
 from er3a.pipeline.cli import app

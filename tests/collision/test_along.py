@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from er3a.collision.along import clearance_along
+from er3a.collision.along import clearance, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.clearance import clearance
-from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import LinkAndSolid, LinkPair
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.singularity import NearSingular
 from er3a.planning.moves import JointMove, line
 from er3a.planning.tool_proof import Wanted, follow_and_prove
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.distance_kernels import FREE, free_between
+from er3a.collision.distances import FREE, free_between
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.scene import Box, Plane, Scene, Sphere
 from er3a.kinematics.chain import constant_links

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 import yaml
 
+from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
-from er3a.collision.clearance import clearance
-from er3a.collision.envelopes import arm_shapes, capsule_poses, default_envelopes
-from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_bodies
-from er3a.dynamics.link_shapes import estimated_links
+from er3a.collision.shapes import LinkAndSolid, LinkPair, arm_bodies, arm_shapes, capsule_poses, default_envelopes
+from er3a.dynamics.arm_model import estimated_links
 from er3a.errors import InputError, InputWarning
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from er3a.collision.envelopes import arm_shapes
+from er3a.collision.shapes import arm_shapes
 from er3a.formats.urdf import import_urdf
 from testing.mesh_peers import held_against_meshes
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.distance_kernels import FREE, MEETS, free_between, judge_polyline
+from er3a.collision.distances import FREE, MEETS, free_between, judge_polyline
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from testing.collision_peers import SHAPES, Outsider, Peer, coal_distance, fcl_distance, own_distance

@@ -10,7 +10,7 @@ import pytest
 import er3a
 from er3a.diagnosis.conclusions import FlangePositionDecides, NothingDecides
 from er3a.diagnosis.diagnose import Hypothesis
-from er3a.diagnosis.fault_kinds import (
+from er3a.diagnosis.faults import (
     Faults,
     ReversedDirection,
     SwappedEntries,

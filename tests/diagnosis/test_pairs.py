@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 import er3a
 from er3a.diagnosis.diagnose import diagnosis_of
-from er3a.diagnosis.fault_kinds import entry_of
+from er3a.diagnosis.faults import entry_of
 from er3a.files.robot_library import load_robot
 from er3a.numerics.arrays import Reals
 from testing.flange_positions import HALF_WIDTH_MM, flange_mm, references_to

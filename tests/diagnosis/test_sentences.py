@@ -7,7 +7,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from er3a.diagnosis import conclusions, fault_kinds
+from er3a.diagnosis import conclusions
 from er3a.diagnosis.conclusions import (
     Conclusion,
     FlangePositionDecides,
@@ -21,7 +21,7 @@ from er3a.diagnosis.conclusions import (
     Resolution,
     TooSmallToTell,
 )
-from er3a.diagnosis.fault_kinds import (
+from er3a.diagnosis.faults import (
     Fault,
     ReversedDirection,
     SwappedEntries,
@@ -34,10 +34,10 @@ from er3a.diagnosis.fault_kinds import (
     WrongOffset,
     WrongScale,
     WrongUnit,
+    repairs_of,
     rounded,
 )
-from er3a.diagnosis.faults import repairs_of
-from er3a.diagnosis.free_numbers import free_numbers
+from er3a.diagnosis.fitting import free_numbers
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.table_batch import tables_of

@@ -13,7 +13,7 @@ import pytest
 import er3a
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NothingToExplain, TooSmallToTell
 from er3a.diagnosis.diagnose import Hypothesis, diagnosis_of
-from er3a.diagnosis.fault_kinds import ReversedDirection, WrongLimit, WrongScale, entry_of, rounded
+from er3a.diagnosis.faults import ReversedDirection, WrongLimit, WrongScale, entry_of, rounded
 from er3a.diagnosis.ranking import usable
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot

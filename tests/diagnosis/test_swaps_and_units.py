@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from er3a.diagnosis.diagnose import diagnosis_of
-from er3a.diagnosis.fault_kinds import (
+from er3a.diagnosis.faults import (
     Fault,
     ShiftedRows,
     SwappedEntries,

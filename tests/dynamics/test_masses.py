@@ -12,7 +12,7 @@ import trimesh
 import yaml
 
 import er3a
-from er3a.dynamics.link_shapes import capsule_body, estimated_links, filled
+from er3a.dynamics.arm_model import capsule_body, estimated_links, filled
 from er3a.dynamics.plausibility import (
     AboutOrigin,
     CentreOutside,
@@ -26,7 +26,7 @@ from er3a.dynamics.plausibility import (
     mass_findings,
 )
 from er3a.errors import InputError
-from er3a.files.load_file import LoadFields, load_of
+from er3a.files.robot_library import LoadFields, load_of
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, about, moved, no_body, together

@@ -12,9 +12,8 @@ import pytest
 
 import er3a
 from er3a.dynamics.arm_model import arm_model
-from er3a.dynamics.demands import power_imbalance
-from er3a.dynamics.torques import accelerations, torque_parts
-from er3a.dynamics.uncertainty import parameters, torque_tolerance
+from er3a.dynamics.margins import parameters, torque_tolerance
+from er3a.dynamics.torques import accelerations, power_imbalance, torque_parts
 from er3a.errors import Er3aError, PoseError, RobotError, ShapeError
 from er3a.kinematics.chain import link_parts
 from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses, moved

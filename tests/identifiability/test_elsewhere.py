@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
-from er3a.identifiability.elsewhere import same_robots
-from er3a.identifiability.extreme_climb import climber, measure_code
+from er3a.identifiability.continuous import same_robots
+from er3a.identifiability.requirements import climber, measure_code
 from er3a.kinematics.table_batch import frames_of, tables_of
+from er3a.references.predict import search
 from er3a.references.quantities import AxisDistance, SectionExtent
-from er3a.references.reach import search
 from testing.arms import placement
 
 STARTS = 20

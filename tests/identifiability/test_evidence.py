@@ -15,7 +15,7 @@ from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.entries import continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
-from er3a.identifiability.evidence import evidence_of
+from er3a.identifiability.evidence import evidence_of, parts_of, settles_tool
 from er3a.identifiability.proposals import (
     LookAtMotion,
     MeasureAngle,
@@ -25,10 +25,8 @@ from er3a.identifiability.proposals import (
     measured,
     proposals_of,
 )
-from er3a.identifiability.verdict_parts import parts_of, settles_tool
-from er3a.references.documents import Document, Documents
 from er3a.references.quantities import CarriedCoordinate, PointCoordinate
-from er3a.references.reference import Reference
+from er3a.references.reference import Document, Documents, Reference
 from er3a.references.subjects import PointAtPose
 from er3a.robots.robot import Robot
 

@@ -12,13 +12,12 @@ import er3a
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.continuous import Extents
-from er3a.identifiability.entries import continuous_of
+from er3a.identifiability.entries import continuous_of, gauge_of
 from er3a.identifiability.entry_evidence import Evidence
 from er3a.identifiability.feasible import Region
-from er3a.identifiability.gauge import gauge_of
 from er3a.identifiability.proposals import LookAtMotion, proposals_of
 from er3a.identifiability.requirements import Asked, requirements_of
-from er3a.identifiability.tool_motion import ToolRange
+from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import tables_of
 from testing import plain_oracle as oracle
 

@@ -11,7 +11,7 @@ from er3a.identifiability.reactions import bases_of, count_checks
 from er3a.identifiability.statements import inconsistent_with_own_text, not_the_robot_described
 from er3a.pipeline.messages import evidence as _words  # noqa: F401
 from er3a.pipeline.messages.say import say
-from er3a.references.documents import Document, Documents
+from er3a.references.reference import Document, Documents
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
-from er3a.geometry.angles import wrap_to_pi
-from er3a.geometry.sphere import fibonacci_sphere
+from er3a.geometry.vectors import fibonacci_sphere, wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward, frames, jacobian
 from er3a.kinematics.inverse import inverse
@@ -20,8 +19,7 @@ from er3a.robots.joint_limits import limit_margin, limits_exceeded, nearest_equi
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.sampling.grid import make_grid, tool_bound
 from er3a.sampling.random_joints import Draw
-from er3a.sampling.reach_search import search_reach
-from er3a.sampling.tally import tally_blocks
+from er3a.sampling.tally import search_reach, tally_blocks
 from testing.arms import PinocchioArm, chains, joints_at_random, joints_within, make_arm, pose_errors
 
 FANUC = np.array([[1.0, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0], [0, 1, 1, 0, 0, 0], *np.eye(6)[3:]])

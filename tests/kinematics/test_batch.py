@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import er3a
 from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.geometry.angles import wrap_to_pi
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse

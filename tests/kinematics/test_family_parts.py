@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from er3a.geometry.angles import wrap_to_pi
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.robots.robot import CombinedLimit

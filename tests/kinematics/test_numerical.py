@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 
 import er3a
 from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.geometry.angles import wrap_to_pi
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.iteration import _E, _Q, _ROWS, _TARGET, LANES, _evaluate, uniform
-from er3a.kinematics.numerical import all_found, solve
+from er3a.kinematics.numerical import _E, _Q, _ROWS, _TARGET, LANES, _evaluate, all_found, solve, uniform
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.pipeline.messages.kinematics import say
 from er3a.robots.joint_limits import within

@@ -7,9 +7,8 @@ import pytest
 import scipy
 
 from er3a.files.robot_library import load_robot
-from er3a.kinematics.aligned_wrist import bend_of_wrist
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.families import Family, _nearest_wrists
+from er3a.kinematics.families import Family, _nearest_wrists, bend_of_wrist
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors

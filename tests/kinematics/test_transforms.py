@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError, ShapeError
-from er3a.geometry.angles import wrap_to_pi
 from er3a.geometry.transforms import (
     check_poses,
     rot_x,
@@ -22,6 +21,7 @@ from er3a.geometry.transforms import (
     transform,
     translation,
 )
+from er3a.geometry.vectors import wrap_to_pi
 from testing.arms import number
 
 angles = number(-np.pi, np.pi)

@@ -13,23 +13,22 @@ import trimesh
 from typer.testing import CliRunner
 
 import er3a
-from er3a.collision.clearance import clearance
+from er3a.collision.along import clearance
 from er3a.errors import Er3aError, InputError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.robot_library import load_robot, robot_of
 from er3a.files.scene_file import load_scene
 from er3a.files.shipped import ROOT
 from er3a.formats.urdf import export_urdf
-from er3a.kinematics.rank_loss import scaled_jacobian
+from er3a.kinematics.singularity import scaled_jacobian
 from er3a.pipeline.check import check_file, check_study
 from er3a.pipeline.cli import app
-from er3a.pipeline.new_study.brought_arm import arm_of
-from er3a.pipeline.new_study.write import write_study
+from er3a.pipeline.new_study.write import arm_of, write_study
 from er3a.pipeline.stages.inverse.compute import compute as compute_inverse
 from er3a.pipeline.stages.trajectory.compute import compute as compute_trajectory
 from er3a.pipeline.study import Study, load_study
+from er3a.robots.joint_limits import joint_columns
 from er3a.robots.robot import Envelope
-from er3a.robots.shown import joint_columns
 
 REGULAR = 0.02
 """Smallest singular value below which a pose is near-singular."""

@@ -11,15 +11,13 @@ from scipy.spatial.transform import Rotation
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.near_singular import NearSingular, factor_of
-from er3a.kinematics.singularity import characteristic_length, determinant_factors
+from er3a.kinematics.singularity import NearSingular, characteristic_length, determinant_factors, factor_of
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
-from er3a.planning.avoidance import avoidance_findings, damped_least_squares, via_point
-from er3a.planning.avoidance.deviation import deviation
+from er3a.planning.avoidance import avoidance_findings, strategies, via_point
+from er3a.planning.avoidance.avoidance_findings import StrategyName
 from er3a.planning.avoidance.singular_segment import singular_segment
-from er3a.planning.avoidance.strategies import STRATEGIES, best, compare
-from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.avoidance.strategies import STRATEGIES, best, compare, deviation
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
 from er3a.planning.singular_events import singular_events
@@ -151,20 +149,20 @@ def test_bend_is_smooth_and_vanishes_at_its_ends():
 def test_damped_least_squares_are_those_of_the_formula(results):
     """Against the formula in plain numpy, from the tool's velocity and error."""
     case = segment_of("wrist_near")
-    t = np.linspace(0, 4, damped_least_squares.STEPS + 1)
+    t = np.linspace(0, 4, strategies.STEPS + 1)
     way, length = case.followed.line, characteristic_length(case.robot)
     T = way.poses(way.progress(t)[0])
-    motion = damped_least_squares._run(case, t, T, 0.1)
+    motion = strategies._run(case, t, T, 0.1)
     q, dt = case.q[0].copy(), t[1] - t[0]
     scale = np.array([1 / length] * 3 + [1] * 3)
     for n in range(500):
         tool = forward(case.robot, q)
         turn = [Rotation.from_matrix(b[:3, :3] @ a[:3, :3].T).as_rotvec() for a, b in ((T[n], T[n + 1]), (tool, T[n]))]
         step = np.concatenate([T[n + 1][:3, 3] - T[n][:3, 3], turn[0]])
-        step += damped_least_squares.FEEDBACK * dt * np.concatenate([T[n][:3, 3] - tool[:3, 3], turn[1]])
+        step += strategies.FEEDBACK * dt * np.concatenate([T[n][:3, 3] - tool[:3, 3], turn[1]])
         J = jacobian(case.robot, q) * scale[:, None]
         least = np.linalg.svd(J, compute_uv=False)[-1]
-        squared = 0.1**2 * max(0.0, 1 - (least / damped_least_squares.THRESHOLD) ** 2)
+        squared = 0.1**2 * max(0.0, 1 - (least / strategies.THRESHOLD) ** 2)
         q = q + J.T @ np.linalg.solve(J @ J.T + squared * np.eye(6), scale * step)
     np.testing.assert_allclose(motion.q[500], q, atol=1e-5)
 

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.planning.branch_tracking import WIDE_STEP, branches_along, turned_difference
-from er3a.planning.follow import _turned, follow
+from er3a.planning.follow import WIDE_STEP, _turned, branches_along, follow, turned_difference
 from er3a.planning.moves import line
 
 GRID = np.linspace(0, 1, 121)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
-from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.singularity import NearSingular
 from er3a.planning import piecewise
 from er3a.planning.intervals import RateLimit
 from er3a.planning.piecewise import MotionInParts

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
-from er3a.files.path_table import read_path_table
+from er3a.files.path_file import read_path_table
 from er3a.geometry.transforms import transform
 
 RPY = "x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg"

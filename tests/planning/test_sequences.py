@@ -12,11 +12,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from er3a.errors import PathError, PoseError
 from er3a.geometry.transforms import transform
-from er3a.planning.arcs import arc
 from er3a.planning.moves import line
 from er3a.planning.profiles import Times
-from er3a.planning.rotation_curves import spin
-from er3a.planning.sequences import joint_sequence, segment_path
+from er3a.planning.sequences import arc, joint_sequence, segment_path, spin
 
 
 def random_pose(random):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from er3a.collision.envelopes import arm_shapes
 from er3a.collision.scene import Plane, Scene, Sphere
+from er3a.collision.shapes import arm_shapes
 from er3a.errors import ShapeError
 from er3a.files.program_file import load_programs
 from er3a.files.robot_library import load_robot
@@ -18,8 +18,8 @@ from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.program_check.ways import _slot
-from er3a.programs.angle_conventions import numbers_of
+from er3a.program_check.motion_checks import _slot
+from er3a.programs.instructions import numbers_of
 from er3a.programs.read_program import read_program
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,8 +12,7 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.program_check.program_check_findings import ZoneCollides, ZoneNotSettled
-from er3a.program_check.zone_clearance import WHOLE, pair_levers, zone_clearance
-from er3a.program_check.zone_patch import bend_of_line, patch_of
+from er3a.program_check.step_checks import WHOLE, bend_of_line, pair_levers, patch_of, zone_clearance
 
 ROBOT = load_robot("er3a_c60")
 FLOOR = Scene("floor", (Plane("floor", np.array([0.0, 0.0, 1.0]), 0.1),))

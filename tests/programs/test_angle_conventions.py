@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import transform
-from er3a.programs.angle_conventions import Convention, numbers_of, pose_of
+from er3a.programs.instructions import Convention, numbers_of, pose_of
 
 robomath = pytest.importorskip("robodk.robomath")
 CONVENTIONS: tuple[Convention, ...] = ("kuka", "efort", "staubli", "ur", "abb")

@@ -9,12 +9,11 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.programs.machine import execute
 from er3a.programs.program_findings import NothingMoves
 from er3a.programs.read_program import read_program
-from er3a.programs.resolving import Resolver
-from er3a.programs.run_program import execute
 from er3a.programs.write_program import write_program
-from er3a.programs.writing import WriteOptions
+from er3a.programs.writing import Resolver, WriteOptions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "data/programs"
 TASKS = {"pick_place": ("er3a_c60", 8), "weld_seam": ("er3a_c60", 7), "palletise": ("er3_600", 36)}

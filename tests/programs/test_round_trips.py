@@ -19,6 +19,7 @@ from er3a.planning.commands import (
 from er3a.planning.profiles import Times
 from er3a.programs.from_commands import listing_of
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Output, Pause, PoseTarget, Rate, Remark, Zone
+from er3a.programs.machine import execute
 from er3a.programs.program_findings import (
     ArcsSplit,
     HalfTurnsSplit,
@@ -31,7 +32,6 @@ from er3a.programs.program_findings import (
     ZonesDropped,
 )
 from er3a.programs.read_program import read_program
-from er3a.programs.run_program import execute
 from er3a.programs.write_program import write_program
 from er3a.programs.writing import WriteOptions
 
@@ -282,7 +282,7 @@ def test_poses_that_are_written_as_poses_need_no_inverse(monkeypatch):
     q, poses = wound_path(50)
     listing = listing_of(ToolTableCommand(poses, tuple(map(str, range(50))), 9.0, blend=0.001), ROBOT, q[0]).listing
     wanted = {language: write_program(listing, language, WriteOptions(ROBOT)).files for language in LANGUAGES[:2]}
-    monkeypatch.setattr("er3a.programs.resolving.inverse_batch", None)
+    monkeypatch.setattr("er3a.programs.writing.inverse_batch", None)
     for language, files in wanted.items():
         assert write_program(listing, language, WriteOptions(ROBOT)).files == files
 

@@ -7,9 +7,8 @@ import pytest
 
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
-from er3a.identifiability.requirements import requirements_of
+from er3a.identifiability.requirements import Components, requirements_of
 from er3a.kinematics.table_batch import Tables, join, tables_of
-from er3a.references.components import Components
 from er3a.references.predict import state_of_tables
 from er3a.references.quantities import Extreme
 

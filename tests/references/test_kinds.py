@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from er3a.files.csv_file import CsvColumn, Written
-from er3a.files.reference_rows import FORMATS, Format
-from er3a.files.reference_sets import load_references
+from er3a.files.reference_sets import FORMATS, Format, load_references
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.messages import references as words
 from er3a.pipeline.messages.say import say

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from er3a.errors import InputError
-from er3a.files.reference_rows import FORMATS
-from er3a.files.reference_sets import check_reference_file, load_references
+from er3a.files.reference_sets import FORMATS, check_reference_file, load_references
 from er3a.files.robot_library import REFERENCES, load_robot
 from er3a.references.predict import predict
 from er3a.references.subjects import JointLimit, PoseExcess

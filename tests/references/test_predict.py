@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward, frames
-from er3a.references.predict import predict, read, state_of
+from er3a.references.predict import predict, read, search, state_of
 from er3a.references.quantities import (
     ZERO_POSE,
     AxisAngle,
@@ -25,7 +25,6 @@ from er3a.references.quantities import (
     SegmentAngle,
     Speed,
 )
-from er3a.references.reach import search
 from er3a.references.reference import Reference, conflicts, expected_of, quantities_of
 from er3a.references.rows import PositionRow
 from er3a.references.subjects import AxisDirection, JointLimit

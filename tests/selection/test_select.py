@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.collision.clearance import clearance
-from er3a.collision.pairs import PairOverlaps
+from er3a.collision.along import clearance
+from er3a.collision.shapes import PairOverlaps
 from er3a.errors import Er3aError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.selection.rules import RULES, available_rules, joint_weights
-from er3a.selection.select import select
+from er3a.selection.select import RULES, available_rules, joint_weights, select
 from er3a.selection.sequence import select_sequence
 from testing.arms import DEG, joints_at_random
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.collision.clearance import clearance
+from er3a.collision.along import clearance
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward

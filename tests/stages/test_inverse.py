@@ -14,7 +14,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from er3a.collision.clearance import clearance
+from er3a.collision.along import clearance
 from er3a.errors import InputError, ResultError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
@@ -24,10 +24,16 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.inverse.compute import compute
-from er3a.pipeline.stages.inverse.model import RESULTS, SINGULAR_PARTS, InverseResults, TargetResult
-from er3a.pipeline.stages.inverse.shown_targets import MOST_SHOWN, shown_targets
+from er3a.pipeline.stages.inverse.model import (
+    MOST_SHOWN,
+    RESULTS,
+    SINGULAR_PARTS,
+    InverseResults,
+    TargetResult,
+    shown_targets,
+)
 from er3a.pipeline.study import Study
-from er3a.selection.rules import RULES
+from er3a.selection.select import RULES
 
 ROOT = Path(__file__).parents[2]
 NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
@@ -394,7 +400,7 @@ def test_of_many_targets_one_turn_of_each_branch_is_kept_and_the_page_says_so(tm
     study = make_study(er3a_c60={"targets": str(tmp_path / "many.csv"), "paths": "unused.yaml"})
     every = compute(study, "er3a_c60")
     monkeypatch.setattr("er3a.pipeline.stages.inverse.compute.MANY_TARGETS", 14)
-    monkeypatch.setattr("er3a.pipeline.stages.inverse.shown_targets.MOST_SHOWN", 5)
+    monkeypatch.setattr("er3a.pipeline.stages.inverse.model.MOST_SHOWN", 5)
     monkeypatch.setattr("er3a.pipeline.stages.inverse.compute.MOST_ADVISED", 2)
     run.compute("inverse", study, "er3a_c60", tmp_path / "few")
     few = read_results(tmp_path / "few", RESULTS).results

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import er3a
 from er3a.calibration.outcomes import Misfit, MorePositions, NoCorrectionFound
 from er3a.diagnosis.conclusions import MostLikelyFault, NoFewFaultsExplain, NothingToExplain
-from er3a.diagnosis.fault_kinds import WrongOffset
+from er3a.diagnosis.faults import WrongOffset
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
@@ -36,20 +36,21 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import compute as compute_module
-from er3a.pipeline.stages.validation.checks import checks_of_set
-from er3a.pipeline.stages.validation.model import RESULTS, ValidationResults, ValidationSummary
-from er3a.pipeline.stages.validation.record import record
-from er3a.pipeline.stages.validation.report import report
-from er3a.pipeline.stages.validation.self_checks import table_checks
-from er3a.pipeline.stages.validation.validation_findings import (
+from er3a.pipeline.stages.validation.checks import checks_of_set, table_checks
+from er3a.pipeline.stages.validation.model import (
+    RESULTS,
     AnotherArm,
     Contradicted,
     LeftOpen,
     NothingToCompare,
     NumbersMissing,
     SelfCheck,
+    ValidationResults,
+    ValidationSummary,
     WholeGroup,
 )
+from er3a.pipeline.stages.validation.record import record
+from er3a.pipeline.stages.validation.report import report
 from er3a.pipeline.stages.validation.verdict import verdict_of
 from er3a.pipeline.study import RobotEntry, Study, load_study
 from er3a.pipeline.viewing.recording import TIMELINE

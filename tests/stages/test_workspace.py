@@ -21,12 +21,11 @@ from er3a.pipeline.results import read_stage, write_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.compute import compute
-from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.workspace.model import VoidUnexpected, WorkspaceResults
 from er3a.pipeline.stages.workspace.report import report
 from er3a.pipeline.stages.workspace.sample import sample
-from er3a.pipeline.stages.workspace.workspace_findings import VoidUnexpected
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.comparison import border_mm
+from er3a.pipeline.viewing.index import border_mm
 from tests.stages.workspace_arms import locked_file, make_study, skew_file, tally_of
 
 pytestmark = pytest.mark.long  # whole stages, and kernels that take forty seconds to compile

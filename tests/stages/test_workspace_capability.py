@@ -17,15 +17,14 @@ from er3a.files.yaml_file import load
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
-from er3a.pipeline.stages.workspace.capability_texts import capability_context
-from er3a.pipeline.stages.workspace.cell_lookup import CellLookup
+from er3a.pipeline.stages.workspace.capability_section import capability_context
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
-from er3a.pipeline.stages.workspace.model import ToolPointsElsewhere
+from er3a.pipeline.stages.workspace.model import CellLookup, ToolPointsElsewhere
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
-from er3a.workspace.clear_poses import try_poses
+from er3a.workspace.capability import try_poses
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
 from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import narrowed

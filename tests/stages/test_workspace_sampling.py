@@ -11,8 +11,8 @@ from scipy.stats import qmc
 
 from er3a.errors import InputError, NotWristPartitionedError
 from er3a.files.robot_library import load_robot
-from er3a.geometry.sphere import fibonacci_sphere
 from er3a.geometry.transforms import transform
+from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import NoWristCentre, wrist_partitioned_arm
 from er3a.pipeline.progress import shown_progress

@@ -9,19 +9,16 @@ from scipy.spatial import ConvexHull
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.workspace import say
-from er3a.pipeline.stages.workspace.void_verdict import judge
+from er3a.pipeline.stages.workspace.compute import judge
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
-from er3a.sampling.reach_search import search_reach
+from er3a.sampling.tally import search_reach
 from er3a.workspace.causes import Disappears, OnlySampled, Relaxed
-from er3a.workspace.cavities import cavities
-from er3a.workspace.hull import cells_inside, convex_hull
-from er3a.workspace.lookup import SectionMap
-from er3a.workspace.proof import prove
-from er3a.workspace.sampled_voids import find_voids, unseen_cells
+from er3a.workspace.proven import SectionMap, cavities
 from er3a.workspace.section_arm import section_arm
-from er3a.workspace.voids import Void
+from er3a.workspace.section_proof import prove
+from er3a.workspace.voids import Void, cells_inside, convex_hull, find_voids, unseen_cells
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of, two_link_arm
 
 # --- hull ---

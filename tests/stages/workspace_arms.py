@@ -11,10 +11,9 @@ from er3a.files.robot_library import ROBOTS
 from er3a.kinematics.forward import forward
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
-from er3a.sampling.extreme_samples import Extremes
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
-from er3a.sampling.tally import tally_blocks
+from er3a.sampling.tally import Extremes, tally_blocks
 
 SEED = 20261120
 

@@ -14,8 +14,8 @@ import psutil
 import pytest
 
 from er3a.errors import ResultError
-from er3a.pipeline.checksums import check_checksum, write_checksum
 from er3a.pipeline.cli import app
+from er3a.pipeline.results import check_checksum, write_checksum
 from er3a.pipeline.viewing.viewer import free_port, viewer_running, without_statistics
 
 RERUN = Path(sys.executable).with_name("rerun")

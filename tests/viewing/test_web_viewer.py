@@ -15,9 +15,9 @@ from urllib.parse import parse_qs, urlsplit
 import psutil
 import pytest
 
-from er3a.pipeline.checksums import write_checksum
 from er3a.pipeline.cli import app
-from er3a.pipeline.viewing import web_viewer
+from er3a.pipeline.results import write_checksum
+from er3a.pipeline.viewing import viewer
 from testing.processes import started
 
 # A shell without a terminal starts what runs in the background with SIGINT ignored, and so do all its children.
@@ -45,9 +45,9 @@ def reports(tmp_path_factory):
 def root(reports):
     """The address of a server of these recordings."""
     recordings = sorted(reports.glob("*/*.rrd"))
-    with web_viewer.server(recordings) as listening:
+    with viewer.server(recordings) as listening:
         threading.Thread(target=listening.serve_forever, daemon=True).start()
-        yield web_viewer.address(listening, recordings)
+        yield viewer.address(listening, recordings)
         listening.shutdown()
 
 

@@ -12,10 +12,9 @@ from PIL import Image
 
 from er3a.errors import Er3aError, InputError
 from er3a.files.hand_eye_file import load_hand_eye
-from er3a.vision.boards import Board, BoardNotFoundError, Camera, ambiguous_tilts, board_drawing, board_views
+from er3a.vision.boards import Board, BoardNotFoundError, Camera, ambiguous_tilts, board_drawing, board_views, opencv
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
-from er3a.vision.opencv import opencv
 from testing.hand_eye_sets import off, pose
 from tests.vision.test_hand_eye_file import HEAD, columns, write
 

@@ -9,25 +9,25 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
-from er3a.collision.clearance import clearance
 from er3a.files.hand_eye_file import load_hand_eye
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
 from er3a.kinematics.forward import forward
-from er3a.pipeline.stages.vision.grasp_programs import grasp_programs
+from er3a.pipeline.stages.vision.compute import grasp_programs
 from er3a.planning.timing import joint_limits
 from er3a.planning.way_around import EndOutsideLimits, PlannerMissing
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.read_program import read_program
 from er3a.robots.joint_limits import within
+from er3a.vision.calibration_set import moved, step_between
 from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, NoTransfer, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.next_view import board_visible, next_view
 from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error
-from er3a.vision.tangent import moved, step_between
 from testing.camera_cells import CARRIED, FIXED, FOLDER, SCENE, seen_from
 from testing.hand_eye_sets import pose
 

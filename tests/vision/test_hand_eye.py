@@ -9,11 +9,10 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
-from er3a.vision.calibration_set import CalibrationSet
+from er3a.vision.calibration_set import CalibrationSet, moved
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.likelihood import flange_to_camera, residuals
-from er3a.vision.tangent import moved
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
     AngleOrder,

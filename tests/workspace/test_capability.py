@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
-from er3a.geometry.sphere import fibonacci_sphere
+from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse

@@ -14,9 +14,9 @@ from er3a.workspace.causes import (
     joints_behind,
     relaxations,
 )
-from er3a.workspace.cavities import Cavity
 from er3a.workspace.cell_frame import cell_frame
-from er3a.workspace.proof import in_section
+from er3a.workspace.proven import Cavity
+from er3a.workspace.section_proof import in_section
 from testing.arms import made_of, tools_by_hand
 
 TURN = 2 * np.pi

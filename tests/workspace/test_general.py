@@ -13,13 +13,20 @@ from er3a.kinematics.chain import joint_starts
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.robots.robot import CombinedLimit, Robot
-from er3a.workspace.general import prove_general
 from er3a.workspace.general_arm import general_arm, place
-from er3a.workspace.lookup import EMPTY, FILLED, SectionMap
-from er3a.workspace.proof import prove
-from er3a.workspace.proven import BoundsFarApart, GeneralMethod, ToolNearWrist, prove_robot
+from er3a.workspace.general_proof import prove_general
+from er3a.workspace.proven import (
+    EMPTY,
+    FILLED,
+    BoundsFarApart,
+    GeneralMethod,
+    SectionMap,
+    ToolNearWrist,
+    prove_robot,
+    reach_points,
+)
 from er3a.workspace.section_arm import section_arm
-from er3a.workspace.witness import reach_points
+from er3a.workspace.section_proof import prove
 
 
 def skew() -> Robot:

@@ -13,15 +13,20 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
-from er3a.workspace.azimuths import MOST_ARCS, measure, meets, remove
-from er3a.workspace.boundary import border
 from er3a.workspace.causes import Disappears, cause_of, joints_behind, relaxations
-from er3a.workspace.cavities import cavities
-from er3a.workspace.lookup import EMPTY, FILLED, UNDECIDED, SectionMap
-from er3a.workspace.proof import Proof, judge, prove
-from er3a.workspace.section_arm import section_arm, section_frame, wrist_and_forearm
-from er3a.workspace.volume import estimate_volume, wilson
-from er3a.workspace.witness import witness_joints
+from er3a.workspace.proven import (
+    EMPTY,
+    FILLED,
+    UNDECIDED,
+    SectionMap,
+    cavities,
+    estimate_volume,
+    wilson,
+    witness_joints,
+)
+from er3a.workspace.section_arm import MOST_ARCS, measure, meets, remove, section_arm, section_frame, wrist_and_forearm
+from er3a.workspace.section_proof import Proof, judge, prove
+from er3a.workspace.side_view import border
 
 NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
 RIGHT = np.pi / 2

@@ -8,8 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from er3a.robots.robot import CombinedLimit, Robot
-from er3a.workspace.lookup import EMPTY, FILLED
-from er3a.workspace.proven import Proven, prove_robot
+from er3a.workspace.proven import EMPTY, FILLED, Proven, prove_robot
 from er3a.workspace.surface import surface_of
 from testing.arms import DEG, dh_matrix, gantry, made_of, palletiser, placement, tools_by_hand
 

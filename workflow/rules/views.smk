@@ -11,7 +11,7 @@ rule record:
         "../envs/er3a.yaml"
     params:
         code=lambda wildcards: code_of(wildcards.stage, "record"),
-        drawing=code_digest("er3a.pipeline.viewing.preview"),
+        drawing=code_digest("er3a.pipeline.viewing.viewer"),
     message:
         "{wildcards.robot}: record {wildcards.stage}"
     shell:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.geometry.angles import TURN
+from er3a.geometry.vectors import TURN
+from er3a.kinematics.classes.arm_angle import about_z
 from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.parallel_axes import (
     SLOTS,
@@ -20,7 +21,6 @@ from er3a.kinematics.classes.parallel_axes import (
     polish_rows,
     solve_parallel_blocks,
 )
-from er3a.kinematics.classes.spherical_joints import about_z
 from er3a.numerics.arrays import Flags, Reals
 
 SAME_FAMILY = 1e-6  # rad, of joints 1 and 5

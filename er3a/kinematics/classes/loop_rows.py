@@ -11,16 +11,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.kinematics.classes.circle_zeros import LOCAL_ORDER, NODES, TERMS, zeros_between, zeros_on_circle
 from er3a.kinematics.classes.hidden_joint import (
+    LOCAL_ORDER,
+    NODES,
     SHIFT_4,
     SHIFT_5,
+    TERMS,
     Reading,
     Scratch,
     at_angle,
     determinant_at,
     new_scratch,
     nine_rows,
+    zeros_between,
+    zeros_on_circle,
 )
 from er3a.kinematics.classes.links import multiply_rigid, turn_behind
 from er3a.numerics.arrays import Flags, Integers, Reals

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.kinematics.classes.circle_zeros import HARMONICS, SAMPLE_ANGLES, SAMPLES
+from er3a.kinematics.classes.hidden_joint import HARMONICS, SAMPLE_ANGLES, SAMPLES
 from er3a.kinematics.classes.links import inverse_rigid, poses_of, size_of
 from er3a.kinematics.classes.loop_rows import LoopMemory
 from er3a.kinematics.classes.polish import SOLVES, newton, twin_start

@@ -16,8 +16,8 @@ import typer
 from er3a.errors import Er3aError, InputError
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, print_json, print_note
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.robots.shown import meant
 
 if TYPE_CHECKING:
     from er3a.pipeline.program_reports import CheckedFile
@@ -132,7 +132,7 @@ def write(
     from er3a.files.scene_file import load_scene
     from er3a.pipeline.messages.expectations import outcome_word
     from er3a.pipeline.messages.program_check import say
-    from er3a.pipeline.path_programs import programs_of
+    from er3a.pipeline.program_reports import programs_of
     from er3a.pipeline.progress import shown_work
 
     arm = load_robot(robot)

@@ -74,8 +74,8 @@ def record(
 
     The viewer draws it as a picture for the stage's page; of the many variants of a sweep the picture stays empty.
     """
-    from er3a.pipeline.checksums import write_checksum
-    from er3a.pipeline.viewing.preview import draw_preview, write_empty
+    from er3a.pipeline.results import write_checksum
+    from er3a.pipeline.viewing.viewer import draw_preview, write_empty
 
     loaded, folder = _folder(study, results, robot, stage)
     recording = reports / robot / f"{stage}.rrd"
@@ -98,7 +98,7 @@ def report(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Write a stage's page from its results."""
-    from er3a.pipeline.checksums import write_checksum
+    from er3a.pipeline.results import write_checksum
     from er3a.pipeline.viewing.figures import house_style
 
     loaded, folder = _folder(study, results, robot, stage)
@@ -117,7 +117,7 @@ def teach(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all IK solutions of it, in one page."""
-    from er3a.pipeline.checksums import write_checksum
+    from er3a.pipeline.results import write_checksum
     from er3a.pipeline.teach.panel import write_teach_page
 
     page = reports / robot / "teach.html"
@@ -128,7 +128,7 @@ def teach(
 @app.command(rich_help_panel=JOBS)
 def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
     """Write the pages over all robots and stages: the index and the comparison of two robots."""
-    from er3a.pipeline.checksums import OVERALL, write_checksum
+    from er3a.pipeline.results import OVERALL, write_checksum
     from er3a.pipeline.viewing.figures import house_style
     from er3a.pipeline.viewing.index import write_index
 

@@ -51,8 +51,7 @@ def new(
     modified: Annotated[bool, typer.Option(help="the table of --dh is modified (Craig), not standard")] = False,
 ):
     """Write a study to start from: robot file, targets and paths that the arm can do, a scene, a README."""
-    from er3a.pipeline.new_study.brought_arm import arm_of
-    from er3a.pipeline.new_study.write import write_study
+    from er3a.pipeline.new_study.write import arm_of, write_study
 
     ends, arguments = (base, tip), tuple(xacro or ())
     with shown_work(f"{folder}: the arm is read") as at:
@@ -158,9 +157,8 @@ def view(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Open the recordings in the Rerun viewer; where there is no desktop, serve them to a browser."""
-    from er3a.pipeline.checksums import check_checksum
-    from er3a.pipeline.viewing.viewer import has_display, viewer_command, without_statistics
-    from er3a.pipeline.viewing.web_viewer import serve
+    from er3a.pipeline.results import check_checksum
+    from er3a.pipeline.viewing.viewer import has_display, serve, viewer_command, without_statistics
 
     recordings = sorted(reports.glob(f"{robot or '*'}/*.rrd"))
     if not recordings:

@@ -18,7 +18,7 @@ from er3a.diagnosis.conclusions import (
     Resolution,
     TooSmallToTell,
 )
-from er3a.diagnosis.fault_kinds import (
+from er3a.diagnosis.faults import (
     Faults,
     ReversedDirection,
     ShiftedRows,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from er3a.identifiability.evidence import PartEvidence
 from er3a.identifiability.proposals import LookAtMotion, MeasureAngle, MeasureLength, ReadLimit, TimeJoint
 from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
-from er3a.identifiability.verdict_parts import PartEvidence
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.references import motion_seen
 from er3a.pipeline.messages.say import joined, say, sentence, word

@@ -9,10 +9,9 @@ from er3a.geometry.transforms import rpy_of
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import say, sentence, word
 from er3a.vision.boards import AmbiguousTilt
+from er3a.vision.calibration_set import TimeOffset, quaternion_of
 from er3a.vision.hand_eye import HandEye, spread_of
 from er3a.vision.table_corrections import NoCorrections, TableCorrections
-from er3a.vision.tangent import quaternion_of
-from er3a.vision.time_offset import TimeOffset
 from er3a.vision.vision_findings import (
     AllSamplesEqual,
     AngleOrder,

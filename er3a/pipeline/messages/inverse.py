@@ -6,7 +6,7 @@ from er3a.pipeline.messages.inverse_verdict import say
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, sentence
-from er3a.pipeline.stages.inverse.inverse_findings import (
+from er3a.pipeline.stages.inverse.model import (
     AtSingularity,
     MoveObstacle,
     NearLimit,

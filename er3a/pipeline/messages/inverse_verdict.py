@@ -6,7 +6,7 @@ import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.say import counted, joined, listed, say, sentence
 from er3a.pipeline.stages.expectations import Demonstration
-from er3a.pipeline.stages.inverse.inverse_findings import (
+from er3a.pipeline.stages.inverse.model import (
     AllSolved,
     BranchesCollide,
     BranchesLeaveLimits,

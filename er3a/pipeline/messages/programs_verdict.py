@@ -6,7 +6,7 @@ import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.say import counted, joined, say, sentence
 from er3a.pipeline.stages.programs.model import NoPrograms, ProgramCounts
-from er3a.programs.program_outcomes import ProgramOutcome
+from er3a.programs.syntax import ProgramOutcome
 
 
 @say.register

@@ -21,8 +21,7 @@ from er3a.selection.nearest import (
     OtherFreeJoint,
     OtherTurns,
 )
-from er3a.selection.rules import RULES
-from er3a.selection.select import BestByRules, Measure, Placed
+from er3a.selection.select import RULES, BestByRules, Measure, Placed
 
 RULE_NAMES = {
     "nearest": N_("nearest"),

@@ -7,7 +7,7 @@ import er3a.pipeline.messages.validation_verdict  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS
 from er3a.pipeline.messages.say import say, sentence, word
-from er3a.pipeline.stages.validation.validation_findings import (
+from er3a.pipeline.stages.validation.model import (
     InNoSet,
     NamedPose,
     NearSingularLeftOut,

@@ -10,7 +10,7 @@ from er3a.pipeline.messages.evidence import PART_WORDS
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.references import quoted
 from er3a.pipeline.messages.say import counted, joined, say, sentence, word
-from er3a.pipeline.stages.validation.validation_findings import (
+from er3a.pipeline.stages.validation.model import (
     AnotherArm,
     Claims,
     Confirmed,

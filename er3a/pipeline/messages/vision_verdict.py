@@ -6,7 +6,7 @@ from er3a.pipeline.messages import hand_eye, pairs, planning  # noqa: F401  (the
 from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import counted, joined, listed, say, sentence, word
-from er3a.pipeline.stages.vision.vision_verdicts import (
+from er3a.pipeline.stages.vision.model import (
     CalibrationDoubtful,
     CalibrationImpossible,
     DirectionContradicted,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.workspace_proof import is_predicate
-from er3a.pipeline.stages.workspace.workspace_findings import (
+from er3a.pipeline.stages.workspace.model import (
     Flat,
     NoVoid,
     OnSurface,

@@ -14,15 +14,14 @@ import scipy
 from markupsafe import Markup
 
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
-from er3a.geometry.sphere import fibonacci_sphere
+from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.teach.scripts import TEACH, import_map
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, rgb
-from er3a.robots.joint_limits import theta_limits
+from er3a.robots.joint_limits import shown, size_of, theta_limits
 from er3a.robots.robot import Robot
-from er3a.robots.shown import shown, size_of
 
 _HERE = Path(__file__).parent
 MOST_FRAMES = 240

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from er3a.kinematics.targets import TargetOutcome
-from er3a.planning.path_verdicts import PathVerdict
-from er3a.programs.program_outcomes import ProgramOutcome
+from er3a.kinematics.solutions import TargetOutcome
+from er3a.planning.intervals import PathVerdict
+from er3a.programs.syntax import ProgramOutcome
 from er3a.vision.vision_findings import GraspOutcome
 
 Outcome = TargetOutcome | PathVerdict | ProgramOutcome | GraspOutcome

@@ -1,5 +1,5 @@
 /**
- * Distances between convex bodies, as er3a/collision/core_distance.py has them.
+ * Distances between convex bodies, as er3a/collision/distances.py has them.
  *
  * A body is `{kind, link, points, radius, disc}`: a core grown by a radius (m). The core is the hull of its points, a
  * cylinder (two points, the ends of its axis, with the radius of its disc) or a half-space (its normal, then how far

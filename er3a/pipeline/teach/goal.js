@@ -81,7 +81,7 @@ export function* solutionsByIteration(goal, T, q, starts) {
 }
 
 /**
- * Levenberg and Marquardt's iteration within the limits, as er3a/kinematics/iteration_any.py has it: `{q, size, solved}`,
+ * Levenberg and Marquardt's iteration within the limits, as er3a/kinematics/numerical.py has it: `{q, size, solved}`,
  * the size of the error that is left, in which the position may weigh more.
  */
 function descend(goal, T, start) {

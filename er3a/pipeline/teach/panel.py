@@ -9,10 +9,9 @@ import numpy as np
 
 import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.collision.bodies import Bodies
-from er3a.collision.core_distance import CYLINDER, HALF_SPACE, HULL
-from er3a.collision.envelopes import arm_shapes
-from er3a.collision.pairs import PairsUnexamined
+from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import PairsUnexamined, arm_shapes
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import characteristic_length
@@ -20,18 +19,234 @@ from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
 from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_verdict
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.scripts import import_map
-from er3a.pipeline.teach.words import WORDS
 from er3a.pipeline.viewing.page import render, run_command
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
+from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
-from er3a.robots.shown import joint_names
+
+WORDS: dict[str, Any] = {
+    "title": N_("teach panel"),
+    "lead": N_(
+        "Move the joints and watch the tool: its pose, the limits, how near the arm comes to a singularity, and which "
+        "other joint angles reach the same pose."
+    ),
+    "no_script": N_("This page computes in the browser; it needs JavaScript."),
+    "view": N_("The arm"),
+    "picture": N_(
+        "The arm in three dimensions at the joint angles of the sliders, each joint in its own colour. "
+        "Arrow keys turn the view, plus and minus zoom."
+    ),
+    "view_help": N_("Drag to turn the view. With the picture in focus the wheel and the plus and minus keys zoom."),
+    "views": {"overview": N_("Overview"), "side": N_("Side"), "front": N_("Front"), "top": N_("Top")},
+    "frames": N_("Frames of the table"),
+    "frames_none": N_("none"),
+    "frames_all": N_("all"),
+    "frames_row": N_("row {row}"),
+    "row": {
+        "standard": N_(
+            "Row {row}: turn by θ = {theta} about z, go {d} mm along z and {a} mm along the new x, turn by α = {alpha} "
+            "about it."
+        ),
+        "modified": N_(
+            "Row {row}: go {a} mm along x, turn by α = {alpha} about it, turn by θ = {theta} about the new z, go {d} "
+            "mm along it."
+        ),
+    },
+    "zoom_in": N_("Zoom in"),
+    "zoom_out": N_("Zoom out"),
+    "joints": N_("Joints"),
+    "joints_help": N_(
+        "Arrow keys move by 1° (1 mm where a joint slides), with Shift by a tenth; Page Up and Page Down by ten; Home "
+        "and End go to the limits."
+    ),
+    "slider": N_("{joint}, slider"),
+    "typed": N_("{joint} in degrees"),
+    "typed_length": N_("{joint} in millimetres"),
+    "angle": N_("{degrees} degrees"),
+    "way": N_("{degrees} millimetres"),
+    "endless_joint": N_("turns without end"),
+    "room": N_("{room} from its limit"),
+    "at_limit": N_("at its limit"),
+    "outside": N_("{joint} stays between {lower} and {upper}."),
+    "no_number": N_("{joint} needs a number, in degrees."),
+    "no_length": N_("{joint} needs a number, in millimetres."),
+    "zero": N_("Zero pose"),
+    "copy_joints": N_("Copy joints"),
+    "copy_link": N_("Copy link"),
+    "copied": N_("The joints are copied: {text}"),
+    "link_copied": N_("The link to this pose is copied."),
+    "not_copied": N_("This browser does not let pages copy; copy it from here: {text}"),
+    "bad_link": N_("The joints in the link were not used: {reason}"),
+    "bad_count": N_("it names {count} numbers where {joints} are needed."),
+    "jog": N_("Jog"),
+    "jog_help": N_(
+        "Along and about the axes of the base or the tool (rotations keep the tool point fixed), or joint by joint."
+    ),
+    "jog_frame": N_("Frame"),
+    "jog_frames": {"base": N_("base"), "tool": N_("tool"), "joints": N_("joints")},
+    "jog_axes": ["X", "Y", "Z", "RX", "RY", "RZ"],
+    "jog_mm": N_("step in mm"),
+    "jog_deg": N_("step in degrees"),
+    "jog_step": N_("A step needs a number above 0."),
+    "typed_pose": N_("Go to a pose"),
+    "pose_fields": [
+        N_("x in mm"),
+        N_("y in mm"),
+        N_("z in mm"),
+        N_("roll in degrees"),
+        N_("pitch in degrees"),
+        N_("yaw in degrees"),
+    ],
+    "pose_go": N_("Go there"),
+    "pose_take": N_("Use the current pose"),
+    "pose_number": N_("“{field}” needs a number."),
+    "not_reached": N_("The arm does not move: {reason}."),
+    "not_found": N_(
+        "iteration found no joint values within the limits; the nearest are {length} and {angle} away. This "
+        "does not prove that none exist"
+    ),
+    "left_over": N_(
+        "The tool is {length} and {angle} away from what was asked, in what the {joints} joints of this arm cannot set."
+    ),
+    "no_such_motion": N_("The arm does not move: its joints cannot move the tool that way."),
+    "points": N_("Way points"),
+    "points_help": N_(
+        "Export two or more saved points as a path file (joint moves that stop at each point) or as an RPL "
+        "program at a tenth of full speed. The motions between them are not checked here: use er3a check, the "
+        "trajectory stage and er3a check-program."
+    ),
+    "points_help_path": N_(
+        "Export two or more saved points as a path file: joint moves that stop at each point. The motions "
+        "between them are not checked here: use er3a check and the trajectory stage."
+    ),
+    "save_point": N_("Save this point"),
+    "export_path": N_("Export path file"),
+    "export_program": N_("Export program"),
+    "clear_points": N_("Remove all"),
+    "go_to_point": N_("go to point {number}"),
+    "remove_point": N_("remove point {number}"),
+    "pose": N_("Tool pose"),
+    "pose_help": N_("Of the tool's frame in the base frame."),
+    "position": N_("Position"),
+    "orientation": N_("Orientation as"),
+    "orientations": {
+        "rpy": N_("Roll, pitch, yaw (ZYX)"),
+        "zyz": N_("Euler angles ZYZ"),
+        "quaternion": N_("Quaternion"),
+        "matrix": N_("Matrix"),
+    },
+    "parts": {
+        "rpy": [N_("roll about X"), N_("pitch about Y"), N_("yaw about Z")],
+        "zyz": [N_("φ about Z"), N_("ϑ about Y"), N_("ψ about Z")],
+        "quaternion": ["w", "x", "y", "z"],
+    },
+    "matrix_caption": N_("Transform from the tool to the base; its last column is the position in mm"),
+    "measures": N_("How near to a singularity?"),
+    "measures_help": N_(
+        "At a singularity the tool loses a direction, and near it slow tool motions need fast joints. The measures are "
+        "of the Jacobian with its linear rows divided by {length} mm, {length_is}; they are 0 at a singularity."
+    ),
+    "length_is": {"wrist": N_("the reach of the wrist centre"), "links": N_("half the length along all links")},
+    "manipulability": N_("Manipulability"),
+    "smallest": N_("Smallest singular value"),
+    "condition": N_("Condition number"),
+    "kinds": {"wrist": N_("Wrist"), "elbow": N_("Elbow"), "shoulder": N_("Shoulder")},
+    "kinds_are": {
+        "wrist": N_("between axes 4 and 6"),
+        "elbow": N_("from straight or folded"),
+        "shoulder": N_("wrist centre from the plane of axes 1 and 2"),
+    },
+    "states": {"clear": N_("clear"), "near": N_("near"), "at": N_("singular")},
+    "clear": N_("No singularity is near."),
+    "near": {
+        "wrist": N_("Near the wrist singularity: axes 4 and 6 are {distance} from collinear."),
+        "elbow": N_("Near the elbow singularity: the arm is {distance} from straight or folded."),
+        "shoulder": N_("Near the shoulder singularity: the wrist centre is {distance} from the plane of axes 1 and 2."),
+    },
+    "at": {
+        "wrist": N_(
+            "At the wrist singularity: axes 4 and 6 are collinear, so J4 and J6 turn the tool about the same line."
+        ),
+        "elbow": N_(
+            "At the elbow singularity: the arm is straight or folded, so the wrist centre can't move along the arm."
+        ),
+        "shoulder": N_(
+            "At the shoulder singularity: the wrist centre is in the plane of axes 1 and 2, where no joint moves it "
+            "along axis 2."
+        ),
+    },
+    "near_unnamed": N_("Near a singularity: the smallest singular value is {value}."),
+    "unnamed": N_("The kinds of singularity of this arm have no names here, because {reason}."),
+    "solutions": N_("All IK solutions of this pose"),
+    "solutions_some": N_("IK solutions of this pose"),
+    "solutions_help": N_(
+        "Choose one and the arm goes there; the tool stays in place. Point at one to see it as a pale arm. "
+        "Branches: wrist in front of axis 1 or behind it (back), elbow up or down, wrist flipped or not. "
+        "Numbers are J1 to J6 in degrees."
+    ),
+    "previous": N_("Previous"),
+    "next": N_("Next"),
+    "count": N_("{within} of {total} within the limits"),
+    "current": N_("the arm is here"),
+    "within": N_("within the limits"),
+    "leaves": N_("outside: {reasons}"),
+    "separator": N_("; "),
+    "above": N_("{joint} at {angle} is {excess} above its limit of {limit}"),
+    "below": N_("{joint} at {angle} is {excess} below its limit of {limit}"),
+    "turn": N_("{joint} {turn}"),
+    "other_turns": N_("Further turns:"),
+    "not_moved": N_("The arm does not move: {reasons}."),
+    "missing": N_("not there: {reason}"),
+    "faults": {
+        "too_far": N_("the wrist centre would be {gap} too far from axis 2"),
+        "too_near": N_("the wrist centre would be {gap} too near to axis 2"),
+        "off_axis": N_("the wrist centre would be {gap} too near to axis 1"),
+        "orientation": N_("the wrist would have to tilt {gap} further than it can"),
+    },
+    "free": {
+        "wrist": N_(
+            "Axes 4 and 6 are collinear: J4 and J6 compensate each other, so there are infinitely many "
+            "solutions; J4 is kept here."
+        ),
+        "elbow": N_(
+            "The wrist centre is on axis 2: J2 is free, so there are infinitely many solutions; J2 is kept here."
+        ),
+        "shoulder": N_(
+            "The wrist centre is on axis 1: J1 is free, so there are infinitely many solutions; J1 is kept here."
+        ),
+    },
+    "found": N_("solution {number}"),
+    "iterated": N_("{count} found by iteration; there may be others"),
+    "no_closed_form": N_(
+        "The page solves arms with a spherical wrist and parallel axes 2 and 3 in closed form. This arm it solves by "
+        "iteration within the joint limits, once the arm is at rest, because {reason}. The inverse page lists all "
+        "solutions of its targets where the arm's class has a solver."
+    ),
+    "endless": N_(
+        "The arm has more joints than a pose needs, so there are infinitely many solutions; some that are far "
+        "apart are shown."
+    ),
+    "clearance_help": N_(
+        "Clearance: the least distance between the arm's shapes and the scene's, and between links of the arm "
+        "that can collide, as checked by the collision stage. A line shows where."
+    ),
+    "clearance_estimated": N_(
+        "The robot's file gives no shapes of its links, so they are capsules along the table, as thick as arms of this "
+        "size usually are: an estimate."
+    ),
+    "clearance_is": N_("Clearance {distance}: {pair}."),
+    "overlap": N_("Collision: {pair} overlap by {distance}."),
+    "overlap_deep": N_("Collision: {pair} overlap by {distance} or more."),
+    "nothing_meets": N_("No bodies here can collide."),
+}
+
 
 SIX = 6
 _HERE = Path(__file__).parent

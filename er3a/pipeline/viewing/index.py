@@ -1,29 +1,451 @@
 """The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two.
 
 Variants of a sweep stand in the section of their sweep only.
+
+A study's verdicts as a JUnit report, which any continuous integration shows: a suite for each robot, a case for each
+stage. Its elements and attributes are those that Jenkins' schema ``junit-10.xsd`` knows.
 """
 
 from __future__ import annotations
 
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull
+
+from er3a.files.kept_files import write_atomically
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.decision import decision
-from er3a.pipeline.messages.language import tr
-from er3a.pipeline.results import AbsentResults, Provenance, is_computed, read_stage, result_records
+from er3a.pipeline.messages.foundations import caveat
+from er3a.pipeline.messages.language import N_, own_title, tr
+from er3a.pipeline.results import (
+    AbsentResults,
+    Input,
+    Provenance,
+    Stored,
+    input_records,
+    is_computed,
+    read_stage,
+    result_records,
+)
 from er3a.pipeline.stages.registry import STAGES, all_messages
-from er3a.pipeline.stages.validation.validation_findings import LeftOpen
-from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.validation.model import LeftOpen
+from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
-from er3a.pipeline.verdicts import NOT_EXAMINED, read_verdicts
+from er3a.pipeline.sweeps import ENTRIES, entry_label
+from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
-from er3a.pipeline.viewing.comparison import write_compare
+from er3a.pipeline.viewing.arm import skeleton
+from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.heads import stage_head
-from er3a.pipeline.viewing.instead import table_instead
-from er3a.pipeline.viewing.junit import write_junit
-from er3a.pipeline.viewing.sweep_section import sweep_sections
-from er3a.pipeline.viewing.thumbnail import thumbnail
+from er3a.pipeline.viewing.numbers import number
+from er3a.pipeline.viewing.page import PAGES, Picture, status_word, table_instead
+from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.robots.joint_limits import shown
+from er3a.robots.robot import Robot
+
+BORDER_POINT = "tool_point"
+Workspaces = Mapping[str, WorkspaceResults | AbsentResults | None]
+CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
+
+
+def write_compare(study: Study, results: Path, workspaces: Workspaces, output: Path) -> None:
+    """Render ``compare.html`` from the tables and summaries of all robots, and their workspaces."""
+    robots = {name: study.robot(name) for name in study.robots}
+    values = {
+        name: parameters(robot) | key_figures(results / name, study.stages(name)) for name, robot in robots.items()
+    }
+    borders = {name: border_mm(workspaces[name]) for name in robots}
+    rows = list(dict.fromkeys(key for own in values.values() for key in own))
+    groups = list(dict.fromkeys(group for group, _, _ in rows))
+    rows.sort(key=lambda row: groups.index(row[0]))
+    data = {
+        name: {
+            "title": own_title(robot.title),
+            "values": [values[name].get(row) for row in rows],
+            "border": borders[name],
+        }
+        for name, robot in robots.items()
+    }
+    validated = {name: results / name / "validation" for name in robots}
+    corners = np.array([point for border in borders.values() for line in border for point in line] or [[0, 0]])
+    page.render(
+        Path(__file__).with_name("compare.html.j2"),
+        output,
+        command=page.run_command(study, "compare.html"),
+        provenance=Provenance(_inputs(study, results), code_digest(__name__), seed=study.seed),
+        rows=rows,
+        data=data,
+        caveats={
+            name: caveat(stage_head(folder, STAGES["validation"]).status if is_computed(folder) else "not_computed")
+            for name, folder in validated.items()
+        },
+        low=corners.min(axis=0).tolist(),
+        high=corners.max(axis=0).tolist(),
+        compare_script=Path(__file__).with_name("compare.js").read_text(encoding="utf-8"),
+    )
+
+
+def _inputs(study: Study, results: Path) -> tuple[Input, ...]:
+    return input_records(study.robot_file(name) for name in study.robots) + result_records(results, study.robots)
+
+
+def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
+    """Values of a robot's table by (group, name, unit); None where unknown."""
+    of_joints = ["mm" if slides else "deg" for slides in robot.slides]
+    own = shown(robot, np.stack([robot.lower, robot.upper, robot.speed]))
+    columns = (
+        (tr("D-H table"), "a", ["mm"] * robot.rows, robot.a * 1000),
+        (tr("D-H table"), "α", ["deg"] * robot.rows, np.degrees(robot.alpha)),
+        (tr("D-H table"), "d", ["mm"] * robot.rows, robot.d * 1000),
+        (tr("zero"), tr("offset"), ["deg"] * robot.rows, np.degrees(robot.offset)),
+        (tr("zero"), tr("direction"), [""] * robot.rows, [_sense(value) for value in robot.direction.tolist()]),
+        (tr("limits"), tr("lower limit"), of_joints, own[0]),
+        (tr("limits"), tr("upper limit"), of_joints, own[1]),
+        (tr("speeds"), tr("greatest speed"), [f"{unit}/s" for unit in of_joints], own[2]),
+    )
+    found: dict[tuple[str, str, str], float | str | None] = {
+        (tr("D-H table"), tr("convention"), ""): tr(CONVENTIONS[robot.convention])
+    }
+    for group, name, units, values in columns:
+        for joint, (unit, value) in enumerate(zip(units, values), start=1):
+            found[group, f"J{joint} {name}", unit] = value if isinstance(value, str) else _finite(value)
+    return found
+
+
+def _sense(direction: float) -> str:
+    return tr("+1: positive as the D-H row") if direction > 0 else tr("−1: positive against the D-H row")
+
+
+def _finite(value: float) -> float | None:
+    return round(float(value), 9) if np.isfinite(value) else None
+
+
+def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str], float | str | None]:
+    """Verdicts and key figures of a robot's stages by (stage, name, unit)."""
+    found: dict[tuple[str, str, str], float | str | None] = {}
+    for stage in (STAGES[name] for name in stages if name in STAGES and is_computed(folder / name)):
+        head, title = stage_head(folder / stage.name, stage), tr(stage.title)
+        found[title, tr("verdict"), ""] = page.status_word(head.status)
+        for figure in head.figures:
+            value, unit = figure.value, figure.unit
+            if figure.part and value is not None:  # the whole differs from robot to robot
+                found[title, figure.label, ""] = f"{number(value)} {unit}"
+            else:
+                found[title, figure.label, unit] = value
+    return found
+
+
+def border_mm(workspace: WorkspaceResults | AbsentResults | None) -> list[list[list[float]]]:
+    """The arcs of the tool point's border in the section through axis 1: lists of (radius, height) in mm."""
+    if not isinstance(workspace, WorkspaceResults):
+        return []
+    border: pd.DataFrame = workspace.border.frame()
+    arcs = border[(border["point"] == BORDER_POINT) & (border["view"] == "section")].groupby("arc", sort=False)
+    return [(arc[["rho_m", "z_m"]].to_numpy() * 1000).round(2).tolist() for _, arc in arcs]
+
+
+MARKERS = {"pass": "o", "caution": "^", "fail": "X", "conflict": "D", "no_reference": "s", "not_computed": "x"}
+SHORT_TABLE = 12
+
+
+@dataclass(frozen=True)
+class Point:
+    """A variant in a sweep: its value and its stages' results, by stage."""
+
+    name: str
+    value: float
+    stages: dict[str, Stored[Any]]
+
+    @property
+    def workspace(self) -> WorkspaceSummary:
+        """What the workspace stage found."""
+        return self.stages["workspace"].results.summary
+
+    @property
+    def enclosed(self) -> list[VoidSummary]:
+        """The enclosed voids that the workspace stage lists."""
+        return self.workspace.enclosed_voids
+
+    def litres(self, bound: str) -> float:
+        """The ``lower`` or ``upper`` bound of the enclosed voids' volume together, L."""
+        return 1000 * sum(getattr(void.volume_m3, bound) for void in self.enclosed)
+
+
+def sweep_sections(study: Study, results: Path) -> list[dict[str, Any]]:
+    """What the template shows of each sweep of the study whose variants have all been computed."""
+    return [_section(study, name, results) for name in study.sweeps if _is_whole(study, name, results)]
+
+
+def _is_whole(study: Study, name: str, results: Path) -> bool:
+    variants = [variant.name for variant in study.variants.values() if variant.sweep == name]
+    return all(is_computed(results / variant / stage) for variant in variants for stage in study.stages(variant))
+
+
+def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
+    sweep = study.sweeps[name]
+    variants = [variant for variant in study.variants.values() if variant.sweep == name]
+    points = [
+        Point(v.name, v.value, {stage: read_stage(results / v.name / stage, STAGES[stage]) for stage in sweep.stages})
+        for v in variants
+    ]
+    content, entry = study.table(sweep.robot), study.entry(sweep.robot)
+    own = variants[0].replaced(content, entry.tool or content.tool)
+    what, unit = entry_label(ENTRIES[sweep.vary]), ENTRIES[sweep.vary].unit
+    ends = {"low": _plain(min(sweep.resolved)), "high": _plain(max(sweep.resolved))}
+    title = tr(
+        "{robot}: {what} from {low} to {high} {unit}", robot=own_title(content.title), what=what, unit=unit, **ends
+    )
+    columns, rows = _table(points, what, unit, sweep.stages)
+    return {
+        "name": name,
+        "title": title,
+        "count": len(points),
+        "picture": Picture(
+            _figure(points, f"{what} ({unit})", own, sweep.stages),
+            tr("Results of {count} variants against {what}", count=len(points), what=what),
+            _caption(points, own, unit, "workspace" in sweep.stages),
+        ),
+        "columns": columns,
+        "rows": rows,
+        "open": len(points) <= SHORT_TABLE,
+    }
+
+
+def _computed(points: list[Point]) -> list[Point]:
+    """The variants whose workspace was computed."""
+    return [point for point in points if point.stages["workspace"].status != "not_computed"]
+
+
+def _figure(points: list[Point], label: str, own: float | None, stages: list[str]) -> Figure:
+    drawers = {_draw_volume: 2.4, _draw_litres: 1.5, _draw_numbers: 1.3} if "workspace" in stages else {}
+    heights = [*drawers.values(), 0.35 + 0.25 * len(stages)]
+    figure, axes = new_figure(
+        len(heights), 1, height=1.0 + sum(heights), sharex=True, squeeze=False, height_ratios=heights
+    )
+    for drawer, panel in zip(drawers, axes[:, 0]):
+        drawer(panel, _computed(points))
+    _draw_verdicts(axes[-1, 0], points, stages)
+    for panel in axes[:, 0]:
+        if own is not None:
+            panel.axvline(own, color=MUTED, linestyle=":", zorder=0)
+    axes[-1, 0].set_xlabel(label)
+    return figure
+
+
+def _draw_volume(axes: Axes, points: list[Point]) -> None:
+    volumes = [point.workspace.volume_m3 for point in _in_order(points)]
+    x = [point.value for point in _in_order(points)]
+    low, high = ([getattr(volume, bound) for volume in volumes] for bound in ("lower", "upper"))
+    axes.fill_between(x, low, high, color=MODEL, alpha=0.25, linewidth=0, label=tr("proven bounds"))
+    axes.vlines(x, low, high, color=MODEL, linewidth=1)
+    axes.plot(x, [volume.estimate for volume in volumes], ".-", color=MODEL, linewidth=0.8, label=tr("estimate"))
+    axes.set_ylabel(tr("reached volume (m³)"))
+    axes.legend(loc="best")
+
+
+def _draw_litres(axes: Axes, points: list[Point]) -> None:
+    low, high = ([point.litres(bound) for point in points] for bound in ("lower", "upper"))
+    x = [point.value for point in points]
+    axes.vlines(x, low, high, color=REFERENCE, linewidth=3)
+    axes.plot(x, low, "_", color=REFERENCE)
+    axes.set_ylim(bottom=0)
+    axes.set_ylabel(tr("enclosed voids (L)"))
+
+
+def _draw_numbers(axes: Axes, points: list[Point]) -> None:
+    x = [point.value for point in points]
+    numbers = [len(point.enclosed) for point in points]
+    pockets = [len(point.workspace.voids) - count for point, count in zip(points, numbers)]
+    axes.plot(x, pockets, "o", color=MUTED, markerfacecolor="none", label=tr("open pockets"))
+    axes.plot(x, numbers, ".", color=HIGHLIGHT, label=tr("enclosed"))
+    axes.yaxis.get_major_locator().set_params(integer=True)  # type: ignore[call-arg]
+    axes.set_ylim(bottom=-0.5, top=max([*pockets, *numbers, 1]) + 0.5)
+    axes.set_ylabel(tr("voids"))
+    axes.legend(loc="best")
+
+
+def _draw_verdicts(axes: Axes, points: list[Point], stages: list[str]) -> None:
+    rows = list(reversed(stages))
+    seen = set()
+    for point in points:
+        for row, stage in enumerate(rows):
+            status = point.stages[stage].status
+            label = None if status in seen else status_word(status)
+            seen.add(status)
+            axes.plot(point.value, row, MARKERS[status], color=VERDICTS[status], linestyle="none", label=label)
+    axes.set_yticks(range(len(rows)), [tr(PAGES[stage]) for stage in rows])
+    axes.set_ylim(-0.6, len(rows) - 0.4)
+    axes.grid(False, axis="y")
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(seen), borderpad=0)
+
+
+def _caption(points: list[Point], own: float | None, unit: str, workspace: bool) -> str:
+    said = []
+    if workspace and _computed(points):
+        ordered = _in_order(_computed(points))
+        text = N_(
+            "Proven reached volume: {low_1} to {high_1} m³ at {value_1}, {low_2} to {high_2} m³ at {value_2} {unit}."
+        )
+        parts = {"unit": unit}
+        for end, point in enumerate((ordered[0], ordered[-1]), start=1):
+            volume = point.workspace.volume_m3
+            parts |= {f"low_{end}": number(volume.lower), f"high_{end}": number(volume.upper)}
+            parts[f"value_{end}"] = _plain(point.value)
+        said.append(tr(text, **parts))
+    if own is not None:
+        said.append(tr("Dotted: the robot's own value, {value} {unit}.", value=_plain(own), unit=unit))
+    return " ".join(said)
+
+
+def _plain(value: float) -> str:
+    """A varied value with the digits that it is written with."""
+    return f"{value:.9g}".replace("-", "−")
+
+
+def _in_order(points: list[Point]) -> list[Point]:
+    return sorted(points, key=lambda point: point.value)
+
+
+def _table(points: list[Point], what: str, unit: str, stages: list[str]) -> tuple[list[str], list[list[Any]]]:
+    columns = [tr("variant"), f"{what} ({unit})>", *(tr(PAGES[stage]) for stage in stages)]
+    rows = [[point.name, _plain(point.value), *(_verdict(point, stage) for stage in stages)] for point in points]
+    if "workspace" in stages:
+        numbers = (
+            tr("reached volume, at least (m³)"),
+            tr("at most (m³)"),
+            tr("enclosed voids"),
+            tr("their volume, at least (L)"),
+            tr("open pockets"),
+            tr("greatest reach from axis 1 (mm)"),
+        )
+        columns += [f"{label}>" for label in numbers]
+        rows = [[*row, *_workspace_cells(point)] for row, point in zip(rows, points)]
+    return columns, rows
+
+
+def _workspace_cells(point: Point) -> list[str]:
+    if not _computed([point]):
+        return ["–"] * 6
+    summary = point.workspace
+    return [
+        number(summary.volume_m3.lower),
+        number(summary.volume_m3.upper),
+        str(len(point.enclosed)),
+        number(point.litres("lower"), 3),
+        str(len(summary.voids) - len(point.enclosed)),
+        number(1000 * summary.reach_m.furthest_from_axis),
+    ]
+
+
+def _verdict(point: Point, stage: str) -> Markup:
+    status = point.stages[stage].status
+    return Markup('<a href="{}/{}.html"><span class="badge {}">{}</span></a>').format(
+        point.name, stage, status, status_word(status)
+    )
+
+
+CORNERS = 24  # of an arc, at most
+MARGIN_MM = 40.0
+
+
+@dataclass(frozen=True)
+class Thumbnail:
+    """Polylines of an SVG, x to the front and y downwards, in mm: its view box, what bounds the reach, the arm."""
+
+    view_box: str
+    reach: list[str]
+    arm: str
+
+
+def thumbnail(robot: Robot, workspace: WorkspaceResults | AbsentResults | None) -> Thumbnail:
+    """Draw a robot: with the exact border where there is one, else the outline of the sampled hull, if any."""
+    arm = skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000
+    reach = [line * 1000 for line in _reach(workspace)] if isinstance(workspace, WorkspaceResults) else []
+    corners = np.concatenate([arm, *reach])
+    low, high = corners.min(axis=0) - MARGIN_MM, corners.max(axis=0) + MARGIN_MM
+    box = (low[0], -high[1], *(high - low))
+    return Thumbnail(" ".join(f"{value:.0f}" for value in box), [_points(line) for line in reach], _points(arm))
+
+
+def _reach(workspace: WorkspaceResults) -> list[Reals]:
+    border = workspace.border
+    border = border.take((border.view == "side") & (border.point == "tool_point"))
+    if len(border):
+        arcs = [border.take(border.arc == arc) for arc in np.unique(border.arc)]
+        kept = [np.unique(np.linspace(0, len(arc) - 1, CORNERS).round().astype(int)) for arc in arcs]
+        return [np.column_stack([arc.rho_m, arc.z_m])[rows] for arc, rows in zip(arcs, kept)]
+    flat = workspace.hull_vertices.point_m[:, ::2]
+    if len(flat) < 3 or np.ptp(flat, axis=0).min() == 0:
+        return []
+    outline = ConvexHull(flat).vertices
+    return [flat[np.append(outline, outline[0])]]
+
+
+def _points(line: Reals) -> str:
+    return " ".join(f"{x:.0f},{-z:.0f}" for x, z in line)
+
+
+_NO_XML = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
+    """Write the report.
+
+    A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
+    to the robot or has not been computed yet, are skipped; a caution passes and tells what it found.
+    """
+    root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
+    for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
+        own = [verdict for verdict in verdicts if verdict.robot == robot]
+        skipped = sum(_outcome(verdict) == "skipped" for verdict in own)
+        suite = ElementTree.SubElement(root, "testsuite", {"name": robot} | _counts(own) | {"skipped": str(skipped)})
+        for verdict in own:
+            _add_case(suite, verdict)
+    ElementTree.indent(root)
+    content = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    write_atomically(output, lambda file: file.write_bytes(content))
+
+
+def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
+    case = ElementTree.SubElement(suite, "testcase", classname=f"er3a.{verdict.robot}", name=verdict.stage)
+    text = _NO_XML.sub("?", verdict.text)
+    if outcome := _outcome(verdict):
+        ElementTree.SubElement(case, outcome, message=text, type=verdict.code)
+    if verdict.status == "caution":
+        ElementTree.SubElement(case, "system-out").text = f"caution: {text}"
+
+
+def _outcome(verdict: StageVerdict) -> str | None:
+    """The element that says how a case ended; None where it passed."""
+    if verdict.broken:
+        return "error"
+    return {
+        "fail": "failure",
+        "no_reference": "skipped",
+        "not_computed": "skipped",
+        "not_examined": "skipped",
+    }.get(verdict.status)
+
+
+def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
+    outcomes = [_outcome(verdict) for verdict in verdicts]
+    return {
+        "tests": str(len(outcomes)),
+        "failures": str(outcomes.count("failure")),
+        "errors": str(outcomes.count("error")),
+    }
+
 
 SHOWN_FIGURES = 3
 FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass")  # what is open stands first

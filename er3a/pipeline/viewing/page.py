@@ -8,29 +8,32 @@ import platform
 import re
 import shlex
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import jinja2
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from er3a.errors import ResultError
 from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
+from er3a.pipeline.messages.common import say
 from er3a.pipeline.messages.foundations import Caveat, caveat
 from er3a.pipeline.messages.glossary import glossary
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say_all
-from er3a.pipeline.results import Provenance, Stored
+from er3a.pipeline.results import AbsentResults, Provenance, Stored, read_verdict
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.figure_readings import readings
-from er3a.pipeline.viewing.figures import svg_data_uri
+from er3a.pipeline.viewing.figures import readings, svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.recording import escaped, log_note, note_view, recording
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -288,3 +291,40 @@ def _commit() -> str | None:
         return None
     commit = git("rev-parse", "--short=12", "HEAD")
     return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")
+
+
+def table_instead(study: Study, name: str, results: Path) -> str | None:
+    """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out; None
+    where there is none, or none that was computed."""
+    for other in study.other_tables(name):
+        try:
+            status = read_verdict(results / other / "validation")[0]
+        except ResultError:
+            continue
+        if status in ("pass", "caution"):
+            return other
+    return None
+
+
+def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
+    """Write the page: the verdict, and where it comes from."""
+    render(
+        Path(__file__).with_name("absent.html.j2"),
+        output,
+        head=head_of(stored, {}),
+        command=run_command(study, f"{stored.robot}/{stored.stage}.html"),
+        robot=study.robot(stored.robot),
+        robot_pages=study.pages(stored.robot),
+    )
+
+
+def record_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
+    """Write a recording that holds the reason alone."""
+    with recording(output, stored.robot, stored.stage, note_view(stored.stage)) as stream:
+        log_note(stream, stored.stage, escaped(say(stored.results.summary.verdict.finding)))
+
+
+def panel_link(q_deg: Iterable[float], text: str) -> str:
+    """A text that leads to the arm at joint values (deg; mm of joints that slide) in the teach panel."""
+    joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
+    return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)

@@ -1,7 +1,13 @@
 """Colours used the same way in figures and recordings; those of six joints are safe for colour-blind readers.
 
 The joint colours are the qualitative set of M. Okabe and K. Ito, "Color Universal Design", 2008.
+
+One colour for each of the four arm shapes (shoulder, elbow), on the page and in the recording alike.
+
+Safe for colour-blind readers and different from the joints' colours: P. Tol, "Colour schemes", 2021, scheme *bright*.
 """
+
+from __future__ import annotations
 
 SIX_JOINTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
 JOINTS = (*SIX_JOINTS, "#7b4fa3", "#4d4d4d", "#a05a2c", "#80b918")
@@ -29,3 +35,16 @@ VERDICTS = {
 def rgb(colour: str) -> tuple[int, int, int]:
     """Red, green and blue (0..255) of a ``#rrggbb`` colour."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+SHAPE_COLOURS = ("#4477aa", "#ccbb44", "#228833", "#66ccee")
+
+
+def shape_of(branch: int, label: str) -> int:
+    """Number of the arm shape: two wrist branches of the closed form share one; found arms have one each."""
+    return branch if label == "found_arm" else branch // 2
+
+
+def colour_of(shape: int) -> str:
+    """The shape's colour; beyond four the colours repeat."""
+    return SHAPE_COLOURS[shape % len(SHAPE_COLOURS)]

@@ -1,18 +1,37 @@
-"""Starting the Rerun viewer so that nobody else can reach it and it tells nobody of its use."""
+"""Starting the Rerun viewer so that nobody else can reach it and it tells nobody of its use.
+
+Recordings shown in a browser on this machine, for where there is no desktop.
+
+Rerun's own web server would let the viewer in the browser report its use, ask for updates and fetch fonts, and hands
+recordings over without their blueprints. So the viewer's files are taken from it once, and served from here together
+with the recordings, under a policy with which a browser connects to no other address.
+"""
 
 from __future__ import annotations
 
+import io
 import json
 import os
+import re
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import time
+import urllib.request
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from urllib.parse import urlencode
+
+from PIL import Image
+from rerun.experimental import ViewerClient
+
+from er3a.errors import Er3aError
+from er3a.files.kept_files import write_atomically
 
 LOOPBACK = "127.0.0.1"
 LONGEST_S = 120
@@ -87,3 +106,158 @@ def without_statistics() -> Iterator[dict[str, str]]:
         }
         settings.write_text(json.dumps(content), encoding="utf-8")
         yield os.environ | {"XDG_CONFIG_HOME": folder}
+
+
+VIEWER_FILES = ("", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
+POLICY = "default-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' data: blob:"
+SERVER_PATIENCE_S = 30
+
+
+def serve(recordings: Sequence[Path]) -> None:
+    """Serve recordings to a browser on this machine, until Ctrl+C or a request to end (SIGTERM)."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with server(recordings) as listening:
+        port = listening.server_port
+        print("There is no desktop here. Ctrl+C stops what is served to a browser on this machine at")
+        print(f"  {address(listening, recordings)}")
+        print(f"To reach it from another machine: ssh -L {port}:{LOOPBACK}:{port} THIS_MACHINE", flush=True)
+        try:
+            listening.serve_forever()
+        except KeyboardInterrupt:
+            print()
+
+
+def server(recordings: Sequence[Path]) -> ThreadingHTTPServer:
+    """A server on a free port of the loopback address, for the viewer's files and recordings."""
+    files = _viewer_files() | {_place(path): ("application/octet-stream", path.read_bytes()) for path in recordings}
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            kind, content = files.get(self.path.partition("?")[0], (None, b""))
+            self.send_response(200 if kind else 404)
+            self.send_header("Content-Type", kind or "text/plain")
+            self.send_header("Content-Length", str(len(content)))
+            self.send_header("Content-Security-Policy", POLICY)
+            self.end_headers()
+            self.wfile.write(content)
+
+        def log_message(self, *_: object) -> None:
+            """Say nothing of each request."""
+
+    return ThreadingHTTPServer((LOOPBACK, 0), Handler)
+
+
+def address(listening: ThreadingHTTPServer, recordings: Sequence[Path]) -> str:
+    """The address that shows the recordings."""
+    root = f"http://{LOOPBACK}:{listening.server_port}"
+    shown = [("url", root + _place(recording)) for recording in recordings]
+    return f"{root}/?{urlencode([('hide_welcome_screen', ''), ('persist', '0'), *shown], safe=':/')}"
+
+
+def _place(recording: Path) -> str:
+    return f"/{recording.parent.name}/{recording.name}"
+
+
+def _viewer_files() -> dict[str, tuple[str, bytes]]:
+    """Type and content of the web viewer's files, by path."""
+    port, deadline = free_port(), time.monotonic() + SERVER_PATIENCE_S
+    words = ("--serve-web", "--port", str(free_port()), "--web-viewer-port", str(port))
+    with viewer_running([], *words) as viewer:
+        while viewer.poll() is None and time.monotonic() < deadline:
+            try:
+                return {f"/{name}": _fetched(f"http://{LOOPBACK}:{port}/{name}") for name in VIEWER_FILES}
+            except OSError:
+                time.sleep(0.05)
+    raise Er3aError("Rerun's web viewer does not start; on a machine with a desktop `er3a view` opens a window")
+
+
+def _fetched(url: str) -> tuple[str, bytes]:
+    with urllib.request.urlopen(url, timeout=SERVER_PATIENCE_S) as answer:
+        kind, content = answer.headers["Content-Type"], answer.read()
+    # No policy keeps a browser from connecting ahead of a font that it may not load then.
+    return kind, re.sub(rb"<link\b[^>]*https://[^>]*>", b"", content) if kind.startswith("text/html") else content
+
+
+WINDOW = (1200, 780)  # pixels
+TITLE_BAR = 36
+TIME_BAR = 34  # left out: it fills as loading goes
+QUALITY = 75
+PATIENCE_S = 60
+
+
+def draw_preview(recording: Path, output: Path) -> str | None:
+    """Draw a recording as a WebP picture.
+
+    Returns
+    -------
+    why it could not be drawn, None if it was; what could not be drawn becomes an empty file
+    """
+    try:
+        picture = _picture(recording)
+    except Er3aError as error:
+        write_empty(output)
+        return str(error)
+    write_atomically(output, lambda file: file.write_bytes(picture))
+    return None
+
+
+def write_empty(output: Path) -> None:
+    """Write the picture of a recording that is not drawn."""
+    write_atomically(output, lambda file: file.write_bytes(b""))
+
+
+def _picture(recording: Path) -> bytes:
+    with TemporaryDirectory(prefix="er3a-preview-") as folder:
+        shot, messages, port = Path(folder) / "shot.png", Path(folder) / "messages", free_port()
+        size = "x".join(map(str, WINDOW))
+        words = ("--headless", "--port", str(port), "--window-size", size, "--hide-welcome-screen")
+        with viewer_running([recording], *words, messages=messages) as viewer:
+            try:
+                _shoot(port, viewer, shot)
+            except EOFError:
+                raise Er3aError(_why(messages.read_text(errors="replace"))) from None
+        image = Image.open(shot).convert("RGB")
+        views = image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR))
+        encoded = io.BytesIO()
+        views.save(encoded, "WEBP", quality=QUALITY, method=6)
+        return encoded.getvalue()
+
+
+def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path) -> None:
+    """Have the viewer save pictures until one is like the one before: everything is loaded then.
+
+    Raises
+    ------
+    EOFError
+        if the viewer ends
+    Er3aError
+        if that takes longer than PATIENCE_S
+    """
+    client, bare, before = None, False, b""
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        if viewer.poll() is not None:
+            raise EOFError
+        try:
+            client = client or ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy")
+            state = client.get_state()
+            if not state.active_recording or state.loading:
+                time.sleep(0.05)
+                continue
+            if not bare:
+                client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
+                bare = True
+            client.save_screenshot(str(shot))
+        except (ConnectionError, RuntimeError):
+            time.sleep(0.05)
+            continue
+        if shot.read_bytes() == before:
+            return
+        before = shot.read_bytes()
+    raise Er3aError(f"the viewer drew no steady picture in {PATIENCE_S} s")
+
+
+def _why(messages: str) -> str:
+    panic = re.search(r"panicked at '(.+?)'\n", messages, flags=re.DOTALL)
+    said = panic[1] if panic else (messages.strip().splitlines() or ["without a word"])[-1]
+    return f"the Rerun viewer ended: {said} (docs/recordings.md tells what it needs)"

@@ -140,3 +140,6 @@ class AccelerationExceeded:
 
     ratio: float
     code: Literal["acceleration_exceeded"] = "acceleration_exceeded"
+
+
+StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop", "planned"]

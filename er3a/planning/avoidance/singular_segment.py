@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
 from er3a.planning.avoidance.avoidance_findings import NotPossible
-from er3a.planning.followed import Followed
+from er3a.planning.follow import Followed
 from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits, Timed, fastest, nodes_along, straight
 from er3a.robots.robot import Robot

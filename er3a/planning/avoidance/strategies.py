@@ -1,33 +1,297 @@
-"""All strategies of singularity avoidance side by side: what each costs, and which one to take."""
+"""All strategies of singularity avoidance side by side: what each costs, and which one to take.
+
+Damped least squares: joint speeds stay bounded near a singularity, at the price of leaving the path.
+
+The joints follow the tool's programmed velocity plus a part of the error made so far, through the damped inverse of the
+Jacobian [1]_. The damping sets in where the smallest singular value falls below ``THRESHOLD`` and grows towards the
+singularity [2]_.
+
+References
+----------
+.. [1] Y. Nakamura, H. Hanafusa, "Inverse kinematic solutions with singularity robustness for robot manipulator
+   control", J. Dynamic Systems, Measurement, and Control 108(3), 1986.
+.. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 3.5.2; the damping's course:
+   S. Chiaverini et al., IEEE Trans. Control Systems Technology 2(2), 1994, equation 13.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+import scipy
 
-from er3a.kinematics.forward import forward
+from er3a.errors import PoseError
+from er3a.kinematics.chain import constant_links
+from er3a.kinematics.closed_form import SLOTS
+from er3a.kinematics.forward import forward, rows_of, step_row, turn_row
+from er3a.kinematics.singularity import characteristic_length
 from er3a.numerics.arrays import Reals
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.planning.avoidance.avoidance_findings import (
     AccelerationExceeded,
+    BeginsInRegion,
+    BeginsOutOfReach,
+    BranchEnds,
     EndsOffPath,
+    EndsOutOfReach,
+    NoDampingSuffices,
+    NoOtherBranch,
+    NoSingularRegion,
+    NothingToAvoid,
     NotPossible,
+    PartlyOutOfReach,
     PathNotFinished,
     SpeedExceeded,
+    StrategyName,
 )
-from er3a.planning.avoidance.damped_least_squares import damped
-from er3a.planning.avoidance.deviation import deviation
-from er3a.planning.avoidance.joint_detour import detour
-from er3a.planning.avoidance.other_branch import branch
-from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, Strategy
-from er3a.planning.avoidance.slow_down import slow
-from er3a.planning.avoidance.stop_before import stop
-from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, Strategy, coarse, singular_segment
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
-from er3a.planning.timing import Timed, TimingError
+from er3a.planning.follow import Followed, follow
+from er3a.planning.timing import Timed, TimingError, joined, straight, through
 from er3a.planning.way_around import NoWayAround
-from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
+from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded, within
+
+STEPS = 1000
+THRESHOLD = 0.1  # of the smallest singular value, linear rows divided by the characteristic length
+FEEDBACK = 10.0  # 1/s
+DAMPINGS = np.geomspace(2e-3, 0.5, 9)
+
+Row = tuple[float, float, float, float]
+
+
+def damped(segment: SingularSegment) -> Avoidance | NotPossible:
+    """Follow the path on its own time law, with the least damping that keeps the joints within their limits.
+
+    Where no damping bounds the accelerations too, it is the least that bounds the speeds.
+    """
+    if np.isnan(segment.q[0, 0]):
+        return BeginsOutOfReach()
+    line = segment.followed.line
+    t = np.linspace(0.0, line.duration, STEPS + 1)
+    T = line.poses(line.progress(t)[0])
+    runs = [_run(segment, t, T, damping) for damping in DAMPINGS]
+    ratios = np.array([motion.ratios(segment.limits) for motion in runs])
+    held = np.flatnonzero((ratios <= 1.0).all(axis=1))
+    if not held.size:
+        held = np.flatnonzero(ratios[:, 0] <= 1.0)
+    if not held.size:
+        return NoDampingSuffices()
+    best = runs[int(held[0])]
+    return Avoidance(joined([*segment.begin(), best]))
+
+
+def _run(segment: SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
+    robot = segment.robot
+    q = np.empty((len(t), 6))
+    q[0] = segment.q[0]
+    length = characteristic_length(robot)
+    _damped_steps(robot.direction, robot.offset, constant_links(robot), T, t[1] - t[0], length, damping, q)
+    return through(t, q)
+
+
+@kernel
+def _damped_steps(
+    direction: Reals, offset: Reals, links: Reals, T: Reals, dt: float, length: float, damping: float, q: Reals
+) -> None:
+    """Fill ``q`` (N, 6) from its first row on: the joints that run after the poses ``T`` (N, 4, 4)."""
+    J, wanted = np.empty((6, 6)), np.empty(6)
+    for n in range(q.shape[0] - 1):
+        tool = _scaled_jacobian(q[n], direction, offset, links, length, J)
+        _pull(tool, T[n], T[n + 1], FEEDBACK * dt, length, wanted)
+        u, values, vt = np.linalg.svd(J)
+        smallest = values[5]
+        squared = 0.0
+        if smallest < THRESHOLD:
+            squared = damping**2 * (1.0 - (smallest / THRESHOLD) ** 2)
+        for j in range(6):
+            q[n + 1, j] = q[n, j]
+        for k in range(6):
+            along = 0.0
+            for r in range(6):
+                along += u[r, k] * wanted[r]
+            along *= values[k] / (values[k] ** 2 + squared + 1e-16)
+            for j in range(6):
+                q[n + 1, j] += vt[k, j] * along
+
+
+@inner_kernel
+def _pull(tool: tuple[Row, Row, Row], now: Reals, then: Reals, gain: float, length: float, wanted: Reals) -> None:
+    """The step (6,) asked for: from one target to the next, and ``gain`` times from the tool to the target now."""
+    for r in range(3):
+        wanted[r] = (then[r, 3] - now[r, 3] + gain * (now[r, 3] - tool[r][3])) / length
+        wanted[3 + r] = 0.0
+    for c in range(3):
+        for r in range(3):
+            a, b = (r + 1) % 3, (r + 2) % 3
+            wanted[3 + r] += 0.5 * (now[a, c] * then[b, c] - now[b, c] * then[a, c])
+            wanted[3 + r] += 0.5 * gain * (tool[a][c] * now[b, c] - tool[b][c] * now[a, c])
+
+
+@inner_kernel
+def _scaled_jacobian(
+    q: Reals, direction: Reals, offset: Reals, links: Reals, length: float, J: Reals
+) -> tuple[Row, Row, Row]:
+    """Fill ``J`` (6, 6), linear rows divided by ``length``; the tool's frame as three rows."""
+    x, y, z = rows_of(links[0])
+    points = np.empty((6, 3))
+    for k in range(6):
+        sign = direction[k]
+        points[k, 0], points[k, 1], points[k, 2] = x[3], y[3], z[3]
+        J[3, k], J[4, k], J[5, k] = sign * x[2], sign * y[2], sign * z[2]
+        angle, link = sign * q[k] + offset[k], links[k + 1]
+        c, s = np.cos(angle), np.sin(angle)
+        x, y, z = turn_row(x, c, s), turn_row(y, c, s), turn_row(z, c, s)
+        x, y, z = step_row(x, link), step_row(y, link), step_row(z, link)
+    for k in range(6):
+        a, b, c = x[3] - points[k, 0], y[3] - points[k, 1], z[3] - points[k, 2]
+        J[0, k] = (J[4, k] * c - J[5, k] * b) / length
+        J[1, k] = (J[5, k] * a - J[3, k] * c) / length
+        J[2, k] = (J[3, k] * b - J[4, k] * a) / length
+    return x, y, z
+
+
+def detour(segment: SingularSegment) -> Avoidance | NotPossible:
+    """Follow the path up to the last good pose, move the joints to the next good one, and go on, at every region.
+
+    Where the path begins or ends inside a region, its first or last joints take the place of the good pose.
+    """
+    if not segment.regions:
+        return NoSingularRegion()
+    count, at = len(segment.t), 0
+    parts: list[Timed] = []
+    for first, last in segment.regions:
+        before, after = max(first - 1, 0), min(last, count - 1)
+        if np.isnan(segment.q[before, 0]):
+            return BeginsOutOfReach()
+        if np.isnan(segment.q[after, 0]):
+            return EndsOutOfReach()
+        if before > at:
+            parts += [*(segment.begin() if at == 0 else []), segment.along(at, before)]
+        leave = segment.q[before] if before > 0 else segment.first_joints
+        parts.append(straight(leave, segment.q[after], segment.limits))
+        at = after
+    if at < count - 1:
+        parts.append(segment.along(at, count - 1))
+    return Avoidance(joined(parts))
+
+
+COARSE = 201
+
+
+def branch(segment: SingularSegment) -> Avoidance | NotPossible:
+    """Change to another branch by a joint move at rest, and follow the rest of the path on it.
+
+    A change before the path begins is preferred: where only the tool's pose is given there, the arm may as well begin
+    on that branch. Else the change is made at the last good pose. Of the branches on which the rest keeps its distance
+    within the limits, the one nearest in joint travel is taken.
+    """
+    bad = ~(segment.good & within(segment.robot, segment.q))
+    if not bad.any():
+        return NothingToAvoid()
+    few = np.linspace(0.0, segment.followed.line.duration, COARSE)
+    others = [_follow(segment, slot, few) for slot in range(SLOTS) if slot != segment.followed.slot[0]]
+    begin = max(int(np.argmax(bad)) - 1, 0)
+    for index in sorted({0, begin}):
+        leave = segment.first_joints if index == 0 else segment.q[index]
+        found = []
+        for other in others:
+            if other is not None and _keeps_clear(segment, other, segment.t[index]):
+                step = other.joints(segment.t[index : index + 1])[0] - leave
+                found.append((float(np.abs(step / segment.limits.speed).max()), int(other.slot[0])))
+        for _, slot in sorted(found):
+            times = np.union1d(coarse(segment.t), segment.t[index])
+            other = _follow(segment, slot, times)
+            if other is not None and _keeps_clear(segment, other, segment.t[index]):
+                return _changed(segment, other, index, leave)
+    return NoOtherBranch()
+
+
+def _follow(segment: SingularSegment, slot: int, t: Reals) -> Followed | None:
+    try:
+        return follow(segment.robot, segment.followed.line, t, start_slot=slot)
+    except PoseError:
+        return None
+
+
+def _keeps_clear(segment: SingularSegment, other: Followed, start: float) -> bool:
+    rest = other.q[np.searchsorted(other.t, start) :]
+    if other.jumps or np.isnan(rest[:, 0]).any() or not within(segment.robot, rest).all():
+        return False
+    return bool(segment.near.margin(segment.robot, rest).min() >= 1.0)
+
+
+def _changed(segment: SingularSegment, followed: Followed, index: int, leave: Reals) -> Avoidance:
+    other = singular_segment(followed, segment.near, segment.limits)
+    at = int(np.searchsorted(other.t, segment.t[index]))
+    before = [*segment.begin(), segment.along(0, index)] if index > 0 else []
+    waits = index == 0 and not segment.fixed_start
+    change = [] if waits else [straight(leave, other.q[at], segment.limits)]
+    return Avoidance(joined([*before, *change, other.along(at, len(other.t) - 1)]))
+
+
+def slow(segment: SingularSegment) -> Avoidance | NotPossible:
+    """Follow the path exactly, as programmed wherever the joints can, slower where they can't."""
+    if np.isnan(segment.q[:, 0]).any():
+        return PartlyOutOfReach()
+    if segment.followed.jumps:
+        jump = segment.followed.jumps[0]
+        return BranchEnds(jump.t, jump.joint)
+    return Avoidance(joined([*segment.begin(), segment.along(0, len(segment.t) - 1)]))
+
+
+def stop(segment: SingularSegment) -> Avoidance | NotPossible:
+    """Follow the path exactly, and come to rest at the last pose that keeps its distance."""
+    if not segment.regions:
+        return NoSingularRegion()
+    last = segment.regions[0][0] - 1
+    if last < 1:
+        return BeginsInRegion()
+    motion = joined([*segment.begin(), segment.along(0, last)])
+    return Avoidance(motion, done=float(segment.followed.line.progress(segment.t[last])[0]))
+
+
+POINTS = 2001
+LENGTH = 0.001 / np.radians(1.0)  # m per rad
+
+
+class HasPoses(Protocol):
+    """A way of the tool in space."""
+
+    def poses(self, progress: Reals) -> Reals:
+        """T_base_tool (..., 4, 4) at shares of the way (...,)."""
+
+
+def deviation(line: HasPoses, T: Reals) -> tuple[Reals, Reals, Reals]:
+    """Distance and angle of poses from the path's nearest pose, where 1 mm weighs as much as 1 deg.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), T_base_tool
+
+    Returns
+    -------
+    distance : (N,), m; angle : (N,), rad; progress : (N,), the nearest pose's share of the way
+    """
+    progress = np.linspace(0.0, 1.0, POINTS)
+    on_path, at = _points(line.poses(progress)), _points(T)
+    _, near = scipy.spatial.cKDTree(on_path).query(at)
+    middle = np.clip(near, 1, POINTS - 2)
+    squares = np.stack([((at - on_path[middle + k]) ** 2).sum(axis=1) for k in (-1, 0, 1)])
+    curvature = squares[0] - 2 * squares[1] + squares[2]
+    offset = np.divide(squares[0] - squares[2], 2 * curvature, out=np.zeros(len(T)), where=curvature > 0)
+    refined = progress[middle] + np.clip(offset, -1.0, 1.0) / (POINTS - 1)
+    nearest = line.poses(refined)
+    distance = np.linalg.norm(T[:, :3, 3] - nearest[:, :3, 3], axis=1)
+    chord = np.linalg.norm(T[:, :3, :3] - nearest[:, :3, :3], axis=(1, 2)) / np.sqrt(8.0)
+    return distance, 2 * np.arcsin(np.minimum(chord, 1.0)), refined
+
+
+def _points(T: Reals) -> Reals:
+    return np.concatenate([T[:, :3, 3] / LENGTH, T[:, :3, :3].reshape(-1, 9) / np.sqrt(2.0)], axis=1)
+
 
 STRATEGIES: dict[StrategyName, Strategy] = {
     "slow": slow,

@@ -17,8 +17,7 @@ import numpy as np
 import scipy
 
 from er3a.kinematics.forward import frames
-from er3a.kinematics.near_singular import factor_of
-from er3a.kinematics.singularity import TYPES, SingularityType, characteristic_length, determinant_factors
+from er3a.kinematics.singularity import TYPES, SingularityType, characteristic_length, determinant_factors, factor_of
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
 from er3a.planning.avoidance import avoidance_findings

@@ -16,10 +16,20 @@ from er3a.pipeline.stages.collision.model import CollisionResults, PathClearance
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINTS, MODEL, MUTED, VERDICTS, rgb
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, seconds, send_series
-from er3a.pipeline.viewing.scene_entities import log_scene, pieces_mesh
+from er3a.pipeline.viewing.recording import (
+    ARM,
+    TIMELINE,
+    escaped,
+    log_note,
+    log_scene,
+    note_view,
+    pieces_mesh,
+    recording,
+    seconds,
+    send_series,
+)
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.robots.shown import meant
 
 STAGE = "collision"
 PAUSE = 0.5  # s between two paths

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import ListedColormap
 
-from er3a.collision.pairs import TRIED
+from er3a.collision.shapes import TRIED
 from er3a.files.scene_file import load_scene
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
@@ -15,7 +17,6 @@ from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.collision.collision_figures import by_pair, clearance_over_time, closest_pair, workspace
 from er3a.pipeline.stages.collision.model import (
     STATES,
     Closest,
@@ -26,10 +27,155 @@ from er3a.pipeline.stages.collision.model import (
     TargetClearances,
 )
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.arm import skeleton
+from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.pipeline.viewing.page import head_of, render, run_command
+from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.robots.shown import meant
+
+MOST_PAIRS = 12
+COLUMNS = 4
+ROW_HEIGHT = 1.5
+LOST, CLEAR, JOINED = 0, 1, 2
+
+
+def by_pair(pairs: PairShares) -> Picture | None:
+    """How much of joint space each pair takes; None where none takes any."""
+    shown = pairs.take(np.flatnonzero(pairs.ratio > 0)[:MOST_PAIRS])
+    if not len(shown):
+        return None
+    figure, ax = new_figure(width=9.0, height=0.8 + 0.28 * len(shown))
+    y = np.arange(len(shown))[::-1]
+    spread = 100 * np.abs(np.stack([shown.ratio - shown.low, shown.high - shown.ratio]))
+    colours = [MODEL if own else REFERENCE for own in shown.of_itself]
+    ax.barh(y, 100 * shown.ratio, color=colours, xerr=spread, ecolor=INK, height=0.7)
+    ax.set_yticks(y, [say(pair) for pair in shown.between])
+    ax.set_xlabel(tr("share of the joint space in which the pair overlaps (%)"))
+    worst = say(shown.between[0])
+    caption = tr(
+        "{pair} collide most often: in {percent} % of the joint space. Blue: self-collision; orange: with the "
+        "scene. Lines: 95 % intervals.",
+        pair=worst[:1].upper() + worst[1:],
+        percent=fixed(100 * shown.ratio[0], 1),
+    )
+    return Picture(figure, tr("Bars: share of joint space per pair. {conclusion}", conclusion=caption), caption)
+
+
+def workspace(results: CollisionResults) -> Picture:
+    """From the side and from above: what of the reached places is clear, joined to home, or lost."""
+    rows = results.places
+    state = np.where(rows.joined, JOINED, np.where(rows.clear, CLEAR, LOST))
+    figure, axes = new_figure(1, 2, width=11.0, height=5.2)
+    cell = results.summary.places.cell_m * 1000
+    labels = (tr("x (mm)"), tr("y (mm)"), tr("z (mm)"))
+    for ax, (across, up), title in zip(axes, ((0, 2), (0, 1)), (tr("From the side"), tr("From above"))):
+        mesh = _columns(ax, rows.middle_mm[:, [across, up]], state, cell)
+        equal_scale(ax, labels[across], labels[up])
+        ax.set_title(title)
+    figure.colorbar(mesh, ax=axes.tolist(), label=tr("reached cells lost to collisions (%)"), shrink=0.8)
+    found = results.summary.places
+    caption = tr(
+        "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of"
+        " {reached} cells reached, {clear} have a collision-free configuration (proven), {joined} of these "
+        "connected to home by a proven motion. In the others none was found in {tries} tries in all, so their "
+        "volume of {lost} L overestimates the loss. Ringed: columns with collision-free cells that are not "
+        "connected to home.",
+        cell=cell,
+        reached=found.reached,
+        clear=found.clear,
+        joined=found.joined,
+        tries=found.tries_in_lost,
+        lost=fixed(found.lost_m3 * 1000, 0),
+    )
+    return Picture(figure, tr("Two views of the cells reached. {conclusion}", conclusion=caption), caption)
+
+
+def _columns(ax, at: np.ndarray, state: np.ndarray, cell: float) -> QuadMesh:
+    """One square for each column of cells: the share that is lost as its shade, a ring where some is not joined."""
+    low = at.min(axis=0)
+    index = np.round((at - low) / cell).astype(int)
+    size = index.max(axis=0) + 1
+    count, lost, apart = np.zeros((3, *size))
+    np.add.at(count, tuple(index.T), 1)
+    np.add.at(lost, tuple(index[state == LOST].T), 1)
+    np.add.at(apart, tuple(index[state == CLEAR].T), 1)
+    share = np.where(count > 0, lost / np.maximum(count, 1), np.nan)
+    edges = [low[k] + cell * (np.arange(size[k] + 1) - 0.5) for k in (0, 1)]
+    colours = ListedColormap([_mixed(k / 20) for k in range(21)])
+    mesh = ax.pcolormesh(
+        *edges, 100 * share.T, cmap=colours, vmin=0, vmax=100, edgecolors="white", linewidth=0.3, rasterized=True
+    )
+    ringed = np.argwhere(apart > 0)
+    ax.plot(*(low + cell * ringed).T, "o", markerfacecolor="none", markeredgecolor=HIGHLIGHT, markersize=5)
+    return mesh
+
+
+def _mixed(share: float) -> tuple[float, ...]:
+    """From the colour of a pass to that of a fail."""
+    ends = [np.array([int(VERDICTS[key][k : k + 2], 16) for k in (1, 3, 5)]) / 255 for key in ("pass", "fail")]
+    return tuple(1 - (0.35 + 0.65 * share) * (1 - (1 - share) * ends[0] - share * ends[1]))
+
+
+def clearance_over_time(results: CollisionResults) -> Picture | None:
+    """Least distance over time, path by path."""
+    rows = results.paths
+    names = [str(name) for name in dict.fromkeys(rows.path) if np.isfinite(rows.clearance_mm[rows.path == name]).any()]
+    if not names:
+        return None
+    count = -(-len(names) // COLUMNS)
+    figure, axes = new_figure(count, COLUMNS, width=11.0, height=ROW_HEIGHT * count + 0.4, sharey=True, squeeze=False)
+    panels = list(zip(axes.flat, names))
+    for ax, name in panels:
+        part = rows.take(rows.path == name)
+        ax.plot(part.t_s, part.clearance_mm, color=MODEL)
+        ax.fill_between(part.t_s, part.clearance_mm, 0, where=part.clearance_mm < 0, color=VERDICTS["fail"], alpha=0.5)
+        ax.axhline(0, color=INK, linewidth=0.8)
+        ax.set_title(name, fontsize=9)
+    for ax in axes.flat[len(names) :]:
+        ax.set_visible(False)
+    for ax in axes[:, 0]:
+        ax.set_ylabel(tr("clearance (mm)"), fontsize=8)
+    for ax in axes[-1]:
+        ax.set_xlabel(tr("time (s)"), fontsize=8)
+    met = [found.name for found in results.summary.closest if found.kind == "path" and found.clearance_mm < 0]
+    caption = (
+        tr("Below zero bodies overlap: {paths}.", paths=", ".join(met))
+        if met
+        else tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
+    )
+    alt = tr("Clearance over time, one panel per path. {conclusion}", conclusion=caption)
+    return Picture(figure, alt, caption, panels)
+
+
+def closest_pair(robot: Robot, found: Closest) -> Picture:
+    """The arm where it is nearest to anything, from the side and from above, with the two points."""
+    points = skeleton(robot, meant(robot, np.array(found.q_deg))) * 1000
+    pair = np.array([found.from_mm, found.to_mm])
+    figure, axes = new_figure(1, 2, width=11.0, height=4.6)
+    labels = (tr("x (mm)"), tr("y (mm)"), tr("z (mm)"))
+    for ax, (across, up), title in zip(axes, ((0, 2), (0, 1)), (tr("From the side"), tr("From above"))):
+        ax.plot(points[:, across], points[:, up], color=LINK, linewidth=7, solid_capstyle="round", zorder=1)
+        ax.plot(points[:, across], points[:, up], color=MUTED, linewidth=1, zorder=2)
+        ax.plot(pair[:, across], pair[:, up], "o-", color=HIGHLIGHT, markersize=5, zorder=3)
+        equal_scale(ax, labels[across], labels[up])
+        ax.set_title(title)
+    caption = tr(
+        "{name}: {pair}, {clearance} mm apart; the line joins the two nearest points of their surfaces.",
+        name=found.name,
+        pair=say(found.between),
+        clearance=fixed(found.clearance_mm, 1),
+    )
+    if found.clearance_mm < 0:
+        caption = tr(
+            "{name}: {pair} overlap by {depth} mm; the line joins the points of deepest penetration.",
+            name=found.name,
+            pair=say(found.between),
+            depth=fixed(-found.clearance_mm, 1),
+        )
+    return Picture(figure, caption, caption)
+
 
 NO_BREAK_SPACE = "\u00a0"
 MOST_ROWS = 100  # of a table of targets and paths

@@ -2,36 +2,375 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
-from er3a.dynamics.arm_model import drives_of
-from er3a.dynamics.holding import worst_holding
-from er3a.dynamics.link_shapes import estimated_links
-from er3a.dynamics.plausibility import mass_findings
-from er3a.dynamics.uncertainty import ASSUMED
-from er3a.files.load_file import load_of
-from er3a.pipeline.results import Figure
-from er3a.pipeline.stages.dynamics.drive_verdict import drive_uses, unknowns, verdict_of
+from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
+from er3a.dynamics.margins import (
+    ASSUMED,
+    DriveLimits,
+    Margin,
+    greatest_payload,
+    greatest_speed_scale,
+    load_tolerance,
+    tolerances_of,
+    torque_tolerance,
+)
+from er3a.dynamics.plausibility import MassFinding, MissingLink, mass_findings
+from er3a.dynamics.torque_timing import fastest_under_torques
+from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
+from er3a.dynamics.wrist import load_diagram, wrist_use
+from er3a.files.robot_library import load_of
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.dynamics.model import (
+    AllWithin,
+    BindingLimit,
+    DataOpen,
+    DiagramRows,
     DynamicsResults,
     DynamicsSummary,
     HoldingTorque,
+    JointLoad,
     LinkEntry,
+    Marginal,
     MassesUsed,
     MotorNeed,
+    Need,
+    NoData,
+    NoLimits,
+    Overload,
+    PathLoad,
     TolerancesUsed,
     TorqueRows,
+    Use,
+    WristMoment,
     hardest_held,
 )
-from er3a.pipeline.stages.dynamics.path_loads import LoadedArm, PathTorques, path_torques
-from er3a.pipeline.stages.dynamics.wrist_check import diagram_rows, wrist_uses
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.listed_motions import study_motions
-from er3a.pipeline.stages.trajectory.motion_demands import limits_of
+from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, study_motions
 from er3a.pipeline.study import Study
-from er3a.robots.masses import LinkMass, Load, MassBody, Masses
+from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
+from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
 from er3a.robots.robot import Grade, Robot
+
+DynamicsVerdict = Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
+
+
+def drive_uses(robot: Robot, paths: tuple[PathLoad, ...], holding: tuple[HoldingTorque, ...]) -> tuple[Use, ...]:
+    """Peak and effective torques of the paths against peak and rated ones, holding torques against rated ones."""
+    drives, found = drives_of(robot), []
+    for path in paths:
+        for load in path.joints:
+            peak, rated = (float(limit[load.joint - 1]) for limit in (drives.peak, drives.rated))
+            if np.isfinite(peak):
+                upper = load.peak + load.tolerance
+                found.append(Use("peak", load.joint, path.name, load.peak, upper, peak, load.unit))
+            if np.isfinite(rated):
+                upper = load.rms + load.rms_tolerance
+                found.append(Use("rms", load.joint, path.name, load.rms, upper, rated, load.unit))
+    for held in holding:
+        rated = float(drives.rated[held.joint - 1])
+        if np.isfinite(rated):
+            upper = held.bound + held.tolerance
+            found.append(Use("holding", held.joint, None, abs(held.torque), upper, rated, held.unit))
+    return tuple(found)
+
+
+def unknowns(robot: Robot, load: Load | None) -> tuple[DataOpen, ...]:
+    """What the files leave open, with links or joints."""
+    drives, wrist, joints = drives_of(robot), robot.masses.wrist, range(1, robot.joints + 1)
+    links = tuple(link for link in range(1, robot.rows + 1) if robot.masses.body(link) is None)
+    open_joints: dict[Need, tuple[int, ...]] = {
+        "masses": links,
+        "peak": _open(drives.peak),
+        "rated": _open(drives.rated),
+        "armature": _open(drives.armature),
+        "friction": _open(drives.coulomb + drives.viscous),
+    }
+    found = [
+        DataOpen(what, () if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers)
+        for what, numbers in open_joints.items()
+        if numbers
+    ]
+    last = {joint for joint in joints[-3:] if not robot.slides[joint - 1]}
+    if wrist is None or not np.isfinite(wrist.payload):
+        found.append(DataOpen("payload"))
+    asked: tuple[tuple[Need, set[int]], ...] = (
+        ("wrist_moment", last - {joint for joint, _ in (wrist.moment if wrist else ())}),
+        ("wrist_inertia", last - {joint for joint, _ in (wrist.inertia if wrist else ())}),
+    )
+    found += [DataOpen(what, tuple(sorted(missing))) for what, missing in asked if missing]
+    return (*found, DataOpen("load")) if load is None else tuple(found)
+
+
+def _open(values: np.ndarray) -> tuple[int, ...]:
+    return tuple((np.flatnonzero(np.isnan(values)) + 1).tolist())
+
+
+def verdict_of(
+    paths: tuple[PathLoad, ...],
+    holding: tuple[HoldingTorque, ...],
+    uses: tuple[Use, ...],
+    findings: tuple[MassFinding, ...],
+    unknown: tuple[DataOpen, ...],
+    masses: MassesUsed | None,
+) -> DynamicsVerdict:
+    """Fit, marginal, overload; no_reference where there is nothing to compare, or no limit to compare it with."""
+    missing = tuple(found.link for found in findings if isinstance(found, MissingLink))
+    doubts = len(findings) - len(missing)
+    inferred = masses is not None and masses.grade == "inferred"
+    if not uses:
+        if not holding:
+            return Verdict("no_reference", NoData(unknown))
+        return Verdict("no_reference", _no_limits(paths, holding, missing, doubts, inferred))
+    beyond = sum(use.ratio > 1 for use in uses)
+    unlimited: tuple[Need, ...] = tuple(
+        each.what for each in unknown if each.what in ("peak", "rated", "wrist_moment", "wrist_inertia", "payload")
+    )
+    at_limit = any(use.upper > use.allowed for use in uses)
+    kind = Overload if beyond else Marginal if at_limit or doubts else AllWithin
+    status: Status = "fail" if beyond else "caution" if at_limit or doubts else "pass"
+    return Verdict(status, kind(len(uses), beyond, uses[0], unlimited, missing, doubts, inferred))
+
+
+def _no_limits(
+    paths: tuple[PathLoad, ...],
+    holding: tuple[HoldingTorque, ...],
+    missing: tuple[int, ...],
+    doubts: int,
+    inferred: bool,
+) -> NoLimits:
+    followed = [path for path in paths if path.complete]
+    if followed:
+        path = max(followed, key=lambda path: path.hardest.peak)
+        load, shown = path.hardest, (missing, doubts, inferred)
+        return NoLimits(len(followed), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
+    held = hardest_held(holding)
+    return NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred)
+
+
+@dataclass(frozen=True)
+class LoadedArm:
+    """An arm with what hangs on it.
+
+    Attributes
+    ----------
+    unit_payload : 1 kg of the payload whose greatest mass is asked for
+    links_grade, load_grade : of the masses
+    limits : joint speeds and accelerations, partly assumed
+    """
+
+    robot: Robot
+    load: Load | None
+    unit_payload: MassBody
+    gravity: float
+    links_grade: Grade
+    load_grade: Grade
+    limits: JointLimits
+
+    @cached_property
+    def model(self) -> ArmModel:
+        """With its load."""
+        return arm_model(self.robot, self.load, self.gravity)
+
+    @cached_property
+    def with_unit(self) -> ArmModel:
+        """With its load and 1 kg more."""
+        bodies = [body for body in (self.load, self.unit_payload) if body]
+        whole = together(bodies)
+        return arm_model(self.robot, Load(whole.mass, whole.centre, whole.inertia), self.gravity)
+
+    @cached_property
+    def bare(self) -> ArmModel:
+        """Without its load."""
+        return arm_model(self.robot, None, self.gravity)
+
+    def tolerance(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
+        """Half-widths (N, n) of the torques' intervals."""
+        return torque_tolerance(self.model, q, qd, qdd, self.links_grade, self.load_grade)
+
+
+@dataclass(frozen=True, eq=False)
+class PathTorques:
+    """A path with its torques; ``inertia`` (n, 2): least and greatest that each joint moves, without rotor."""
+
+    summary: PathLoad
+    rows: TorqueRows
+    demand: Demand | None
+    inertia: Reals
+    imbalance: float | None
+
+
+def path_torques(arm: LoadedArm, motion: Motion, samples: int, wrist: tuple[int, ...]) -> PathTorques:
+    """Torques of a path at evenly spread times; ``wrist``: joints whose moments by the load are wanted."""
+    entry, n = motion.entry, arm.robot.joints
+    t = np.linspace(0.0, motion.built.duration, samples)
+    q, qd, qdd = motion.rates(t)
+    if not np.isfinite([q, qd, qdd]).all():
+        absent = PathLoad(entry.name, entry.title, False, float(t[-1]), (), (), None, None, None, None, None)
+        return PathTorques(absent, TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
+    parts = torque_parts(arm.model, q, qd, qdd)
+    tau, tolerance = parts.total, arm.tolerance(q, qd, qdd)
+    asked = demand(t, qd, tau)
+    own = np.diagonal(arm.model.mass_matrix(q), axis1=1, axis2=2)
+    payload, scale = _margins(arm, parts, t, q, qd, qdd)
+    timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
+    summary = PathLoad(
+        name=entry.name,
+        title=entry.title,
+        complete=True,
+        duration_s=float(t[-1]),
+        joints=_joint_loads(arm.robot, t, parts, tolerance, asked),
+        wrist=_wrist_moments(arm, t, q, qd, qdd, wrist),
+        payload=_bound(payload, t),
+        speed_scale=_bound(scale, t),
+        torque_timed_s=timed,
+        kinematic_s=kinematic,
+        no_law=no_law,
+    )
+    rows = TorqueRows(
+        path=np.full(len(t), entry.name, object),
+        t_s=t,
+        q=np.where(arm.robot.slides, 1000 * q, np.degrees(q)),
+        torque=tau,
+        tolerance=tolerance,
+        **{name: getattr(parts, name) for name in PARTS},
+        power_w=tau * qd,
+    )
+    inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
+    return PathTorques(summary, rows, asked, inertia, power_imbalance(arm.model, parts, q, qd, qdd))
+
+
+PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
+
+
+def _joint_loads(robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, asked: Demand) -> tuple[JointLoad, ...]:
+    found = []
+    for j, slides in enumerate(robot.slides):
+        at = int(asked.peak_at[j])
+        found.append(
+            JointLoad(
+                joint=j + 1,
+                unit="N" if slides else "N m",
+                peak=float(asked.peak[j]),
+                tolerance=float(tolerance[at, j]),
+                peak_at_s=float(t[at]),
+                rms=float(asked.rms[j]),
+                rms_tolerance=float(np.sqrt(np.mean(tolerance[:, j] ** 2))),
+                **{name: float(np.abs(getattr(parts, name)[:, j]).max()) for name in PARTS},
+                power_w=float(asked.power[j]),
+                braking_w=float(asked.braking[j]),
+                work_j=float(asked.work[j]),
+                recovered_j=float(asked.recovered[j]),
+            )
+        )
+    return tuple(found)
+
+
+def _margins(
+    arm: LoadedArm, parts: TorqueParts, t: Reals, q: Reals, qd: Reals, qdd: Reals
+) -> tuple[Margin | None, Margin | None]:
+    """Greatest further payload and greatest speed scale under peak and rated torques, and joint speeds."""
+    drives = drives_of(arm.robot)
+    more = arm.with_unit.rigid_torques(q, qd, qdd) - arm.model.rigid_torques(q, qd, qdd)
+    viscous = known(drives.viscous) * qd
+    at_rest = parts.gravity + parts.tool + parts.friction - viscous
+    limits = DriveLimits(drives.peak, drives.rated, arm.robot.speed)
+    return (
+        greatest_payload(t, parts.total, more, limits),
+        greatest_speed_scale(t, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits),
+    )
+
+
+def _timings(
+    arm: LoadedArm, joints: Callable[[Reals], Reals], t: Reals, q: Reals
+) -> tuple[float | None, float | None, NoTimeLaw | None]:
+    """Shortest times under torques and under assumed accelerations; None where peak torques are unknown."""
+    peak = drives_of(arm.robot).peak
+    if not np.isfinite(peak).any():
+        return None, None, None
+    _, nodes = nodes_along(joints, t[::20], q[::20], arm.limits)
+    try:
+        kinematic = fastest(nodes, arm.limits).duration
+        return fastest_under_torques(arm.model, nodes, arm.limits.speed, peak).timed.duration, kinematic, None
+    except TimingError as error:
+        return None, None, error.finding
+
+
+def _wrist_moments(
+    arm: LoadedArm, t: Reals, q: Reals, qd: Reals, qdd: Reals, wrist: tuple[int, ...]
+) -> tuple[WristMoment, ...]:
+    """What the load's own mass asks of the wrist's joints."""
+    if arm.load is None:
+        return ()
+    by_load = np.abs(arm.model.rigid_torques(q, qd, qdd) - arm.bare.rigid_torques(q, qd, qdd))
+    off = load_tolerance(arm.model, q, qd, qdd, arm.load_grade)
+    most = [(j, int(by_load[:, j - 1].argmax())) for j in wrist]
+    return tuple(WristMoment(j, float(by_load[at, j - 1]), float(off[at, j - 1]), float(t[at])) for j, at in most)
+
+
+def _bound(margin: Margin | None, t: Reals) -> BindingLimit | None:
+    if margin is None:
+        return None
+    value = margin.value if np.isfinite(margin.value) else None
+    joint = None if margin.joint is None else margin.joint + 1
+    return BindingLimit(value, margin.by, joint, None if margin.sample is None else float(t[margin.sample]))
+
+
+DIAGRAM_POINTS = 501
+FARTHEST_M = 1.0
+PARTS_OF_PAYLOAD = (1 / 3, 2 / 3, 1.0)
+UNITS = {"payload": "kg", "moment": "N m", "inertia": "kg m²"}
+
+
+def wrist_uses(
+    robot: Robot, load: Load | None, grade: Grade, gravity: float, paths: tuple[PathLoad, ...]
+) -> tuple[Use, ...]:
+    """All that the wrist's data limit; upper ends by the load's tolerances."""
+    wrist = robot.masses.wrist
+    if wrist is None or load is None:
+        return ()
+    uses = [
+        Use(use.quantity, use.joint, None, use.asked, use.most, use.allowed, UNITS[use.quantity])
+        for use in wrist_use(robot, wrist, load, gravity, tolerances_of(load, grade))
+    ]
+    allowed = dict(wrist.moment)
+    for path in paths:
+        for moment in path.wrist:
+            asked = moment.moment_n_m
+            if moment.joint in allowed:
+                upper, limit = asked + moment.tolerance, allowed[moment.joint]
+                uses.append(Use("moment", moment.joint, path.name, asked, upper, limit, "N m"))
+    return tuple(uses)
+
+
+def diagram_rows(robot: Robot, load: Load | None, gravity: float) -> DiagramRows:
+    """Curves for the rated payload and parts of it, and for the load's own mass; none where no limit is known."""
+    wrist = robot.masses.wrist
+    if wrist is None:
+        return DiagramRows.empty()
+    masses = {round(part * wrist.payload, 3) for part in PARTS_OF_PAYLOAD if np.isfinite(wrist.payload)}
+    masses |= {load.mass} if load and load.mass > 0 else set()
+    if not masses:
+        return DiagramRows.empty()
+    along = np.linspace(0.0, FARTHEST_M, DIAGRAM_POINTS)
+    diagram = load_diagram(robot, wrist, np.array(sorted(masses)), along, gravity)
+    if diagram is None:
+        return DiagramRows.empty()
+    reached = np.isfinite(diagram.across).any(axis=0)
+    last = min(int(np.flatnonzero(reached).max(initial=0)) + 2, DIAGRAM_POINTS)
+    count = len(diagram.mass)
+    return DiagramRows(
+        mass_kg=np.repeat(diagram.mass, last),
+        along_mm=1000 * np.tile(diagram.along[:last], count),
+        across_mm=1000 * diagram.across[:, :last].ravel(),
+    )
+
 
 CHECKS_PER_SAMPLE = 1
 WRIST_JOINTS = 3

@@ -17,8 +17,8 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import arm_view, log_arm, send_motion
 from er3a.pipeline.viewing.palette import JOINTS, rgb
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, seconds, send_series
+from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
-from er3a.robots.shown import size_of
 
 STAGE = "dynamics"
 PAUSE = 1.0  # s between two paths

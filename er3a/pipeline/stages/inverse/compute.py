@@ -2,44 +2,408 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
-from er3a.collision.clearance import bodies_of
+from er3a.collision.along import bodies_of
+from er3a.collision.bodies import Bodies
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import PairOverlaps
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
-from er3a.kinematics.by_class import arm_solver
+from er3a.geometry.transforms import rotation_angle, rpy_of, transform
+from er3a.kinematics.batch import inverse_batch
+from er3a.kinematics.by_class import arm_solver, task_mask
+from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.classes.chain_solvers import Unsolved
+from er3a.kinematics.closed_form import ORIENTATION
+from er3a.kinematics.cuspidal import cuspidal_move
+from er3a.kinematics.families import Family
+from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.neighbours import neighbours
 from er3a.kinematics.round_trips import MOST_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
-from er3a.kinematics.targets import MANY_TARGETS
-from er3a.kinematics.wrist_partitioned import has_branches
+from er3a.kinematics.self_motions import SelfMotionCurve
+from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Method, Solutions, Target, TargetOutcome
+from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches, solve_slots, wrist_partitioned_arm
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.progress import shown_progress
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.inverse.entry import InverseSettings
-from er3a.pipeline.stages.inverse.inverse_findings import (
-    AllSolved,
-    NoneSolved,
-    NotReproduced,
-    SomeUnsolved,
-    UnsolvedTarget,
-)
 from er3a.pipeline.stages.inverse.model import (
+    SINGULAR_PARTS,
+    Advice,
+    AllSolved,
+    AtSingularity,
+    BranchesCollide,
+    BranchesLeaveLimits,
     InverseResults,
     InverseSummary,
     MapRows,
+    MoveObstacle,
+    NearLimit,
+    NeighbourPoses,
+    NoneSolved,
+    NothingFound,
+    NotReproduced,
+    Obstacle,
     RankingRows,
+    ReachMissing,
     RoundTrips,
+    SelfMotion,
+    ShiftingDoesNotHelp,
+    ShiftTool,
     SolutionRows,
+    SomeUnsolved,
+    Stop,
     TargetResult,
+    TiltMissing,
+    ToolOrientation,
+    TurningDoesNotHelp,
+    TurnTool,
+    UnsolvedTarget,
+    VisitOrder,
 )
-from er3a.pipeline.stages.inverse.rankings import rankings, sequence
-from er3a.pipeline.stages.inverse.solution_map import solution_map
-from er3a.pipeline.stages.inverse.solve_target import SolvedTarget, solve_target
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.motion_demands import limits_of
+from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
+from er3a.robots.joint_limits import limit_margin, shown
+from er3a.robots.robot import Robot
+from er3a.selection.nearest import AllCollide, Choice, Refusal, nearest
+from er3a.selection.select import RULES, RuleName, available_rules, mixed_cost, refusals
+from er3a.selection.sequence import MoveRule, best_of_sets
+
+SINGULAR = 1e-6
+LITTLE_MARGIN_DEG = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedTarget:
+    """What the summary holds of a target, one row for each of its solutions, and what they were made from."""
+
+    result: TargetResult
+    rows: SolutionRows
+    solutions: Solutions
+
+
+def solve_target(
+    robot: Robot,
+    target: Target,
+    random: np.random.Generator,
+    scene: Scene | None = None,
+    many: bool = False,
+    advise: bool = True,
+) -> SolvedTarget:
+    """Solve, choose, explain; solutions that collide with the scene or with themselves are not chosen.
+
+    One of ``many``: only the turn nearest to the reference is kept of each arm. With ``advise`` what would help a pose
+    without solution is looked for.
+    """
+    solutions = inverse(robot, target.T, target.q_ref, self_motion_rows=True)
+    if many:
+        solutions = solutions.without_turns()
+    refused = refusals(robot, solutions, scene)
+    choice = nearest(robot, solutions, target.q_ref, refused)
+    rows = _rows(robot, target, solutions, choice, refused)
+    found, within = np.unique(rows.branch), np.unique(rows.branch[rows.within_limits])
+    chosen = choice.chosen
+    near: NeighbourPoses | None = None
+    obstacle: Obstacle | None = None
+    advice: tuple[Advice, ...] = ()
+    if chosen is not None:
+        advice = _what_to_know(rows, chosen)
+    elif isinstance(choice.reason, AllCollide):
+        obstacle, advice = BranchesCollide(len(within)), (MoveObstacle(),)
+    else:
+        obstacle = _obstacle(robot, target, solutions, len(found))
+        if advise and has_branches(robot):
+            near = _neighbours(robot, target, random)
+            advice = _what_would_help(near)
+    x, y, z = (target.T[:3, 3] * 1000).tolist()
+    quaternion = scipy.spatial.transform.Rotation.from_matrix(target.T[:3, :3]).as_quat(
+        canonical=True, scalar_first=True
+    )
+    result = TargetResult(
+        name=target.name,
+        note=target.note,
+        xyz_mm=(x, y, z),
+        rpy_deg=tuple(np.degrees(rpy_of(target.T)).tolist()),
+        quaternion_wxyz=tuple(quaternion.tolist()),
+        q_ref_deg=target.q_ref_deg,
+        solutions=len(found),
+        within_limits=len(within),
+        rows_within_limits=int(rows.within_limits.sum()),
+        collide=len(np.unique(rows.branch[collides(rows)])),
+        chosen_deg=None if chosen is None else tuple(rows.q_deg[chosen].tolist()),
+        chosen_branch=None if chosen is None else int(rows.branch[chosen]),
+        reason=choice.reason,
+        obstacle=obstacle,
+        outcome=_outcome(obstacle),
+        expect=target.expect,
+        unsolved=solutions.unsolved,
+        method=_method(robot, solutions.method),
+        families=tuple(map(_self_motion, solutions.families)),
+        neighbours=near,
+        advice=advice,
+    )
+    return SolvedTarget(result, rows, solutions)
+
+
+def collides(rows: SolutionRows) -> Flags:
+    """Which rows are refused because something overlaps."""
+    return np.array([isinstance(why, PairOverlaps) for why in rows.refusal], dtype=bool)
+
+
+def _rows(
+    robot: Robot, target: Target, solutions: Solutions, choice: Choice, refused: tuple[Refusal | None, ...]
+) -> SolutionRows:
+    q, T, count = solutions.q, target.T, len(solutions.q)
+    back = forward(robot, q)
+    rank = np.zeros(count, dtype=int)
+    rank[choice.order] = np.arange(1, len(choice.order) + 1)
+    why = np.full(count, None, dtype=object)
+    why[:] = refused
+    return SolutionRows(
+        target=np.full(count, target.name, dtype=object),
+        branch=solutions.branch,
+        label=solutions.label,
+        q_deg=shown(robot, q) + 0.0,
+        turn=solutions.turn,
+        within_limits=solutions.within_limits,
+        refusal=why,
+        rank=rank,
+        first_of_branch=_first_of_branch(solutions.branch, rank),
+        position_residual_mm=np.linalg.norm(back[:, :3, 3] - T[:3, 3], axis=1) * 1000,
+        orientation_residual_deg=np.degrees(_missed_orientation(robot, back[:, :3, :3], T[:3, :3])),
+        manipulability=conditioning(robot, q, characteristic_length(robot)).manipulability,
+        singular=_singular(robot, solutions),
+        limit_margin_deg=np.degrees(limit_margin(robot, q)),
+        greatest_move_deg=np.degrees(choice.greatest_move),
+        distance_deg=np.degrees(choice.distance),
+    )
+
+
+def _missed_orientation(robot: Robot, R: Reals, asked: Reals) -> Reals:
+    """By how much (n,), rad, rotations R (n, 3, 3) miss the one asked for, in what the arm's task asks of it."""
+    mask = task_mask(robot)[3:]
+    if mask.all():
+        return rotation_angle(R, np.tile(asked, (len(R), 1, 1)))
+    if not len(R):
+        return np.zeros(0)
+    missed = scipy.spatial.transform.Rotation.from_matrix(asked.T @ R).as_rotvec()
+    return np.asarray(np.linalg.norm(mask * missed, axis=1), dtype=float)
+
+
+def _singular(robot: Robot, solutions: Solutions) -> Flags:
+    """Which of ``SINGULAR_PARTS`` each row is on, (n, 4); arms without closed form by the Jacobian's rank."""
+    found = np.zeros((len(solutions.q), len(SINGULAR_PARTS)), dtype=bool)
+    if has_branches(robot):
+        factors = determinant_factors(robot, solutions.q)
+        for column, kind in enumerate(TYPES):
+            found[:, column] = np.abs(getattr(factors, kind)) < SINGULAR
+    else:
+        smallest = conditioning(robot, solutions.q, characteristic_length(robot)).smallest_singular_value
+        found[:, SINGULAR_PARTS.index("rank")] = smallest < SINGULAR
+    return found
+
+
+def _first_of_branch(branch: Integers, rank: Integers) -> Flags:
+    order = np.lexsort((np.arange(len(rank)), rank == 0, rank))
+    first = np.zeros(len(rank), dtype=bool)
+    seen: set[int] = set()
+    for row in order:
+        if branch[row] not in seen:
+            seen.add(branch[row])
+            first[row] = True
+    return first
+
+
+def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
+    low, high = np.degrees(family.range).tolist()
+    return SelfMotion(
+        kind=family.kind,
+        q0_deg=tuple(shown(family.robot, family.q0).tolist()),
+        direction=tuple((shown(family.robot, family.direction) / np.degrees(1.0)).tolist()),
+        range_deg=(low, high),
+        within_limits=family.within_limits,
+        branches=family.branches,
+        dimension=family.dimension,
+    )
+
+
+def _method(robot: Robot, method: Method) -> Method:
+    """The method, with what is known of numbered branches."""
+    if isinstance(method, ByClass) and not method.named and method.arm_class == "general_six":
+        return replace(method, cuspidal=cuspidal_move(robot) is not None)
+    return method
+
+
+def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int) -> Obstacle:
+    """Why there is no solution within the limits: of the branch that misses the pose by least."""
+    if branches:
+        return BranchesLeaveLimits(branches)
+    if not has_branches(robot):
+        return NothingFound()
+    _, fault, gap = (batch[0] for batch in solve_slots(robot, target.T[None], target.q_ref[None]))
+    least = int(gap.argmin())
+    if fault[least] == ORIENTATION:
+        return TiltMissing(float(np.degrees(gap[least])))
+    return ReachMissing(float(gap[least] * 1000))
+
+
+def _outcome(obstacle: Obstacle | None) -> TargetOutcome:
+    match obstacle:
+        case None:
+            return "reached"
+        case BranchesLeaveLimits():
+            return "leaves limits"
+        case BranchesCollide():
+            return "collides"
+        case _:
+            return "unreachable"
+
+
+def _neighbours(robot: Robot, target: Target, random: np.random.Generator) -> NeighbourPoses:
+    near = neighbours(robot, target.T, random)
+    return NeighbourPoses(
+        orientation_ratio=near.orientation_ratio,
+        least_turn_deg=None if near.least_turn is None else float(np.degrees(near.least_turn)),
+        least_shift_mm=None if near.least_shift is None else near.least_shift * 1000,
+        shifted_to_mm=None if near.shifted_to is None else _triple(near.shifted_to * 1000),
+    )
+
+
+def _triple(vector: Reals) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _what_would_help(near: NeighbourPoses) -> tuple[Advice, ...]:
+    turn: Advice = TurningDoesNotHelp()
+    if near.least_turn_deg is not None:
+        turn = TurnTool(near.orientation_ratio, near.least_turn_deg)
+    shift: Advice = ShiftingDoesNotHelp()
+    if near.least_shift_mm is not None and near.shifted_to_mm is not None:
+        shift = ShiftTool(near.least_shift_mm, near.shifted_to_mm)
+    return turn, shift
+
+
+def _what_to_know(rows: SolutionRows, chosen: int) -> tuple[Advice, ...]:
+    found: list[Advice] = [AtSingularity(kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on]
+    margin = float(rows.limit_margin_deg[chosen])
+    return (*found, NearLimit(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
+
+
+MIX = "mix"
+SAME_COST = 1e-9
+
+
+def rankings(
+    robot: Robot, target: Target, solved: SolvedTarget, scene: Scene | None, mix: Mapping[RuleName, float]
+) -> RankingRows:
+    """Place and measure of each branch's best row within the limits, by each rule."""
+    rows = np.flatnonzero(solved.rows.first_of_branch & solved.rows.within_limits)
+    few = solved.solutions.take(rows)
+    free = ~collides(solved.rows)[rows]
+    names = np.full(len(rows), target.name, dtype=object)
+    return RankingRows.stacked(
+        RankingRows(names, few.branch, few.label, np.full(len(rows), rule, dtype=object), measure, _places(cost, free))
+        for rule, measure, cost in _measured(robot, few.q, target.q_ref, scene, mix, free)
+    )
+
+
+def _measured(
+    robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None, mix: Mapping[RuleName, float], free: Flags
+) -> Iterator[tuple[str, Reals, Reals]]:
+    """Name, measure and cost (n,) of each rule, and of the mix of those that the robot has data for."""
+    costs = {}
+    for rule in available_rules(robot):
+        measure = RULES[rule].measure(robot, q, q_ref, scene)
+        costs[rule] = RULES[rule].cost(measure)
+        yield rule, measure, costs[rule]
+    usable = {rule: weight for rule, weight in mix.items() if rule in costs}
+    if usable and free.any():
+        cost = mixed_cost(usable, costs, free)
+        yield MIX, cost, cost
+
+
+def _places(cost: Reals, free: Flags) -> Integers:
+    better = (cost[free] < cost[:, None] - SAME_COST).sum(axis=1)
+    return np.where(free, better + 1, 0)
+
+
+def sequence(
+    robot: Robot,
+    targets: tuple[Target, ...],
+    solved: list[SolvedTarget],
+    acceleration: Reals | None = None,
+) -> VisitOrder | None:
+    """Visiting all targets that are reached, in order: the best rows as a whole, against the greedy ones."""
+    reached = [one for one in solved if one.result.chosen_deg is not None]
+    if len(reached) < 2:
+        return None
+    rule: MoveRule = "time" if "time" in available_rules(robot) else "nearest"
+    usable = [np.flatnonzero(one.rows.rank) for one in reached]
+    sets = [one.solutions.q[rows] for one, rows in zip(reached, usable)]
+    found = best_of_sets(robot, sets, targets[0].q_ref, rule, acceleration)
+    stops = tuple(
+        Stop(
+            target=one.result.name,
+            branch=int(one.rows.branch[rows[row]]),
+            label=one.rows.label[rows[row]],
+            q_deg=tuple(shown(robot, q).tolist()),
+            greedy_branch=int(one.rows.branch[rows[greedy]]),
+            greedy_label=one.rows.label[rows[greedy]],
+        )
+        for one, rows, row, q, greedy in zip(reached, usable, found.rows, found.q, found.greedy_rows)
+    )
+    differs = bool((found.rows != found.greedy_rows).any())
+    return VisitOrder(rule, found.cost, found.greedy_cost, stops, differs)
+
+
+RPY_DEG: dict[ToolOrientation, tuple[float, float, float]] = {
+    "tool_down": (180.0, 0.0, 0.0),
+    "tool_level": (0.0, 90.0, 0.0),
+}
+
+
+def solution_map(robot: Robot, cells: int, scene: Scene | None) -> MapRows:
+    """Number of branches, of those within the limits, and of those clear too, on a grid of ``cells`` by ``cells``."""
+    points, T_base_tool = axes_at_zero_theta(robot)[1:]
+    if closed_form_missing(robot) is None:
+        arm = wrist_partitioned_arm(robot)
+        reach = arm.wrist_reach + np.linalg.norm(points[1] - points[0]) + np.linalg.norm(arm.wrist_in_tool)
+    else:
+        reach = np.linalg.norm(np.diff(np.vstack([points, T_base_tool[:3, 3]]), axis=0), axis=1).sum()
+    middle = (points[1] - robot.base[:3, 3]) @ robot.base[:3, 2]
+    ticks = (np.arange(cells) + 0.5) / cells * 2 - 1
+    x, z = (part.ravel() for part in np.meshgrid(ticks * reach, middle + ticks * reach, indexing="ij"))
+    position = np.stack([x, np.zeros_like(x), z], axis=1)
+    tables, bodies = [], Bodies(robot, scene)
+    for orientation, rpy_deg in RPY_DEG.items():
+        T = robot.base @ transform(position, np.broadcast_to(np.radians(rpy_deg), position.shape))
+        found = inverse_batch(robot, T)
+        clear = found.within_limits.copy()
+        # Arms of one branch after another: neighbours are alike, which makes asking faster.
+        slot, pose = np.nonzero(clear.T)
+        clear[pose, slot] = bodies.free(found.q[pose, slot])
+        tables.append(
+            MapRows(
+                orientation=np.full(len(x), orientation, dtype=object),
+                x_mm=x * 1000,
+                z_mm=z * 1000,
+                solutions=found.solved.sum(axis=1),
+                within_limits=found.within_limits.sum(axis=1),
+                clear=clear.sum(axis=1),
+            )
+        )
+    return MapRows.stacked(tables)
+
 
 STAGE = "inverse"
 REPRODUCED_M = 1e-9

@@ -23,7 +23,7 @@ class InverseSettings(StrictModel):
     """``round_trips``: random poses solved back. ``map_cells``: cells across the maps of the number of solutions.
 
     ``scene`` holds the obstacles that clearance is measured from and that solutions may not touch; ``mix`` weighs
-    rules against each other as one more rule (names: er3a/selection/rules.py).
+    rules against each other as one more rule (names: er3a/selection/select.py).
     """
 
     round_trips: Annotated[int, Field(ge=1, le=10_000_000)] = 2000

@@ -2,27 +2,179 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from er3a.kinematics.solutions import Label, Method, Unsolved
-from er3a.kinematics.targets import TargetOutcome
+from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.stages.expectations import ExpectationsUnmet
-from er3a.pipeline.stages.inverse.inverse_findings import (
-    Advice,
-    AllSolved,
-    NoneSolved,
-    NotReproduced,
-    Obstacle,
-    SomeUnsolved,
-)
+from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
-from er3a.selection.rules import RuleName
+from er3a.selection.select import RuleName
+
+
+@dataclass(frozen=True)
+class NothingFound:
+    """Iteration found no solution."""
+
+    code: Literal["nothing_found"] = "nothing_found"
+
+
+@dataclass(frozen=True)
+class TiltMissing:
+    """The wrist would have to tilt further, by the branch that comes nearest."""
+
+    angle_deg: float
+    code: Literal["tilt_missing"] = "tilt_missing"
+
+
+@dataclass(frozen=True)
+class ReachMissing:
+    """The wrist centre is out of reach, of the branch that comes nearest."""
+
+    gap_mm: float
+    code: Literal["reach_missing"] = "reach_missing"
+
+
+@dataclass(frozen=True)
+class BranchesLeaveLimits:
+    """So many branches reach the target, all outside the limits."""
+
+    count: int
+    code: Literal["branches_leave_limits"] = "branches_leave_limits"
+
+
+@dataclass(frozen=True)
+class BranchesCollide:
+    """So many branches reach the target within the limits, and all collide."""
+
+    count: int
+    code: Literal["branches_collide"] = "branches_collide"
+
+
+Obstacle = NothingFound | TiltMissing | ReachMissing | BranchesLeaveLimits | BranchesCollide
+
+
+@dataclass(frozen=True)
+class TurnTool:
+    """Turning the tool helps: part of random orientations that have a solution, and the least turn found."""
+
+    orientation_ratio: float
+    least_turn_deg: float
+    code: Literal["turn_tool"] = "turn_tool"
+
+
+@dataclass(frozen=True)
+class TurningDoesNotHelp:
+    """No orientation tried at this position has a solution."""
+
+    code: Literal["turning_does_not_help"] = "turning_does_not_help"
+
+
+@dataclass(frozen=True)
+class ShiftTool:
+    """Moving the part or the base helps: the least shift of the tool found, and where it ends."""
+
+    shift_mm: float
+    to_mm: tuple[float, float, float]
+    code: Literal["shift_tool"] = "shift_tool"
+
+
+@dataclass(frozen=True)
+class ShiftingDoesNotHelp:
+    """No position tried has a solution with this orientation."""
+
+    code: Literal["shifting_does_not_help"] = "shifting_does_not_help"
+
+
+@dataclass(frozen=True)
+class MoveObstacle:
+    """Only what is around the arm is in the way."""
+
+    code: Literal["move_obstacle"] = "move_obstacle"
+
+
+@dataclass(frozen=True)
+class AtSingularity:
+    """The arm taken is at a singularity."""
+
+    kind: Literal["wrist", "elbow", "shoulder"]
+    code: Literal["at_singularity"] = "at_singularity"
+
+
+@dataclass(frozen=True)
+class NearLimit:
+    """A joint of the arm taken is near its limit."""
+
+    margin_deg: float
+    code: Literal["near_limit"] = "near_limit"
+
+
+Advice = TurnTool | TurningDoesNotHelp | ShiftTool | ShiftingDoesNotHelp | MoveObstacle | AtSingularity | NearLimit
+
+
+@dataclass(frozen=True)
+class UnsolvedTarget:
+    """A target without an admissible solution."""
+
+    name: str
+    obstacle: Obstacle
+    code: Literal["unsolved_target"] = "unsolved_target"
+
+
+@dataclass(frozen=True)
+class NotReproduced:
+    """The solver misses poses that it says it solves, or loses joint angles that made a pose."""
+
+    worst_mm: float
+    worst_deg: float
+    lost: int
+    code: Literal["inverse.not_reproduced"] = "inverse.not_reproduced"
+
+
+@dataclass(frozen=True)
+class AllSolved:
+    """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``).
+
+    ``collisions``: a scene was given, so that the solutions touch nothing of it. The arm never touches itself.
+    Demonstrations are not counted.
+    """
+
+    targets: int
+    solved: int
+    unsolved: tuple[UnsolvedTarget, ...]
+    collisions: bool
+    demonstrations: tuple[Demonstration, ...]
+    code: Literal["inverse.all_solved"] = "inverse.all_solved"
+
+
+@dataclass(frozen=True)
+class SomeUnsolved:
+    """Some targets have no admissible solution."""
+
+    targets: int
+    solved: int
+    unsolved: tuple[UnsolvedTarget, ...]
+    collisions: bool
+    demonstrations: tuple[Demonstration, ...]
+    code: Literal["inverse.some_unsolved"] = "inverse.some_unsolved"
+
+
+@dataclass(frozen=True)
+class NoneSolved:
+    """No target has an admissible solution."""
+
+    targets: int
+    solved: int
+    unsolved: tuple[UnsolvedTarget, ...]
+    collisions: bool
+    demonstrations: tuple[Demonstration, ...]
+    code: Literal["inverse.none_solved"] = "inverse.none_solved"
+
 
 ToolOrientation = Literal["tool_down", "tool_level"]
 SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")
@@ -107,7 +259,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Sequence:
+class VisitOrder:
     """All targets that can be reached, in order; costs in the rule's unit.
 
     Attributes
@@ -159,7 +311,7 @@ class InverseSummary(Summary):
     scene: str | None
     turns: bool
     targets: tuple[TargetResult, ...]
-    sequence: Sequence | None
+    sequence: VisitOrder | None
     round_trips: RoundTrips | None
 
 
@@ -227,3 +379,22 @@ class InverseResults(Results[InverseSummary]):
 
 
 RESULTS = InverseResults
+
+
+MOST_SHOWN = 60
+
+
+def shown_targets(targets: Sequence[TargetResult]) -> list[TargetResult]:
+    """All targets, in their order; of more than 60 as many of each outcome, taken evenly over the list."""
+    if len(targets) <= MOST_SHOWN:
+        return list(targets)
+    by_outcome: dict[str, list[int]] = {}
+    for number, target in enumerate(targets):
+        by_outcome.setdefault(target.outcome, []).append(number)
+    taken: list[int] = []
+    left, kinds = MOST_SHOWN, len(by_outcome)
+    for done, numbers in enumerate(sorted(by_outcome.values(), key=len)):
+        count = min(len(numbers), left // (kinds - done))
+        taken += [numbers[int(k)] for k in np.linspace(0, len(numbers) - 1, count).round()]
+        left -= count
+    return [targets[number] for number in sorted(taken)]

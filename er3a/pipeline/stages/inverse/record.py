@@ -13,18 +13,13 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.say import listed
 from er3a.pipeline.messages.selection import say
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult
-from er3a.pipeline.stages.inverse.shape_colours import colour_of, shape_of
-from er3a.pipeline.stages.inverse.shown_targets import shown_targets
+from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult, shown_targets
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion
-from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, rgb
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording
-from er3a.pipeline.viewing.scene_entities import log_scene
-from er3a.pipeline.viewing.skeleton import skeleton
-from er3a.robots.joint_limits import LimitsExceeded
+from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion, skeleton
+from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
+from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, log_scene, note_view, recording
+from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
 from er3a.robots.robot import Robot
-from er3a.robots.shown import meant, size_of
 
 STAGE = "inverse"
 AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))

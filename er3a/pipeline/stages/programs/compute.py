@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from er3a.collision.clearance import bodies_of
-from er3a.collision.pairs import PairsUnexamined
+from er3a.collision.along import bodies_of
+from er3a.collision.shapes import PairsUnexamined
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
-from er3a.kinematics.near_singular import NearSingular
+from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
@@ -31,16 +31,16 @@ from er3a.pipeline.stages.programs.model import (
     SomeProgramsFail,
 )
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.motion_demands import assumed_speeds
+from er3a.pipeline.stages.trajectory.motion import assumed_speeds
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
-from er3a.program_check.motion_laws import AssumedRates
+from er3a.program_check.motion_checks import AssumedRates
 from er3a.program_check.program_check_findings import CheckFinding, Level, worst_of
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.program_findings import NameTwice, NotUnderstood
-from er3a.programs.program_outcomes import ProgramOutcome
 from er3a.programs.read_program import read_program
+from er3a.programs.syntax import ProgramOutcome
 from er3a.robots.robot import Robot
 
 OUTCOMES: dict[Level, ProgramOutcome] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}

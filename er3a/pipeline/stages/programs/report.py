@@ -26,7 +26,8 @@ from er3a.pipeline.stages.programs.model import (
     ProgramSummary,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.page import fixed, head_of, render, run_command
+from er3a.pipeline.viewing.numbers import fixed
+from er3a.pipeline.viewing.page import head_of, render, run_command
 from er3a.program_check.program_check_findings import RANKS, Level, worst_of
 from er3a.robots.robot import Robot
 

@@ -11,7 +11,7 @@ from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel, read_yaml
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.stages.stage import Stage
-from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.avoidance.avoidance_findings import StrategyName
 from er3a.programs.read_program import files_of
 from er3a.programs.syntax import Language
 from er3a.robots.robot import MOST_JOINTS

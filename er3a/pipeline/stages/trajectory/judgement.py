@@ -8,22 +8,25 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.kinematics.near_singular import NearSingular
+from er3a.collision.along import ClearanceAlong, clearance_along
+from er3a.collision.bodies import Bodies
+from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.stages.trajectory.model import BodiesOverlap, Clearances, LeastClearance
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import (
     AccelerationTooGreatIfAssumed,
     Interval,
     LimitCause,
     PathOutOfReach,
+    PathVerdict,
     RateCause,
     TooFastIfAssumed,
     out_of_limits,
     rates_exceeded,
     unreachable,
 )
-from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.polynomial_checks import GreatestRates, LimitCheck, RateCheck, SingularCheck
 from er3a.planning.singular_events import SingularEvent, singular_events
@@ -199,3 +202,44 @@ def _velocity_check(motion: Motion) -> float:
     slope = (motion.joints(inner + step) - motion.joints(inner - step)) / (2 * step)
     difference = np.abs(slope - motion.rates(inner)[1])
     return float(np.nanmax(difference)) if np.isfinite(difference).any() else 0.0
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What motions must not meet: bodies, and the overlap (m) that may go unnoticed."""
+
+    bodies: Bodies
+    tolerance: float
+
+
+def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
+    """Clearance along a motion, shown at its samples."""
+    return clearance_along(
+        surroundings.bodies, motion.joints, motion.rate_bounds, motion.t, motion.samples, surroundings.tolerance
+    )
+
+
+def collisions(along: ClearanceAlong) -> list[Interval[BodiesOverlap]]:
+    """Stretches of overlap."""
+    return [
+        Interval(contact.start, contact.end, BodiesOverlap(contact.pairs, contact.depth * 1000, contact.at))
+        for contact in along.contacts
+    ]
+
+
+def least_clearance(along: ClearanceAlong) -> LeastClearance | None:
+    """Where the arm comes nearest to anything; None where nothing could be measured."""
+    least = along.least
+    if least < 0 or (pair := along.pair[least]) is None:
+        return None
+    return LeastClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
+
+
+def clearance_rows(name: str, along: ClearanceAlong) -> Clearances:
+    """One row per time at which the clearance was measured in full; NaN where the path can't be reached."""
+    return Clearances(
+        path=np.full(len(along.t), name, object),
+        t_s=along.t,
+        clearance_mm=along.distance * 1000,
+        between=np.array([pair.label if pair else "" for pair in along.pair], object),
+    )

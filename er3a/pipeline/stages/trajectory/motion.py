@@ -2,30 +2,85 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import scipy
 
 from er3a.collision.along import RateBounds
-from er3a.errors import PoseError
+from er3a.collision.bodies import Bodies
+from er3a.errors import InputError, NotWristPartitionedError, PoseError
+from er3a.files.path_file import PathEntry, ProgramPath, load_paths
+from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
+from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.stages.trajectory.program_paths import PlannedEntry
+from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.study import Study
 from er3a.planning.build import Built, build
-from er3a.planning.class_follow import follow_by_class
-from er3a.planning.commands import CommandSource, PlanCommand
-from er3a.planning.followed import Followed
+from er3a.planning.class_follow import PathEndsError, follow_by_class
+from er3a.planning.commands import Command, CommandSource, PlanCommand
+from er3a.planning.follow import Followed
+from er3a.planning.intervals import PathVerdict
 from er3a.planning.moves import JointMove
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.sequences import JointSequence
-from er3a.planning.timing import standing, straight
+from er3a.planning.timing import JointLimits, joint_limits, standing, straight
 from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
+from er3a.program_check.check_program import CheckOptions, ProgramPart, check_program, parts_of
+from er3a.programs.read_program import read_program
 from er3a.robots.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class PartOfProgram:
+    """A stretch of a program as an entry of a path file."""
+
+    name: str
+    title: str
+    samples: int
+    expect: PathVerdict | None
+    part: ProgramPart
+
+    @property
+    def kind(self) -> Literal["joint_sequence", "sequence"]:
+        """What kind of path it is."""
+        return self.part.kind
+
+    def command(self, source: CommandSource, robot: Robot) -> Command:
+        """The path in SI units."""
+        return self.part.command(source)
+
+
+PlannedEntry = PathEntry | PartOfProgram
+
+
+def planned_entries(robot: Robot, entry: PathEntry | ProgramPath, source: CommandSource) -> Iterator[PlannedEntry]:
+    """A path as it is, a program as its stretches, named by their numbers.
+
+    Raises
+    ------
+    InputError
+        for a program that can't be read or does not move the arm
+    """
+    if not isinstance(entry, ProgramPath):
+        yield entry
+        return
+    start = None if entry.start_deg is None else np.radians(entry.start_deg)
+    check = check_program(read_program(entry.program), robot, CheckOptions(start=start, measures=False))
+    parts = parts_of(check, robot, source)
+    for number, part in enumerate(parts, 1):
+        name = f"{entry.name}_{number}" if len(parts) > 1 else entry.name
+        first, last = part.lines
+        title = f"{entry.title}, lines {first} to {last}" if last > first else f"{entry.title}, line {first}"
+        yield PartOfProgram(name, title, entry.samples, entry.expect, part)
+
 
 FOLLOWED_AT = 1030  # times at which a path of the tool is solved at least: its branches depend on no samples
 EQUAL_TIMES = 1e-12  # share of the duration
@@ -202,3 +257,95 @@ def _joint_motion(
         polynomials=move.in_parts() if isinstance(move, JointSequence) else move.polynomials(),
         proof=None,
     )
+
+
+def wanted_of(robot: Robot, settings: TrajectorySettings) -> Wanted:
+    """What is to be settled of paths of the tool."""
+    wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg])
+    near = NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
+    return Wanted(limits_of(robot, settings).rates, near)
+
+
+def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:
+    """How motions are planned; ``bodies`` are what they must not meet, None where nothing can be measured."""
+    tolerance = settings.penetration_tolerance_mm / 1000
+    return PlanningTask(robot, bodies, tolerance, limits_of(robot, settings), seed)
+
+
+def assumed_speeds(robot: Robot, settings: TrajectorySettings) -> Reals:
+    """Speeds (n,), rad/s or m/s, of joints whose own is unknown; those beyond the study's have the last of them."""
+    given = settings.assumed_speed_deg_s
+    turning = np.radians([given[min(k, len(given) - 1)] for k in range(robot.joints)])
+    return np.where(robot.slides, settings.assumed_speed_mm_s / 1000, turning)
+
+
+def limits_of(robot: Robot, settings: TrajectorySettings) -> JointLimits:
+    """Limits of a robot's joints.
+
+    Raises
+    ------
+    InputError
+        for accelerations or jerks of another number of joints
+    """
+    count = len(robot.lower)
+    given: list[Reals | None] = []
+    for name in ("acceleration_deg_s2", "jerk_deg_s3"):
+        values = getattr(settings, name)
+        if values is not None and len(values) != count:
+            problem = f"{len(values)} values for the {count} joints of {robot.name}"
+            raise InputError(None, f"trajectory.{name}", problem, "Give one for each joint")
+        given.append(None if values is None else np.radians(values))
+    return joint_limits(robot, assumed_speeds(robot, settings), settings.acceleration_time_s, *given)
+
+
+@dataclass(frozen=True, eq=False)
+class ListedMotion:
+    """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
+
+    ``motion`` is None for a path of the tool that an arm of its class can't be made to follow, or not to its end;
+    ``stops`` is then the time (s) beyond which it is not.
+    """
+
+    listed: str
+    name: str
+    title: str
+    motion: Motion | None
+    stops: float | None = None
+
+
+def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
+    """The motions of a robot of the study, in the scene of its trajectory stage; see :func:`listed_motions`."""
+    robot, settings, scene = study.robot(name), study.section(TrajectorySettings), study.scene(name, "trajectory")
+    bodies = Bodies(robot, load_scene(scene) if scene else None)
+    task = planning_of(robot, settings, bodies, study.seed)
+    return listed_motions(Path(study.entry(name).paths), task, wanted_of(robot, settings), checks_per_sample)
+
+
+def listed_motions(file: Path, task: PlanningTask, wanted: Wanted, checks_per_sample: int) -> Iterator[ListedMotion]:
+    """Plan the paths of a file.
+
+    Parameters
+    ----------
+    task : the arm, what it must not meet and its limits, for motions that are to be planned
+    wanted : what is to be settled of paths of the tool
+    checks_per_sample : points checked between two samples to begin with
+
+    Raises
+    ------
+    InputError
+        for what can't be planned
+    """
+    ends: dict[str, Reals] = {}
+    for i, listed in enumerate(load_paths(file).paths):
+        source = CommandSource(file, f"paths[{i}]")
+        for entry in planned_entries(task.robot, listed, source):
+            stops = None
+            try:
+                motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task=task)
+            except NotWristPartitionedError:
+                motion = None
+            except PathEndsError as error:
+                motion, stops = None, error.t
+            end = np.full(task.robot.joints, np.nan) if motion is None else motion.q[-1]
+            ends[entry.name] = ends[listed.name] = end
+            yield ListedMotion(listed.name, entry.name, entry.title, motion, stops)

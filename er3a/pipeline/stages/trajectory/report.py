@@ -25,8 +25,8 @@ from er3a.pipeline.messages.trajectory import (
 )
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.trajectory.clearance_figures import clearance_section
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.stages.trajectory.figures import PathFigure, clearance_section, turning_figure
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,
     NearThresholds,
@@ -39,16 +39,15 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectoryResults,
     TriedStrategy,
 )
-from er3a.pipeline.stages.trajectory.path_figure_3d import turning_figure
-from er3a.pipeline.stages.trajectory.path_figures import PathFigure
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.figure_readings import readings
-from er3a.pipeline.viewing.page import fixed, head_of, number, render, run_command, text_address
-from er3a.planning.path_verdicts import PathVerdict
-from er3a.programs.arm_joints import WORDS, not_written
+from er3a.pipeline.viewing.figures import readings
+from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.page import head_of, render, run_command, text_address
+from er3a.planning.intervals import PathVerdict
+from er3a.programs.writing import WORDS, not_written
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.robots.shown import meant
 
 DRAWN = 250
 AT_ANY_PACE = ("leaves limits", "collides", "unreachable", "none found")  # verdicts of paths that fail however slow

@@ -11,17 +11,16 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, ProgramFiles
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.intervals import PathVerdict
 from er3a.planning.profiles import Times
-from er3a.programs.arm_joints import not_written
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.program_findings import WriteFinding, WrittenUnsafe
 from er3a.programs.syntax import Language
 from er3a.programs.write_program import write_program
-from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
+from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, not_written, program_name
+from er3a.robots.joint_limits import joint_columns, meant, shown
 from er3a.robots.robot import Robot
-from er3a.robots.shown import joint_columns, meant, shown
 
 LONGEST_NAME = 24
 REPAIRED = "_repaired"

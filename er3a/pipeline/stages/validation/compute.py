@@ -2,45 +2,308 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import partial
 
-from er3a.files.reference_documents import check_robot_origins
-from er3a.files.reference_sets import load_references
+import numpy as np
+from numpy.typing import NDArray
+
+from er3a.calibration.calibrate import Calibration, calibrate
+from er3a.calibration.outcomes import CalibrationError
+from er3a.diagnosis.diagnose import Diagnosis, Hypothesis, diagnosis_of, residuals
+from er3a.diagnosis.ranking import Ranking, usable
+from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.identifiability.evidence import evidence_of
 from er3a.identifiability.proposals import proposals_of
 from er3a.identifiability.reactions import bases_of, bases_untold
+from er3a.identifiability.statements import made_from_table, title_of
+from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import closed_form_missing
-from er3a.pipeline.stages.validation.check_model import Check, Conflict, Unjudged
-from er3a.pipeline.stages.validation.checks import checks_of_set
-from er3a.pipeline.stages.validation.corrections import calibrate_from_sets
-from er3a.pipeline.stages.validation.diagnoses import diagnose_sets, table_record
+from er3a.pipeline.stages.validation.checks import checks_of_set, round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.entry import ValidationSettings
-from er3a.pipeline.stages.validation.geometry_tables import axes_table, key_poses_table, section_table
 from er3a.pipeline.stages.validation.model import (
+    Axes,
+    Calibrated,
+    Check,
     Checks,
     Circles,
+    Conflict,
+    CorrectedTable,
+    Corrections,
+    InNoSet,
+    KeyPose,
+    KeyPoses,
+    NamedPose,
     OtherTableFound,
+    RankedHypothesis,
+    Residuals,
     Section,
+    SetCalibration,
+    SetDiagnosis,
     TableEvidence,
     TableFacts,
+    Unjudged,
     ValidationResults,
     ValidationSummary,
 )
-from er3a.pipeline.stages.validation.parts_found import parts_found
-from er3a.pipeline.stages.validation.self_checks import round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.subject import model_of
-from er3a.pipeline.stages.validation.validation_findings import InNoSet
-from er3a.pipeline.stages.validation.verdict import SHOWN_DECIMALS, counts_of, key_figures, set_summaries, verdict_of
+from er3a.pipeline.stages.validation.verdict import (
+    SHOWN_DECIMALS,
+    counts_of,
+    key_figures,
+    parts_found,
+    set_summaries,
+    verdict_of,
+)
 from er3a.pipeline.study import Study
 from er3a.references.circle_points import CirclePoints, circle_points
-from er3a.references.documents import Documents
-from er3a.references.predict import read, state_of
-from er3a.references.quantities import MM, ZERO_POSE, AxisDistance, Extreme, Quantity
-from er3a.references.reach import search
-from er3a.references.reference import ReferenceSet, quantities_of
-from er3a.references.subjects import Reach
-from er3a.robots.robot import Robot
+from er3a.references.predict import read, search, state_of
+from er3a.references.quantities import (
+    MM,
+    ZERO_POSE,
+    AxisDistance,
+    Extreme,
+    Extremity,
+    Point,
+    Pose,
+    Quantity,
+    SectionExtent,
+    angle_between,
+    nearest_on_axis,
+    nearest_on_line,
+    point_of,
+    section_of,
+)
+from er3a.references.reference import Documents, ReferenceSet, expected_of, quantities_of, vectors_of
+from er3a.references.rows import AxisRow, EnvelopeRow, PositionRow
+from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
+from er3a.robots.robot import Grade, Robot
+
+
+def calibrate_from_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[SetCalibration, ...], Corrections]:
+    """Estimate corrections to the table from each reference set's positions."""
+    found, tables = [], []
+    for references in sets:
+        try:
+            calibration = calibrate(robot, references)
+        except CalibrationError as error:
+            found.append(SetCalibration(references.name, error.finding))
+            continue
+        found.append(SetCalibration(references.name, _calibrated(calibration)))
+        if calibration.fits:
+            tables.append(_corrections(references.name, calibration))
+    return tuple(found), Corrections.stacked(tables)
+
+
+def _calibrated(found: Calibration) -> Calibrated:
+    return Calibrated(
+        conclusion=found.conclusion,
+        level=found.level,
+        coordinates=found.coordinates,
+        poses=found.poses,
+        held=found.held,
+        close=found.close,
+        singular_values=tuple(found.singular_values.tolist()),
+        rms_before_mm=found.rms_before_mm,
+        rms_after_mm=found.rms_after_mm,
+        scatter=found.scatter,
+        more=found.more,
+    )
+
+
+def _corrections(reference_set: str, found: Calibration) -> Corrections:
+    return Corrections.of_rows(
+        (reference_set, each.name, each.unit, each.nominal, each.correction, each.standard_error, each.half_width)
+        for each in found.estimates
+    )
+
+
+def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[SetDiagnosis, ...], Residuals]:
+    """Diagnose a table against each reference set."""
+    found = [(references.name, diagnosis_of(robot, references)) for references in sets]
+    tables = [_residuals(name, diagnosis.ranking) for name, diagnosis in found if diagnosis.ranking]
+    records = [_set_diagnosis(robot, references, diagnosis) for references, (_, diagnosis) in zip(sets, found)]
+    return tuple(records), Residuals.stacked(tables)
+
+
+def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis) -> SetDiagnosis:
+    documents = dict.fromkeys(reference.document for reference in usable(references))
+    own = [name for name in documents if made_from_table(robot, name, references.documents)]
+    return SetDiagnosis(
+        reference_set=references.name,
+        conclusion=diagnosis.conclusion,
+        against=tuple(title_of(name, references.documents) for name in documents),
+        from_table=tuple(title_of(name, references.documents) for name in own),
+        references=diagnosis.references,
+        hypotheses_tried=diagnosis.tried,
+        hypotheses=tuple(map(_ranked, diagnosis.hypotheses)),
+        corrected=table_record(diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
+    )
+
+
+def _ranked(hypothesis: Hypothesis) -> RankedHypothesis:
+    return RankedHypothesis(
+        faults=hypothesis.faults,
+        residual_before=hypothesis.residual_before,
+        residual_after=hypothesis.residual_after,
+        unit=hypothesis.unit,
+        explains=hypothesis.explains,
+        half_widths=hypothesis.half_widths,
+        indistinguishable_from=hypothesis.indistinguishable_from,
+        to_decide=hypothesis.to_decide,
+        score=hypothesis.score,
+    )
+
+
+def table_record(robot: Robot) -> CorrectedTable:
+    """A robot's table as the results hold it."""
+    columns = [field.name for field in fields(CorrectedTable) if field.name != "convention"]
+    return CorrectedTable(robot.convention, **{name: tuple(getattr(robot, name).tolist()) for name in columns})
+
+
+def _residuals(reference_set: str, ranking: Ranking) -> Residuals:
+    before, bound, units = residuals(ranking, ranking.before)
+    best = ranking.pool.difference[ranking.groups[0][0]] if ranking.groups else ranking.before
+    after, _, _ = residuals(ranking, best)
+    vectors = [[ranking.references[place] for place in places] for places in vectors_of(ranking.references)]
+    return Residuals.of_rows(
+        (
+            reference_set,
+            vectors[i][0].source,
+            vectors[i][0].group,
+            vectors[i][0].subject if len(vectors[i]) == 1 else vectors[i][0].subject.whole,
+            units[i],
+            before[i],
+            after[i],
+            bound[i],
+        )
+        for i in np.argsort(-np.maximum(before, after) / bound, kind="stable")
+    )
+
+
+SECTION_STEPS = 60
+EXTREMITIES: tuple[Extremity, ...] = ("greatest", "least")
+
+Vector = NDArray[np.float64]
+Extremes = Mapping[Extreme, tuple[float, Vector]]
+
+
+def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> Axes:
+    """Each stated axis line beside the model's, as its circles show it."""
+    rows = []
+    for references in sets:
+        for row in references.of(AxisRow):
+            stated = np.array(row.point_mm)
+            direction = circles.axes.direction[row.joint - 1]
+            nearest = nearest_on_line(direction, circles.axes.point_mm[row.joint - 1], stated)
+            angle = float(angle_between(direction, np.array(row.direction), row.signed))
+            distance = float(np.linalg.norm(nearest - stated))
+            head = (references.name, row.source, row.grade, row.joint, row.direction, row.point_mm)
+            rows.append((*head, direction, nearest, angle, distance, row.uncertainty_deg, row.uncertainty_mm))
+    return Axes.of_rows(rows)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A pose at which a source looks at the arm; ``stated`` gives the point from the model's and the frames."""
+
+    source: str
+    grade: Grade
+    group: str
+    name: KeyPose
+    point: Point
+    pose: Pose
+    stated: Callable[[Vector, Vector], Vector]
+
+
+def key_poses_table(robot: Robot, sets: list[ReferenceSet], extremes: Extremes) -> KeyPoses:
+    """The poses at which references look at the arm, with their point and the model's; the zero pose comes first."""
+    rows = []
+    for references in sets:
+        for look in (*_positions(references), *_corners(references), *_extremes(references, extremes)):
+            T = frames(robot, np.radians(np.array(look.pose)))
+            model = point_of(T, look.point)
+            stated = look.stated(model, T)
+            head = (references.name, look.source, look.grade, look.group, look.name, look.point, look.pose)
+            rows.append((*head, stated, model, float(np.linalg.norm(model - stated))))
+    table = KeyPoses.of_rows(rows)
+    return table.take(np.argsort((table.q_deg != 0).any(axis=1), kind="stable"))
+
+
+def section_table(robot: Robot, extremes: Extremes) -> Section:
+    """The wrist centre in the side view over a grid of joints 2 and 3 within their limits, and which points lie where
+    the region can end: at a limit, or with the elbow straight or folded."""
+    elbow = [extremes[AxisDistance("wrist_centre", extreme, 2)][1][2] for extreme in EXTREMITIES]
+    q2 = np.linspace(robot.lower[1], robot.upper[1], SECTION_STEPS + 1)
+    q3 = np.unique(np.concatenate([np.linspace(robot.lower[2], robot.upper[2], SECTION_STEPS + 1), elbow]))
+    grid2, grid3 = np.meshgrid(q2, q3, indexing="ij")
+    q = np.zeros((*grid2.shape, 6))
+    q[..., 1], q[..., 2] = grid2, grid3
+    points = section_of(frames(robot, q))
+    return Section(
+        q2_deg=np.degrees(grid2).ravel(),
+        q3_deg=np.degrees(grid3).ravel(),
+        x_mm=points[..., 0].ravel(),
+        z_mm=points[..., 1].ravel(),
+        on_q2_line=((grid2 == q2[0]) | (grid2 == q2[-1])).ravel(),
+        on_q3_line=np.isin(grid3, [q3[0], q3[-1], *elbow]).ravel(),
+    )
+
+
+def _positions(references: ReferenceSet) -> Iterator[_Look]:
+    for row in references.of(PositionRow):
+        given = np.array([np.nan if value is None else value for value in row.xyz_mm])
+
+        def stated(model: Vector, T: Vector, given: Vector = given) -> Vector:
+            return given if np.isnan(given).all() else np.where(np.isnan(given), model, given)
+
+        yield _Look(row.source, row.grade, row.group, NamedPose(row.name), row.point, row.pose, stated)
+
+
+def _corners(references: ReferenceSet) -> Iterator[_Look]:
+    corners: dict[tuple[str, tuple[float, float]], list[EnvelopeRow]] = {}
+    for row in references.of(EnvelopeRow):
+        if row.corner_deg is not None:
+            corners.setdefault((row.source, row.corner_deg), []).append(row)
+    for (source, (q2, q3)), rows in corners.items():
+        labels = {row.quantity[-1]: (row.value_mm, row.quantity == "abs_x") for row in rows}
+
+        def stated(model: Vector, T: Vector, labels: dict[str, tuple[float, bool]] = labels) -> Vector:
+            origin = np.array([T[0, 0, 3], 0.0, T[1, 2, 3]]) * MM
+            point = model.copy()
+            for coordinate, (value, unsigned) in labels.items():
+                k = "xyz".index(coordinate)
+                sign = np.sign(model[k] - origin[k]) if unsigned else 1.0
+                point[k] = origin[k] + sign * value
+            return point
+
+        pose = (0.0, q2, q3, 0.0, 0.0, 0.0)
+        yield _Look(source, rows[0].grade, "envelope", DrawingCorner(q2, q3, None), "wrist_centre", pose, stated)
+
+
+def _extremes(references: ReferenceSet, extremes: Extremes) -> Iterator[_Look]:
+    for reference, expected in zip(references.checkable, expected_of(references.checkable)[0]):
+        subject, quantity = reference.subject, reference.quantity
+        if isinstance(subject, Reach | DrawingExtent) and isinstance(quantity, AxisDistance | SectionExtent):
+            value, q = extremes[quantity]
+            stated = partial(_extreme_as_stated, quantity, float(expected), value)
+            pose = tuple(np.degrees(q).tolist())
+            yield _Look(reference.source, reference.grade, reference.group, subject, quantity.point, pose, stated)
+
+
+def _extreme_as_stated(
+    quantity: AxisDistance | SectionExtent, expected: float, value: float, model: Vector, T: Vector
+) -> Vector:
+    """The model's point shifted to where its extreme would be the stated one."""
+    if isinstance(quantity, SectionExtent):
+        shift = np.zeros(3)
+        shift["xyz".index(quantity.coordinate)] = 1.0
+        return model + shift * (expected - value)
+    foot = nearest_on_axis(T, quantity.axis, model)
+    return foot + (model - foot) * (expected / value) if value > 0 else model
+
 
 SIX = 6
 WRIST_REACH = AxisDistance("wrist_centre", "greatest", 1)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,19 +14,26 @@ from er3a.pipeline.messages.calibration import level
 from er3a.pipeline.messages.diagnosis import both
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, say, sentence
-from er3a.pipeline.stages.validation.diagnosis_model import (
+from er3a.pipeline.stages.validation.model import (
     Calibrated,
     Corrections,
     RankedHypothesis,
     Residuals,
     SetCalibration,
     SetDiagnosis,
+    ValidationSummary,
 )
-from er3a.pipeline.stages.validation.model import ValidationSummary
-from er3a.pipeline.stages.validation.wording import typographic
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.page import Picture, fixed
+from er3a.pipeline.viewing.numbers import fixed
+from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import INK, MODEL, MUTED, REFERENCE
+from er3a.robots.robot import Robot
+
+
+def typographic(text: str) -> str:
+    """A text with minus signs instead of hyphens before numbers."""
+    return re.sub(r"(?<![0-9A-Za-z])-(?=[0-9])", "−", text)
+
 
 SHOWN_HYPOTHESES = 5
 SHOWN_RESIDUALS = 12
@@ -211,3 +220,12 @@ def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
         )
     numbers = [fixed(value, 1) for value in (hypothesis.residual_before, hypothesis.residual_after)]
     return [typographic(words), *numbers, hypothesis.unit, fixed(hypothesis.score, 1)]
+
+
+def corrected_robot(robot: Robot, diagnoses: Iterable[SetDiagnosis]) -> tuple[Robot | None, str]:
+    """The robot with the first named fault corrected, and its label; None if no fault is named."""
+    for diagnosis in diagnoses:
+        if diagnosis.corrected and isinstance(diagnosis.conclusion, MostLikelyFault | MainFault):
+            label = sentence("corrected", "corrected: {faults}", faults=typographic(both(diagnosis.conclusion.faults)))
+            return robot.replace(**asdict(diagnosis.corrected)), label
+    return None, ""

@@ -4,35 +4,511 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self, get_args
 
 import numpy as np
 
+from er3a.calibration.calibrate import Close
+from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
+from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, NextMeasurement, TooSmallToTell
+from er3a.diagnosis.faults import Faults
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
+from er3a.identifiability.evidence import PartName, PartStatus
 from er3a.identifiability.proposals import Proposal
-from er3a.identifiability.reactions import CheckCounts
-from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
+from er3a.identifiability.reactions import CheckCounts, CheckKind
+from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed, ToolOff
 from er3a.kinematics.round_trips import SlotRoundTrips
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.stages.validation.check_model import Check, Conflict
-from er3a.pipeline.stages.validation.diagnosis_model import (
-    CorrectedTable,
-    Corrections,
-    Residuals,
-    SetCalibration,
-    SetDiagnosis,
-)
-from er3a.pipeline.stages.validation.validation_findings import (
-    CheckSubject,
-    KeyPose,
-    Note,
-    PartFound,
-    Validated,
-)
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
-from er3a.robots.robot import Grade
+from er3a.references.quantities import Unit
+from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
+
+ModelGroup = Literal["table_sanity", "round_trips"]
+SelfChecked = Literal[
+    "numbers_not_finite",
+    "crossed_limits",
+    "odd_directions",
+    "length_unit",
+    "limit_unit",
+    "closed_form",
+    "joints_to_pose_to_joints",
+    "unsolved_poses",
+    "joint_error",
+    "position_error",
+    "orientation_error",
+]
+
+
+@dataclass(frozen=True)
+class SelfCheck(Subject):
+    """A check of the model that needs no document."""
+
+    quantity: SelfChecked
+    code: Literal["self_check"] = "self_check"
+
+
+@dataclass(frozen=True)
+class WholeGroup(Subject):
+    """All that references of a group could say."""
+
+    group: str
+    code: Literal["whole_group"] = "whole_group"
+
+
+CheckSubject = ReferenceSubject | SelfCheck | WholeGroup
+
+
+@dataclass(frozen=True)
+class NamedPose:
+    """A pose by the name that its source gives it."""
+
+    name: str
+    code: Literal["named_pose"] = "named_pose"
+
+
+KeyPose = NamedPose | DrawingCorner | DrawingExtent | Reach
+
+
+@dataclass(frozen=True)
+class NotInRobotFile:
+    """The robot's file gives no value."""
+
+    code: Literal["not_in_robot_file"] = "not_in_robot_file"
+
+
+@dataclass(frozen=True)
+class SourceGivesNone:
+    """The source says that it gives no value."""
+
+    code: Literal["source_gives_none"] = "source_gives_none"
+
+
+@dataclass(frozen=True)
+class SetHasNoData:
+    """A reference set says nothing about it."""
+
+    reference_set: str
+    code: Literal["set_has_no_data"] = "set_has_no_data"
+
+
+@dataclass(frozen=True)
+class InNoSet:
+    """None of the robot's reference sets says anything about it."""
+
+    code: Literal["in_no_set"] = "in_no_set"
+
+
+@dataclass(frozen=True)
+class NumbersMissing:
+    """The table lacks numbers, so nothing can be computed from it."""
+
+    code: Literal["numbers_missing"] = "numbers_missing"
+
+
+@dataclass(frozen=True)
+class NoClosedForm:
+    """The arm has no closed-form inverse."""
+
+    missing: ClosedFormMissing
+    code: Literal["no_closed_form"] = "no_closed_form"
+
+
+@dataclass(frozen=True)
+class NearSingularLeftOut:
+    """Joint errors are judged of those random poses only that are not near a singularity."""
+
+    judged: int
+    poses: int
+    wrist_deg: float
+    shoulder_mm: float
+    code: Literal["near_singular_left_out"] = "near_singular_left_out"
+
+
+Note = (
+    NotInRobotFile
+    | SourceGivesNone
+    | SetHasNoData
+    | InNoSet
+    | NumbersMissing
+    | ClosedFormMissing
+    | NoClosedForm
+    | NearSingularLeftOut
+)
+
+
+LikelyFault = MostLikelyFault | MainFault | TooSmallToTell
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """References that no model can meet all: the first such number, and how many more there are."""
+
+    subject: ReferenceSubject
+    unit: str
+    stated: tuple[float, ...]
+    more: int
+    code: Literal["contradiction"] = "contradiction"
+
+
+@dataclass(frozen=True)
+class Claims:
+    """How many of a set's claims fail."""
+
+    reference_set: str
+    claims: int
+    failed: int
+    code: Literal["claims"] = "claims"
+
+
+@dataclass(frozen=True)
+class JudgedTable:
+    """What every verdict holds.
+
+    Attributes
+    ----------
+    counts : of the checks against references; conflicts : numbers that references contradict each other about
+    sets : names of the reference sets
+    claims : of the sets that hold nothing but claims
+    own_text : what the table's own author says against it
+    """
+
+    counts: CheckCounts
+    conflicts: int
+    sets: tuple[str, ...]
+    claims: tuple[Claims, ...]
+    own_text: tuple[InconsistentWithOwnText, ...]
+
+
+@dataclass(frozen=True)
+class Confirmed(JudgedTable):
+    """The model meets all that it can, and independent documents settle all that moves the tool."""
+
+    grades: tuple[Grade, ...]
+    contradiction: Contradiction | None
+    code: Literal["validation.confirmed"] = "validation.confirmed"
+
+
+@dataclass(frozen=True)
+class PartFound:
+    """What is known of a part of the table.
+
+    Attributes
+    ----------
+    status : the gravest of its entries'
+    entries, settled : how many it has that mean something alone, and how many of these are settled
+    contradicted, open : names of such entries
+    off : how far the tool could be off for what is weak or open; what only its own document speaks of has no bound
+    """
+
+    part: PartName
+    status: PartStatus
+    entries: int
+    settled: int
+    contradicted: tuple[str, ...]
+    open: tuple[str, ...]
+    off: ToolOff
+    code: Literal["part_found"] = "part_found"
+
+
+@dataclass(frozen=True)
+class LeftOpen(JudgedTable):
+    """Nothing contradicts the table, but independent documents don't settle all that moves the tool.
+
+    Attributes
+    ----------
+    parts : of the table
+    off : how far the tool could be off for what is weak or open, all over the joint ranges
+    at_least : whether that is what was found, and more may be left open
+    unbounded : how many entries that move the tool only their own document speaks of: for these there is no bound
+    next_measurement : the one that settles the entry for which it could be off farthest
+    tolerance : how far what counts as settled may leave the tool off
+    """
+
+    parts: tuple[PartFound, ...]
+    tolerance: Tolerance | None
+    off: ToolOff
+    at_least: bool
+    unbounded: int
+    next_measurement: Proposal | None
+    contradiction: Contradiction | None
+    code: Literal["validation.left_open"] = "validation.left_open"
+
+
+@dataclass(frozen=True)
+class NothingToCompare(JudgedTable):
+    """No authoritative document speaks about the model."""
+
+    code: Literal["validation.no_reference"] = "validation.no_reference"
+
+
+@dataclass(frozen=True)
+class ModelUnsound(JudgedTable):
+    """The model fails a check that needs no document."""
+
+    check: SelfCheck
+    measured: float
+    unit: str
+    code: Literal["validation.model_unsound"] = "validation.model_unsound"
+
+
+@dataclass(frozen=True)
+class _Missed(JudgedTable):
+    """The model fails checks against documents; ``check`` is the one to quote.
+
+    Attributes
+    ----------
+    grades : of all authoritative checks
+    diagnosis : the likely fault, if there is one
+    contradicted : entries that move the tool and whose values independent documents exclude
+    """
+
+    reference_set: str
+    check: ReferenceSubject
+    measured: float
+    expected: float
+    unit: str
+    grades: tuple[Grade, ...]
+    diagnosis: LikelyFault | None
+    contradicted: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Contradicted(_Missed):
+    """The model contradicts documents about its arm."""
+
+    code: Literal["validation.contradicted"] = "validation.contradicted"
+
+
+@dataclass(frozen=True)
+class AnotherArm(_Missed):
+    """The documents describe another arm; ``described``: what no one or two corrections remove."""
+
+    described: NotTheRobotDescribed | None
+    code: Literal["validation.another_arm"] = "validation.another_arm"
+
+
+Validated = Confirmed | LeftOpen | NothingToCompare | ModelUnsound | Contradicted | AnotherArm
+
+
+MODEL_GROUPS: tuple[ModelGroup, ...] = get_args(ModelGroup)
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """What the model says (``measured``) beside what it should; ``difference``: measured - expected."""
+
+    measured: float
+    expected: float
+    difference: float
+    tolerance: float
+    unit: str
+
+    @property
+    def tolerances_off(self) -> float:
+        """How many tolerances the difference is."""
+        return abs(self.difference) / self.tolerance
+
+
+@dataclass(frozen=True)
+class ModelCheck(_Compared):
+    """A check of the model against itself, which needs no document."""
+
+    subject: SelfCheck
+    group: ModelGroup
+    status: Literal["pass", "fail"]
+    note: NearSingularLeftOut | None = None
+    kind: None = None
+    reference_set: None = None
+    source: None = None
+    grade: None = None
+    is_authoritative: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class ReferenceCheck(_Compared):
+    """A check against a reference; ``conflict`` is one that the model misses while meeting another that contradicts
+    it.
+
+    ``kind`` is what it rests on; ``independent_of`` names the entries that it reacts to and whose document is another,
+    with nothing in common.
+    """
+
+    subject: ReferenceSubject
+    group: str
+    status: Literal["pass", "fail", "conflict"]
+    reference_set: str
+    source: str
+    grade: Grade
+    kind: CheckKind
+    independent_of: tuple[str, ...]
+    note: None = None
+
+    @property
+    def is_authoritative(self) -> bool:
+        """Whether the verdict may rest on it."""
+        return self.grade in AUTHORITATIVE_GRADES
+
+
+@dataclass(frozen=True)
+class Unjudged:
+    """What could be checked, had the sources, or the robot's file, a value."""
+
+    subject: CheckSubject
+    group: str
+    unit: str
+    note: Note
+    status: Literal["no_reference"] = "no_reference"
+    reference_set: str | None = None
+    measured: float | None = None
+    source: str | None = None
+    grade: Grade | None = None
+    expected: None = None
+    difference: None = None
+    tolerance: None = None
+    kind: None = None
+
+    @property
+    def is_authoritative(self) -> bool:
+        """Whether the verdict could rest on it."""
+        return self.grade in AUTHORITATIVE_GRADES or self.group in MODEL_GROUPS
+
+
+Check = ModelCheck | ReferenceCheck | Unjudged
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What one source says about a number that others contradict it about."""
+
+    expected: float
+    tolerance: float
+    difference: float
+    met: bool
+    source: str
+    grade: Grade
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """References of one set about one number that no model can meet all."""
+
+    reference_set: str
+    subject: ReferenceSubject
+    unit: str
+    measured: float
+    statements: tuple[Statement, ...]
+
+
+Six = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class RankedHypothesis:
+    """A hypothesis of a diagnosis; see :class:`er3a.diagnosis.diagnose.Hypothesis`."""
+
+    faults: Faults
+    residual_before: float
+    residual_after: float
+    unit: Unit
+    explains: bool
+    half_widths: float
+    indistinguishable_from: tuple[Faults, ...]
+    to_decide: NextMeasurement | None
+    score: float
+
+
+@dataclass(frozen=True)
+class CorrectedTable:
+    """A Denavit-Hartenberg table without its most likely fault, in m and rad."""
+
+    convention: Literal["standard", "modified"]
+    a: Six
+    alpha: Six
+    beta: Six
+    d: Six
+    direction: Six
+    offset: Six
+    lower: Six
+    upper: Six
+
+
+@dataclass(frozen=True)
+class SetDiagnosis:
+    """What a reference set says about which number of the table is wrong.
+
+    Attributes
+    ----------
+    references : how many it rests on; hypotheses_tried : how many were evaluated
+    against : titles of the documents that residuals are measured against; from_table : of those among them that the
+        table was taken from, or that were made from it, which are no evidence for its numbers
+    hypotheses : best first
+    corrected : where the conclusion names a fault
+    """
+
+    reference_set: str
+    conclusion: Conclusion
+    against: tuple[str, ...]
+    from_table: tuple[str, ...]
+    references: int
+    hypotheses_tried: int
+    hypotheses: tuple[RankedHypothesis, ...]
+    corrected: CorrectedTable | None
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals(Table):
+    """Residuals before and after the best hypothesis, worst first, for sets with something to explain."""
+
+    reference_set: Texts = column("name of the reference set", dtype=object)
+    source: Texts = column("source of the reference", dtype=object)
+    group: Texts = column("group of the reference", dtype=object)
+    subject: Findings = findings("what the reference is about; coordinates of one point together", ReferenceSubject)
+    unit: Texts = column("unit of the three numbers", dtype=object)
+    before: Reals = column("difference between model and reference")
+    after: Reals = column("the same with the best hypothesis corrected")
+    uncertainty: Reals = column("half-width of the interval that the source leaves open")
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What the positions of a reference set say about the table's entries; see
+    :class:`er3a.calibration.calibrate.Calibration`."""
+
+    conclusion: CalibrationConclusion
+    level: LevelName
+    coordinates: int
+    poses: int
+    held: tuple[Held, ...]
+    close: tuple[Close, ...]
+    singular_values: tuple[float, ...]
+    rms_before_mm: float
+    rms_after_mm: float
+    scatter: float
+    more: MorePositions | None
+
+
+@dataclass(frozen=True)
+class SetCalibration:
+    """The calibration from a reference set: its result, or why there is none."""
+
+    reference_set: str
+    result: Calibrated | NotCalibrated
+
+
+@dataclass(frozen=True, eq=False)
+class Corrections(Table):
+    """Estimated corrections to the table's entries, of the sets whose positions they meet."""
+
+    reference_set: Texts = column("name of the reference set", dtype=object)
+    entry: Texts = column("entry of the table, such as d4", dtype=object)
+    unit: Texts = column("unit of the numbers, mm or deg", dtype=object)
+    nominal: Reals = column("value in the table")
+    correction: Reals = column("to be added to it")
+    standard_error: Reals = column("of the correction")
+    half_width: Reals = column("half-width of the 95 % interval")
 
 
 @dataclass(frozen=True)

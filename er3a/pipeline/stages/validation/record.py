@@ -11,18 +11,16 @@ import rerun.blueprint as rrb
 import er3a.pipeline.messages.validation  # noqa: F401
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.validation.corrected import corrected_robot
-from er3a.pipeline.stages.validation.model import Axes, KeyPoses, ValidationResults
+from er3a.pipeline.stages.validation.diagnosis_figures import corrected_robot
+from er3a.pipeline.stages.validation.model import Axes, KeyPoses, NamedPose, ValidationResults
 from er3a.pipeline.stages.validation.subject import model_of
-from er3a.pipeline.stages.validation.validation_findings import NamedPose
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
-from er3a.pipeline.viewing.arm import log_arm, send_motion
+from er3a.pipeline.viewing.arm import log_arm, send_motion, skeleton
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
-from er3a.pipeline.viewing.skeleton import skeleton
+from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
-from er3a.robots.shown import meant, size_of
 
 STAGE = "validation"
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30

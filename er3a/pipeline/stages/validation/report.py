@@ -2,41 +2,251 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 
+from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
 from er3a.pipeline.messages.decision import decision
+from er3a.pipeline.messages.evidence import CHECK_KINDS
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import counted, joined, say, word
+from er3a.pipeline.messages.say import counted, joined, say, sentence, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
 from er3a.pipeline.messages.validation_verdict import counted_checks
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.validation.axis_figures import axis_deviation, side_view, workspace_drawing
-from er3a.pipeline.stages.validation.check_model import ReferenceCheck, Unjudged
-from er3a.pipeline.stages.validation.check_rows import COLUMNS, Judged, blank_row, by_kind, check_row, group_rows
-from er3a.pipeline.stages.validation.corrected import corrected_robot
-from er3a.pipeline.stages.validation.diagnosis_figures import correction_stories, diagnosis_stories
+from er3a.pipeline.stages.validation.diagnosis_figures import (
+    corrected_robot,
+    correction_stories,
+    diagnosis_stories,
+    typographic,
+)
 from er3a.pipeline.stages.validation.evidence_section import OTHER_TITLES, evidence_section, other_robot
-from er3a.pipeline.stages.validation.frames_figure import link_frames
+from er3a.pipeline.stages.validation.figures import axis_deviation, link_frames, side_view, workspace_drawing
 from er3a.pipeline.stages.validation.model import (
     Axes,
+    Check,
     KeyPoses,
+    ModelCheck,
+    ReferenceCheck,
     Section,
     SetSummary,
+    Unjudged,
     ValidationResults,
     ValidationSummary,
 )
 from er3a.pipeline.stages.validation.subject import model_of
-from er3a.pipeline.stages.validation.symbolic_section import formulas
-from er3a.pipeline.stages.validation.wording import typographic
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.instead import table_instead
-from er3a.pipeline.viewing.page import Head, Picture, fixed, head_of, render, run_command
+from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.page import Head, Picture, head_of, render, run_command, table_instead
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
+
+DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "": 0}
+COLUMNS = (
+    N_("Check"),
+    N_("Model>"),
+    N_("Reference>"),
+    N_("Difference>"),
+    N_("Tolerance>"),
+    N_("Unit"),
+    N_("Source"),
+)
+
+Judged = ModelCheck | ReferenceCheck
+
+
+@dataclass(frozen=True)
+class GroupRow:
+    """One set and group: counts by status, and the check that comes nearest to failing or fails worst."""
+
+    set: str
+    group: str
+    status: str
+    counts: tuple[int, int, int]
+    worst: str
+    difference: str
+
+
+def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
+    """Checks by the set that they come from, as the page names it."""
+    found: dict[str, list[Judged]] = {}
+    for check in checks:
+        found.setdefault(check.reference_set or tr("the model itself"), []).append(check)
+    return found
+
+
+def by_kind(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
+    """Checks by their set and what they rest on, as the page names both."""
+    found: dict[str, list[Judged]] = {}
+    for title, own in by_set(checks).items():
+        for check in own:
+            kind = check.kind and word("check_kind", CHECK_KINDS, check.kind)
+            found.setdefault(tr("{set}, {kind}", set=title, kind=kind) if kind else title, []).append(check)
+    return found
+
+
+def group_rows(checks: Iterable[Judged]) -> list[GroupRow]:
+    """A row for each set and group."""
+    rows = []
+    for title, own in by_set(checks).items():
+        for group in dict.fromkeys(check.group for check in own):
+            part = [check for check in own if check.group == group]
+            counted = Counter(check.status for check in part)
+            status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
+            worst = max(part, key=lambda check: check.tolerances_off)
+            rows.append(
+                GroupRow(
+                    set=title,
+                    group=word("group", GROUPS, group),
+                    status=status,
+                    counts=(counted["pass"], counted["fail"], counted["conflict"]),
+                    worst=say(worst.subject),
+                    difference=f"{_value(worst.difference, worst)} {worst.unit}".strip(),
+                )
+            )
+    return rows
+
+
+def check_row(check: Judged) -> list[str]:
+    """A check in the columns of ``COLUMNS``."""
+    values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
+    if isinstance(check, ReferenceCheck):
+        grade = word("grade", GRADE_NAMES, check.grade)
+        source = sentence("graded", "{own_source} ({grade})", own_source=check.source, grade=grade)
+    else:
+        source = tr("the model itself")
+    return [say(check.subject), *values, f"{check.tolerance:g}", check.unit, source]
+
+
+def _value(value: float, check: Check) -> str:
+    """A value in its unit's decimals; errors of round trips, which are far smaller, with one digit."""
+    if check.group == "round_trips" and 0 < abs(value) < 1e-3:
+        return number(value, 1)
+    return fixed(value, DECIMALS[check.unit])
+
+
+def blank_row(check: Unjudged) -> list[str]:
+    """What is not judged: its name, the model's value, the set, and why."""
+    measured = f"{_value(check.measured, check)} {check.unit}" if check.measured is not None else "–"
+    return [say(check.subject), measured, check.reference_set or "–", say(check.note)]
+
+
+FRAME_COLUMNS = "noap"  # of a transform: the frame's x, y and z axis, and its origin
+MM = 1000.0
+DIGITS = 6
+MOST_PRODUCTS = 200  # of one entry: behind that nobody reads it
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """MathML of a table's transforms.
+
+    Attributes
+    ----------
+    moved : what moves of each row, its theta or its d, by the joints
+    links : a matrix in symbols and one in numbers for each link, lengths in mm
+    arm : name, formula and value in the zero pose of each entry of the upper three rows; none if one is too long
+    longest : products of the arm's longest entry
+    """
+
+    moved: list[Markup]
+    links: list[Markup]
+    arm: list[tuple[Markup, Markup, str]]
+    longest: int
+
+
+def formulas(robot: Robot) -> Formulas:
+    """A robot's transforms."""
+    zero, arm = np.where(robot.sliding, robot.d, robot.offset), arm_transform(robot)
+    values = arm.at(zero)
+    longest = max(len(entry) for row in arm.entries for entry in row)
+    entries = [(r, c) for c in range(4) for r in range(3)] if longest <= MOST_PRODUCTS else []
+    return Formulas(
+        moved=[_moved(robot, k) for k in range(robot.rows)],
+        links=[_link(k, link, zero) for k, link in enumerate(link_transforms(robot))],
+        arm=[
+            (
+                _math(_sub(FRAME_COLUMNS[c], "xyz"[r])),
+                _math(_sum(arm.entries[r][c], c == 3)),
+                fixed(values[r, c] * (MM if c == 3 else 1.0), 2 if c == 3 else 4),
+            )
+            for r, c in entries
+        ],
+        longest=longest,
+    )
+
+
+def _moved(robot: Robot, k: int) -> Markup:
+    """``θ3 = q2 + q3 + 90°`` or ``d3 = −q3 + 200``: what moves of a row, by the joints."""
+    by_joint = robot.direction[k] * (np.eye(robot.rows) if robot.coupling is None else robot.coupling)[k]
+    terms = Markup("")
+    for n in np.flatnonzero(by_joint):
+        terms += _signed(by_joint[n], _sub("q", int(n) + 1), first=not terms)
+    if robot.sliding[k]:
+        name, shift, unit = "d", float(robot.d[k]) * MM, ""
+    else:
+        name, shift, unit = "θ", float(np.degrees(robot.offset[k])), "°"
+    if shift:
+        terms += Markup("<mo>{}</mo><mn>{}{}</mn>").format("+" if shift > 0 else "−", _plain(abs(shift)), unit)
+    return _math(Markup("{}<mo>=</mo>{}").format(_sub(name, k + 1), terms))
+
+
+def _signed(factor: float, symbol: Markup, first: bool) -> Markup:
+    sign = "−" if factor < 0 else "" if first else "+"
+    shown = Markup("") if abs(factor) == 1 else _number(abs(factor))
+    return Markup("{}{}{}").format(Markup("<mo>{}</mo>").format(sign) if sign else "", shown, symbol)
+
+
+def _link(k: int, link: SymbolicTransform, zero: np.ndarray) -> Markup:
+    symbols = [[_sum(entry, c == 3 and r < 3) for c, entry in enumerate(row)] for r, row in enumerate(link.entries)]
+    values = link.at(zero) * np.array([[1, 1, 1, MM]] * 3 + [[1] * 4])
+    numbers = [[_number(value) for value in row] for row in values]
+    return _math(Markup("{}<mo>=</mo>{}<mo>=</mo>{}").format(_sub("A", k + 1), _matrix(symbols), _matrix(numbers)))
+
+
+def _sum(entry: Mapping[Product, float], is_length: bool) -> Markup:
+    terms = Markup("")
+    for product, coefficient in entry.items():
+        in_mm = is_length and not any(function == "d" for function, _ in product)
+        size = abs(coefficient) * (MM if in_mm else 1.0)
+        sign = "−" if coefficient < 0 else "+" if terms else ""
+        shown = Markup("") if product and abs(size - 1) < 1e-9 and not in_mm else _number(size)
+        factors = Markup("<mo>&#8290;</mo>").join(map(_factor, product))
+        terms += Markup("{}{}{}").format(Markup("<mo>{}</mo>").format(sign) if sign else "", shown, factors)
+    return terms or _number(0.0)
+
+
+def _factor(factor: Factor) -> Markup:
+    return _sub(factor[0], "".join(map(str, factor[1])))
+
+
+def _sub(letter: str, index: int | str) -> Markup:
+    return Markup("<msub><mi>{}</mi><mn>{}</mn></msub>").format(letter, index)
+
+
+def _number(value: float) -> Markup:
+    rounded = round(value, DIGITS) + 0.0
+    sign = Markup("<mo>−</mo>") if rounded < 0 else Markup("")
+    return Markup("<mrow>{}<mn>{}</mn></mrow>").format(sign, _plain(abs(rounded)))
+
+
+def _plain(value: float) -> str:
+    return f"{value:.{DIGITS}f}".rstrip("0").rstrip(".")
+
+
+def _matrix(rows: list[list[Markup]]) -> Markup:
+    cells = [Markup("").join(Markup("<mtd>{}</mtd>").format(cell) for cell in row) for row in rows]
+    lines = Markup("").join(Markup("<mtr>{}</mtr>").format(row) for row in cells)
+    return Markup("<mrow><mo>[</mo><mtable>{}</mtable><mo>]</mo></mrow>").format(lines)
+
+
+def _math(content: Markup) -> Markup:
+    return Markup("<math>{}</math>").format(content)
+
 
 SHOWN_FAILURES = 12
 REVERSED_DEG = 135

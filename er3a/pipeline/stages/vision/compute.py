@@ -2,73 +2,367 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 
+from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
-from er3a.collision.clearance import bodies_of
 from er3a.collision.scene import Scene
 from er3a.errors import InputError
-from er3a.files.hand_eye_file import HandEyeFile, read_calibration
+from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
 from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import ObjectEntry, VisionFile, load_vision
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import rpy_of
+from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-from er3a.pipeline.stages.trajectory.motion_demands import limits_of
-from er3a.pipeline.stages.vision.calibration_results import (
-    calibration_result,
-    corner_rows,
-    in_degrees,
-    in_mm,
-    quaternion,
-    sample_rows,
-)
+from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision.entry import VisionSettings
-from er3a.pipeline.stages.vision.error_map import MapTask, error_map
-from er3a.pipeline.stages.vision.grasp_programs import grasp_programs
 from er3a.pipeline.stages.vision.model import (
+    CalibrationDoubtful,
+    CalibrationImpossible,
     CalibrationResult,
     CornerRows,
+    DirectionContradicted,
+    EntryCorrection,
     ErrorMapRows,
     ErrorParts,
+    GraspCounts,
     GraspPrograms,
     GraspResult,
+    MethodResult,
+    NotGraspedObject,
     ObjectResult,
+    OffsetResult,
+    PoseEstimate,
     SampleRows,
+    TableResult,
+    Three,
+    TouchContradicts,
+    TouchedPoint,
+    TouchResult,
+    UnsureGrasp,
+    ViewToAdd,
     VisionResults,
     VisionSummary,
     WayRows,
 )
-from er3a.pipeline.stages.vision.vision_verdicts import (
-    CalibrationDoubtful,
-    CalibrationImpossible,
-    DirectionContradicted,
-    GraspCounts,
-    NotGraspedObject,
-    TouchContradicts,
-    UnsureGrasp,
-)
 from er3a.pipeline.study import Study
 from er3a.planning.timing import JointLimits
+from er3a.programs.csv_program import write_csv
+from er3a.programs.from_commands import TO_START
+from er3a.programs.instructions import (
+    ArmMotion,
+    Instruction,
+    JointTarget,
+    Listing,
+    NamedFrame,
+    Pause,
+    PoseTarget,
+    Rate,
+    Remark,
+)
+from er3a.programs.syntax import Language
+from er3a.programs.write_program import write_program
+from er3a.programs.writing import HEAD, WriteOptions, ascii_text, not_written, program_name
+from er3a.robots.joint_limits import joint_columns, shown
 from er3a.robots.robot import Robot
-from er3a.vision.boards import ambiguous_tilts
-from er3a.vision.grasp_motion import PARTS
+from er3a.vision.boards import ambiguous_tilts, projected
+from er3a.vision.calibration_set import TimeOffset, inverted, quaternion_of
+from er3a.vision.grasp_motion import PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
-from er3a.vision.hand_eye import HandEye, calibrate_hand_eye
-from er3a.vision.next_view import next_view
+from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spread_of
+from er3a.vision.next_view import FieldOfView, NextView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
-from er3a.vision.table_corrections import correct_table
+from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table
 from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, OtherReading
+
+MARGIN = 0.25  # of the objects' extent
+LEAST_HALF = 0.2  # m, to each side of the objects' middle
+
+
+@dataclass(frozen=True, eq=False)
+class MapTask:
+    """What the map is of.
+
+    Attributes
+    ----------
+    T_base_camera : (4, 4), where the objects were seen from; picture : (n,), rad, of an arm that carries the camera
+    places : (k, 4, 4), T_base_object; T_object_tool : (4, 4), the grasp that is held everywhere, as of the first object
+    camera_covariance : (6, 6), m and rad, of one reading
+    """
+
+    robot: Robot
+    home: Reals
+    accuracy: ArmAccuracy
+    T_base_camera: Reals
+    picture: Reals | None
+    view: FieldOfView
+    places: Reals
+    T_object_tool: Reals
+    camera_covariance: Reals
+    cells: int
+
+
+def error_map(found: HandEye, task: MapTask) -> ErrorMapRows:
+    """Errors on a square around the objects, of the first object's grasp held at each cell."""
+    middle = task.places[:, :3, 3].mean(axis=0)
+    half = max(LEAST_HALF, (1 + MARGIN) * float(np.abs(task.places[:, :2, 3] - middle[:2]).max()))
+    steps = np.linspace(-half, half, task.cells)
+    x, y = (part.ravel() for part in np.meshgrid(middle[0] + steps, middle[1] + steps))
+    points = np.tile(task.places[0], (len(x), 1, 1))
+    points[:, :3, 3] = np.column_stack([x, y, np.full(len(x), middle[2])])
+    seen = inverted(task.T_base_camera) @ points
+    q, reached = _held(task, points @ task.T_object_tool)
+    covariance = np.broadcast_to(task.camera_covariance, (len(x), 6, 6))
+    parts = seen_pose_error(found, seen, covariance, task.accuracy, (task.robot, q, task.picture))
+    together = np.where(reached, np.stack(error_sizes(parts.whole)), np.nan)
+    return ErrorMapRows(
+        x_mm=1000 * x,
+        y_mm=1000 * y,
+        in_view=in_sight(task.view, seen[:, :3, 3]),
+        reached=reached,
+        calibration_mm=1000 * error_sizes(parts.calibration)[0],
+        arm_mm=np.where(reached, 1000 * error_sizes(parts.repeatability + parts.table)[0], np.nan),
+        together_mm=1000 * together[0],
+        together_deg=np.degrees(together[1]),
+    )
+
+
+def _held(task: MapTask, tools: Reals) -> tuple[Reals, Flags]:
+    """Joint angles (N, n) within the limits, nearest to where the arm waits, and whether there are any (N,)."""
+    solved = inverse_batch(task.robot, tools, task.home)
+    good = solved.solved & solved.within_limits
+    far = np.where(good, np.abs(np.nan_to_num(solved.q) - task.home).max(axis=-1), np.inf)
+    best = far.argmin(axis=1)
+    reached: Flags = np.asarray(good.any(axis=1))
+    q = np.where(reached[:, None], solved.q[np.arange(len(tools)), best], task.home)
+    return q, reached
+
+
+LONGEST_NAME = 24
+GRIPPER_S = 1.0
+CLOSE = "close the gripper here"  # in a controller's file, which is plain ASCII
+CSV_POINTS = 41
+
+
+def grasp_programs(
+    robot: Robot, name: str, home: Reals, chosen: ChosenGrasp, languages: Sequence[Language]
+) -> GraspPrograms:
+    """A grasp in each language that has this arm's joints."""
+    own = program_name(f"grasp_{name}", LONGEST_NAME)
+    head = f"grasp {ascii_text(chosen.grasp)} of {ascii_text(name)} by {ascii_text(robot.title)}, from where it waits"
+    rows: list[tuple[str, str, str]] = []
+    for language in languages:
+        if not_written(language, robot):
+            continue
+        if language == "csv":
+            files = {".csv": _programs_table(robot, chosen, head)}
+        else:
+            options = WriteOptions(robot, home, head=(head,))
+            files = dict(write_program(_listing(robot, own, home, chosen), language, options).files)
+        rows += [(language, own + suffix, text) for suffix, text in files.items()]
+    return GraspPrograms(
+        target=np.full(len(rows), name, object),
+        language=np.array([row[0] for row in rows], object),
+        file=np.array([row[1] for row in rows], object),
+        text=np.array([row[2] for row in rows], object),
+    )
+
+
+def _listing(robot: Robot, name: str, home: Reals, chosen: ChosenGrasp) -> Listing:
+    tool, base, to_robot = NamedFrame("", robot.tool), NamedFrame("", np.eye(4)), np.linalg.inv(robot.base)
+    found: list[Instruction] = [ArmMotion("joint", JointTarget(home), speed=TO_START, tool=tool, base=base)]
+    for before, leg in zip((None, *chosen.legs), chosen.legs):
+        if before is not None and _closes(before, leg):
+            found += [Remark(CLOSE), Pause(GRIPPER_S)]
+        rate = Rate(leg.duration, "s")
+        if leg.T_end is None:
+            found.append(ArmMotion("joint", JointTarget(leg.q_end), speed=rate, tool=tool, base=base))
+        else:
+            target = PoseTarget(to_robot @ leg.T_end, joints=leg.q_end)
+            found.append(ArmMotion("line", target, speed=rate, tool=tool, base=base))
+    return Listing(name, tuple(found))
+
+
+def _programs_table(robot: Robot, chosen: ChosenGrasp, head: str) -> str:
+    """The motion over time, at rest where the gripper closes."""
+    times, rows, now = [np.zeros(1)], [chosen.legs[0].joints(np.zeros(1))], 0.0
+    for leg, next_leg in zip(chosen.legs, (*chosen.legs[1:], None)):
+        t, q = leg.sampled(CSV_POINTS)
+        times.append(now + t[1:])
+        rows.append(q[1:])
+        now += leg.duration
+        if next_leg is not None and _closes(leg, next_leg):
+            now += GRIPPER_S
+            times.append(np.array([now]))
+            rows.append(q[-1:])
+    joints = np.concatenate(rows)
+    poses = np.linalg.inv(robot.base) @ forward(robot, joints)
+    return write_csv(np.concatenate(times), shown(robot, joints), poses, (HEAD + head,), joint_columns(robot))
+
+
+def _closes(before: GraspLeg, behind: GraspLeg) -> bool:
+    """Whether the gripper closes between two legs."""
+    return before.part == "approach" and behind.part == "retreat"
+
+
+def in_mm(position: Reals) -> Three:
+    """Three lengths (m) in mm."""
+    x, y, z = (1000 * np.asarray(position)).tolist()
+    return x, y, z
+
+
+def in_degrees(angles: Reals) -> Three:
+    """Three angles (rad) in degrees."""
+    x, y, z = np.degrees(angles).tolist()
+    return x, y, z
+
+
+def quaternion(T: Reals) -> tuple[float, float, float, float]:
+    """Unit quaternion of a transform (4, 4), real part first."""
+    w, x, y, z = quaternion_of(T).tolist()
+    return w, x, y, z
+
+
+def calibration_result(
+    head: HandEyeFile,
+    found: HandEye,
+    view: NextView | None,
+    offset: TimeOffset | None,
+    table: TableCorrections | NoCorrections | None,
+) -> CalibrationResult:
+    """All that the summary says of a calibration."""
+    spread, turned = spread_of(found)
+    moved = found.without_suspects
+    return CalibrationResult(
+        title=head.title,
+        source=head.source,
+        setup=found.samples.setup,
+        samples=len(found.samples),
+        used=int(found.used.sum()),
+        stated=found.samples.camera_covariance is not None,
+        hand_eye=_estimate(found.X, found.half_width[:6]),
+        board=_estimate(found.Y, found.half_width[6:]),
+        scatter=found.scatter,
+        camera_mm=float(1000 * found.deviations[0]),
+        camera_deg=float(np.degrees(found.deviations[1])),
+        spread_mm=1000 * spread,
+        spread_deg=float(np.degrees(turned)),
+        greatest_turn_deg=float(np.degrees(found.greatest_turn)),
+        axes_apart_deg=float(np.degrees(found.axes_apart)),
+        suspects=found.suspects,
+        warnings=found.warnings,
+        moved_mm=None if moved is None else float(1000 * moved[0]),
+        moved_deg=None if moved is None else float(np.degrees(moved[1])),
+        methods=tuple(map(_method, found.methods)),
+        directions=found.directions,
+        touch=_touch(found),
+        next_view=_next(view) if view else None,
+        time_offset=OffsetResult(offset.offset, offset.half_width, float(np.degrees(offset.rms))) if offset else None,
+        table=_table_result(table) if isinstance(table, TableCorrections) else table,
+    )
+
+
+def _table_result(found: TableCorrections) -> TableResult:
+    rows = zip(found.estimates, found.entry_half_width.tolist())
+    return TableResult(
+        level=found.level,
+        entries=tuple(
+            EntryCorrection(each.name, each.unit, each.nominal, each.correction, half) for each, half in rows
+        ),
+        held=found.held,
+        close=found.close,
+        scatter=found.scatter,
+        scatter_before=found.scatter_before,
+        probability=found.probability,
+        moved_mm=float(1000 * found.moved[0]),
+        moved_deg=float(np.degrees(found.moved[1])),
+        hand_eye=_estimate(found.X, found.half_width[:6]),
+    )
+
+
+def _estimate(T: Reals, half_width: Reals) -> PoseEstimate:
+    return PoseEstimate(
+        in_mm(T[:3, 3]), in_degrees(rpy_of(T)), quaternion(T), in_mm(half_width[:3]), in_degrees(half_width[3:])
+    )
+
+
+def _method(answer: MethodAnswer) -> MethodResult:
+    numbers = (answer.apart_mm, answer.apart_deg, answer.beyond, answer.rms_mm, answer.rms_deg)
+    return MethodResult(answer.name, *(None if answer.X is None else number for number in numbers))
+
+
+def _touch(found: HandEye) -> TouchResult | None:
+    if found.touch is None:
+        return None
+    rows = zip(found.touch.difference, found.touch.half_width)
+    points = tuple(TouchedPoint(in_mm(difference), in_mm(half)) for difference, half in rows)
+    return TouchResult(points, found.touch.probability)
+
+
+def _next(view: NextView) -> ViewToAdd:
+    return ViewToAdd(
+        q_deg=tuple(np.degrees(view.q).tolist()),
+        clearance_mm=None if view.clearance is None else 1000 * view.clearance,
+        error_before_mm=1000 * view.error_before,
+        error_after_mm=1000 * view.error_after,
+        tried=view.tried,
+        in_view=view.in_view,
+    )
+
+
+def sample_rows(found: HandEye, joints: int) -> SampleRows:
+    """One row for each sample."""
+    samples, count = found.samples, len(found.samples)
+    in_hand = samples.setup == "eye_in_hand"
+    seen = (samples.flange if in_hand else np.eye(4)) @ found.X @ samples.target
+    predicted = np.broadcast_to(found.Y, seen.shape) if in_hand else samples.flange @ found.Y
+    others = np.where(np.eye(count, dtype=bool) | ~found.used, np.nan, found.mismatch)
+    return SampleRows(
+        sample=np.array(samples.names, object),
+        used=found.used,
+        residual_mm=1000 * found.residual[:, :3],
+        residual_deg=np.degrees(found.residual[:, 3:]),
+        mismatch_deg=np.degrees(np.nanmedian(others, axis=1)),
+        flange_mm=1000 * samples.flange[:, :3, 3],
+        seen_mm=1000 * seen[:, :3, 3],
+        predicted_mm=1000 * predicted[:, :3, 3],
+        q_deg=np.full((count, joints), np.nan) if samples.q is None else np.degrees(samples.q),
+    )
+
+
+def corner_rows(found: HandEye, images: SeenImages | None) -> CornerRows:
+    """One row for each corner in each image."""
+    if images is None:
+        return CornerRows.empty()
+    predicted = inverted(found.samples.hand @ found.X) @ found.Y
+    views, tables = images.views, []
+    for k, (name, points, seen, by_board) in enumerate(
+        zip(images.names, views.points, views.corners, views.reprojected)
+    ):
+        count = len(points)
+        tables.append(
+            CornerRows(
+                sample=np.full(count, found.samples.names[k], object),
+                image=np.full(count, name, object),
+                used=np.full(count, found.used[k]),
+                seen_px=seen,
+                by_board_px=by_board,
+                by_arm_px=projected(points, predicted[k], views.camera),
+            )
+        )
+    return CornerRows.stacked(tables)
+
 
 STAGE = "vision"
 VIEW_STREAM = 0

@@ -9,24 +9,94 @@ import numpy as np
 
 from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import Held, LevelName
-from er3a.collision.pairs import Pair
+from er3a.collision.shapes import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.stages.expectations import ExpectationsUnmet
-from er3a.pipeline.stages.vision.vision_verdicts import (
-    CalibrationDoubtful,
-    CalibrationImpossible,
-    DirectionContradicted,
-    GraspCounts,
-    TouchContradicts,
-)
+from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.boards import AmbiguousTilt
 from er3a.vision.calibration_set import Setup
 from er3a.vision.classic_methods import MethodName
 from er3a.vision.grasping import GraspRefusal
 from er3a.vision.table_corrections import NoCorrections
-from er3a.vision.vision_findings import CalibrationWarning, DirectionTried, GraspOutcome, Suspect
+from er3a.vision.vision_findings import CalibrationWarning, DirectionTried, GraspOutcome, NotCalibratable, Suspect
+
+
+@dataclass(frozen=True)
+class CalibrationImpossible:
+    """The samples don't determine where the camera is."""
+
+    why: NotCalibratable
+    code: Literal["calibration_impossible"] = "calibration_impossible"
+
+
+@dataclass(frozen=True)
+class CalibrationDoubtful:
+    """The samples contradict each other, or this robot's table."""
+
+    warnings: tuple[CalibrationWarning, ...]
+    code: Literal["calibration_doubtful"] = "calibration_doubtful"
+
+
+@dataclass(frozen=True)
+class DirectionContradicted:
+    """The samples fit far better with one of the streams inverted."""
+
+    flange_inverted: bool
+    target_inverted: bool
+    rms_mm: float
+    rms_given_mm: float
+    code: Literal["direction_contradicted"] = "direction_contradicted"
+
+
+@dataclass(frozen=True)
+class TouchContradicts:
+    """Touched points, held out of the calibration, are not where it puts them."""
+
+    points: int
+    largest_mm: float
+    probability: float
+    code: Literal["touch_contradicts"] = "touch_contradicts"
+
+
+@dataclass(frozen=True)
+class NotGraspedObject:
+    """An object that the arm can't grasp."""
+
+    name: str
+    why: GraspRefusal
+    code: Literal["not_grasped_object"] = "not_grasped_object"
+
+
+@dataclass(frozen=True)
+class UnsureGrasp:
+    """A grasp that holds less often than asked."""
+
+    name: str
+    probability: float
+    code: Literal["unsure_grasp"] = "unsure_grasp"
+
+
+@dataclass(frozen=True)
+class GraspCounts:
+    """What came of the objects that are to be grasped.
+
+    Attributes
+    ----------
+    objects, grasped : of those that are asked for
+    left_out : samples that the calibration does not rest on
+    point_mm : 95 % of errors at the worst grasp stay below; None where nothing is grasped
+    """
+
+    objects: int
+    grasped: int
+    missed: tuple[NotGraspedObject, ...]
+    unsure: tuple[UnsureGrasp, ...]
+    left_out: tuple[str, ...]
+    point_mm: float | None
+    demonstrations: tuple[Demonstration, ...]
+    code: Literal["grasp_counts"] = "grasp_counts"
+
 
 Three = tuple[float, float, float]
 ROTATIONS = ("rx", "ry", "rz")

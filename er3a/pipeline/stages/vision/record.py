@@ -19,11 +19,10 @@ from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, Sample
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import arm_view, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording
-from er3a.pipeline.viewing.scene_entities import log_scene
+from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, log_scene, note_view, recording
+from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
-from er3a.robots.shown import size_of
-from er3a.vision.tangent import posed
+from er3a.vision.calibration_set import posed
 
 STAGE = "vision"
 MAGNIFIED = 50.0

@@ -8,48 +8,138 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.files.reference_sets import check_reference_file, reference_folder
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
-from er3a.pipeline.stages.workspace.envelope_marks import drawing_table
 from er3a.pipeline.stages.workspace.model import (
     AxisSummary,
     Bars,
     Bounds,
     CellCounts,
+    Drawing,
+    Flat,
     GridSummary,
     HullSummary,
+    HullTriangles,
+    NoVoid,
+    OnSurface,
     ProofSummary,
     SectionFrame,
+    Undersampled,
+    VoidAtShoulder,
     VoidSummary,
+    VoidUncertain,
+    VoidUnexpected,
     Volume,
     VolumePoints,
+    WorkspaceFinding,
     WorkspaceResults,
     WorkspaceSummary,
     triple,
 )
-from er3a.pipeline.stages.workspace.parts import gather
-from er3a.pipeline.stages.workspace.sample import draw_of, sampled
+from er3a.pipeline.stages.workspace.sample import draw_of, gather, sampled
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
-from er3a.pipeline.stages.workspace.void_verdict import judge
-from er3a.pipeline.stages.workspace.workspace_findings import OnSurface
-from er3a.pipeline.stages.workspace.workspace_tables import HullTriangles
 from er3a.pipeline.study import Study
+from er3a.references.rows import EnvelopeRow
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid, shoulder_of
 from er3a.sampling.random_joints import Draw
-from er3a.sampling.reach_search import ReachExtremes, search_reach
-from er3a.sampling.tally import Tally
-from er3a.sampling.touched_cells import section_cells, touched_growth
-from er3a.workspace.hull import Hull, cells_inside, convex_hull
+from er3a.sampling.tally import ReachExtremes, Tally, search_reach, section_cells, touched_growth
 from er3a.workspace.proven import Proven, prove_robot
-from er3a.workspace.sampled_voids import find_voids, unseen_cells, void_numbers
-from er3a.workspace.side_view import border_lines, side_views
+from er3a.workspace.side_view import border_lines, corner_side, side_views
 from er3a.workspace.surface import Surface, surface_of
-from er3a.workspace.voids import Void, pocket_block, proven_voids, sampled_only
+from er3a.workspace.voids import (
+    UNSEEN_RATIO,
+    Hull,
+    Void,
+    cells_inside,
+    convex_hull,
+    find_voids,
+    pocket_block,
+    proven_voids,
+    sampled_only,
+    unseen_cells,
+    void_numbers,
+)
+
+_ACROSS = {"greatest_x": 1.0, "least_x": -1.0}
+_UP = ("greatest_z", "least_z")
+
+
+def drawing_table(robot: Robot, shoulder_m: float) -> Drawing:
+    """Labels of the wrist centre's envelope: extents (one coordinate) and corners (both).
+
+    Parameters
+    ----------
+    shoulder_m : height of joint 2, from which drawings count z, above the section's origin
+    """
+    marks: list[tuple[float, float, float, float, float]] = []
+    corners: dict[tuple[float, float], dict[str, float]] = {}
+    for row in _labels(robot):
+        value = row.value_mm / 1000
+        if row.corner_deg is not None:
+            corner = corners.setdefault(row.corner_deg, {})
+            corner |= {"z": value} if row.quantity == "z" else {"rho": abs(value)}
+        elif row.quantity in _ACROSS:
+            marks.append((abs(value), _ACROSS[row.quantity] * abs(value), np.nan, np.nan, np.nan))
+        elif row.quantity in _UP:
+            marks.append((np.nan, np.nan, shoulder_m + value, np.nan, np.nan))
+    for (q2, q3), values in corners.items():
+        if {"rho", "z"} <= set(values):
+            x = values["rho"] * corner_side(robot, float(np.radians(q2)), float(np.radians(q3)))
+            marks.append((values["rho"], x, shoulder_m + values["z"], q2, q3))
+    return Drawing.of_rows(marks)
+
+
+def _labels(robot: Robot) -> list[EnvelopeRow]:
+    files = [reference_folder(reference) / "envelope.csv" for reference in robot.references]
+    rows = [row for file in files if file.is_file() for row in check_reference_file(file)]
+    return [row for row in rows if isinstance(row, EnvelopeRow)]
+
+
+def judge(
+    hull_volume: float,
+    voids: Sequence[Void],
+    touched: int,
+    unseen: float,
+    proof: bool,
+    undecided_percent: float | None = None,
+) -> Verdict[WorkspaceFinding]:
+    """The stage's verdict.
+
+    An enclosed void about the shoulder is what every arm leaves that can't fold onto itself. Any other one is a hole
+    where none is expected, which points to a wrong limit or direction of joints 2 or 3.
+
+    Parameters
+    ----------
+    hull_volume : m^3
+    touched : number of touched cells; unseen : cells that more samples would touch
+    proof : whether there is a proof that settles most; undecided_percent : what it leaves undecided, where that is told
+    """
+    if hull_volume == 0:
+        return Verdict("caution", Flat())
+    if not proof and unseen > UNSEEN_RATIO * touched:
+        return Verdict("caution", Undersampled(100 * unseen / (unseen + touched)))
+    enclosed = [void for void in voids if void.kind == "enclosed"]
+    elsewhere = [void for void in enclosed if not void.holds_shoulder]
+    unexpected = [void for void in elsewhere if void.status == "proven_empty"]
+    if unexpected:
+        return Verdict("caution", VoidUnexpected(*_size_and_place(unexpected[0]), unexpected[0].cause))
+    if elsewhere:
+        return Verdict("caution", VoidUncertain(*_size_and_place(elsewhere[0])))
+    if enclosed:
+        return Verdict("pass", VoidAtShoulder(*_size_and_place(enclosed[0])))
+    return Verdict("pass", NoVoid(proof, undecided_percent))
+
+
+def _size_and_place(void: Void) -> tuple[float, float, float, float]:
+    """Litres, and the centre in mm."""
+    x, y, z = (1000 * value for value in void.centroid.tolist())
+    return 1000 * (void.lower or void.upper), x, y, z
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,16 +13,74 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.workspace import VOID_STATUS
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.workspace.capability_record import log_capability
-from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
-from er3a.pipeline.stages.workspace.workspace_tables import Cloud
+from er3a.pipeline.stages.workspace.model import (
+    CapabilityCells,
+    CapabilityMissing,
+    CapabilitySummary,
+    CellLookup,
+    Cloud,
+    PlacementSummary,
+    WorkspaceResults,
+    WorkspaceSummary,
+)
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import arm_view, log_arm
+from er3a.pipeline.viewing.arm import arm_view, log_arm, skeleton
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, escaped, log_note, note_view, recording
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
+
+_CLASSES = (0.0, 0.25, 0.5, 0.75, 1.0)
+_NAMES = ("below_25_percent", "25_to_50_percent", "50_to_75_percent", "75_percent_and_more", "all")
+
+
+def log_capability(stream: rr.RecordingStream, results: WorkspaceResults) -> None:
+    """Log voxels coloured by reachability, by halves and classes of it, and the best places."""
+    capability, placement = results.summary.capability, results.summary.placement
+    if isinstance(capability, CapabilityMissing):
+        return
+    if len(results.capability):
+        _log_voxels(stream, capability, results.capability)
+    places = placement.places if isinstance(placement, PlacementSummary) else ()
+    for number, place in enumerate(places, start=1):
+        box = rr.Boxes3D(
+            centers=[place.centre_m],
+            sizes=[place.size_m],
+            colors=[rgb(HIGHLIGHT if place.status == "proven" else MUTED)],
+            labels=[str(number)],
+            radii=rr.Radius.ui_points(1.5),
+        )
+        stream.log(f"workspace/places/{number}", box, static=True)
+
+
+def _log_voxels(stream: rr.RecordingStream, capability: CapabilitySummary, cells: CapabilityCells) -> None:
+    lookup = CellLookup(capability, cells)
+    axes, cell = np.array(capability.frame.axes), lookup.cell
+    count = int(np.ceil(lookup.reach / cell))
+    line = (np.arange(-count, count) + 0.5) * cell
+    height = np.arange(lookup.heights[0] + cell / 2, lookup.heights[1], cell)
+    along = np.arange(cell / 2, capability.bar_m, cell) if lookup.bars else line
+    x, y, z = (part.ravel() for part in np.meshgrid(line, along, height, indexing="ij"))
+    row = lookup.row(x, y, z) if lookup.bars else lookup.row(np.hypot(x, y), np.arctan2(y, x), z)
+    reached = row >= 0
+    value, local = cells.reachability[row[reached]], np.stack([x, y, z], axis=1)[reached]
+    colours = (colormaps["viridis"](value)[:, :3] * 255).astype(np.uint8)
+    far = (local @ axes)[:, 1] >= (float(local[:, 1].mean()) if lookup.bars else 0.0)
+    level = np.digitize(value, _CLASSES[1:])
+    placed = rr.Transform3D(translation=capability.frame.origin_m, mat3x3=axes.T)
+    stream.log("workspace/capability", placed, static=True)
+    for half, side in (("far", far), ("near", ~far)):
+        for number, name in enumerate(_NAMES):
+            chosen = side & (level == number)
+            if chosen.any():
+                voxels = rr.Boxes3D(
+                    centers=local[chosen],
+                    half_sizes=np.full((chosen.sum(), 3), cell / 2),
+                    colors=colours[chosen],
+                    fill_mode="solid",
+                )
+                stream.log(f"workspace/capability/{half}/{name}", voxels, static=True)
+
 
 STAGE = "workspace"
 POINT_SHARE = 0.16  # radius of a point of the cloud, of the mean distance between points

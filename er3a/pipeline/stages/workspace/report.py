@@ -12,14 +12,23 @@ from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import counted, joined, say, word
 from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.workspace.capability_texts import capability_context
-from er3a.pipeline.stages.workspace.cloud_figure import turning_figure
-from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
-from er3a.pipeline.stages.workspace.proof_figures import sections, slices
-from er3a.pipeline.stages.workspace.section_figures import convergence, top_view
-from er3a.pipeline.stages.workspace.side_figures import arc_rows, side_view
-from er3a.pipeline.stages.workspace.workspace_findings import VoidUnexpected
-from er3a.pipeline.stages.workspace.workspace_tables import GrowthCurve
+from er3a.pipeline.stages.workspace.capability_section import capability_context
+from er3a.pipeline.stages.workspace.figures import (
+    arc_rows,
+    convergence,
+    sections,
+    side_view,
+    slices,
+    top_view,
+    turning_figure,
+)
+from er3a.pipeline.stages.workspace.model import (
+    GrowthCurve,
+    VoidSummary,
+    VoidUnexpected,
+    WorkspaceResults,
+    WorkspaceSummary,
+)
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, head_of, render, run_command

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.stages.workspace.workspace_tables import (
+from er3a.pipeline.stages.workspace.model import (
     Border,
     BoxPlaces,
     CapabilityCells,
@@ -24,17 +24,15 @@ from er3a.pipeline.stages.workspace.workspace_tables import (
     VoidVertices,
 )
 from er3a.pipeline.tables import Texts
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
-from er3a.robots.shown import shown
-from er3a.sampling import touched_cells
+from er3a.sampling import tally
 from er3a.sampling.tally import UNTOUCHED, Tally
-from er3a.workspace.capability import Capability
-from er3a.workspace.clear_poses import ClearPoses
-from er3a.workspace.hull import Hull
+from er3a.workspace.capability import Capability, ClearPoses
 from er3a.workspace.placement import Places
 from er3a.workspace.proven import Proven
 from er3a.workspace.side_view import BorderLine, SideView
-from er3a.workspace.voids import Void
+from er3a.workspace.voids import Hull, Void
 
 
 def cells(tally: Tally, void_number: NDArray[np.int64]) -> Cells:
@@ -49,7 +47,7 @@ def cells(tally: Tally, void_number: NDArray[np.int64]) -> Cells:
     )
 
 
-def section(found: touched_cells.TouchedSection) -> SectionCells:
+def section(found: tally.TouchedSection) -> SectionCells:
     """The side section."""
     return SectionCells(found.rho, found.z, found.samples, found.void)
 
@@ -62,7 +60,7 @@ def side_view(views: Sequence[SideView]) -> SideViewCells:
     )
 
 
-def curve(growth: Sequence[touched_cells.Growth]) -> GrowthCurve:
+def curve(growth: Sequence[tally.Growth]) -> GrowthCurve:
     """Growth of the touched volume, one cell size after another."""
     return GrowthCurve.stacked(
         GrowthCurve(np.full(len(part.samples), part.cell * 1000), part.samples, part.volume) for part in growth

@@ -1,0 +1,506 @@
+"""The way that a motion takes, and what is wrong with it, collisions apart.
+
+How long a motion takes and how it runs, as far as a program tells: from rest to rest at even acceleration.
+
+A controller's own ramps and blends decide the true times; these are estimates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from er3a.by_value import ByValue
+from er3a.collision.along import RateBounds
+from er3a.errors import NotWristPartitionedError, PoseError
+from er3a.geometry.vectors import wrap_to_pi
+from er3a.kinematics.configuration import branch_labels
+from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import NearSingular, determinant_factors
+from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.arrays import Reals
+from er3a.planning.follow import Followed
+from er3a.planning.intervals import (
+    AccelerationTooGreat,
+    AccelerationTooGreatIfAssumed,
+    Interval,
+    LimitCause,
+    LimitSide,
+    RateCause,
+    TooFast,
+    TooFastIfAssumed,
+    joints_of,
+    limit_sides,
+    out_of_limits,
+    rates_exceeded,
+    unreachable,
+)
+from er3a.planning.moves import Segment, line
+from er3a.planning.piecewise import polynomial_motion
+from er3a.planning.profiles import trapezoid
+from er3a.planning.sequences import TURN_LENGTH, Arc, arc
+from er3a.planning.singular_events import singular_events
+from er3a.planning.timing import JointLimits
+from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
+from er3a.program_check.program_check_findings import (
+    AcceleratesMoreThanAssumed,
+    ArcHasNoCircle,
+    ArrivesOtherwise,
+    CheckFinding,
+    ConfigurationChanges,
+    ConfigurationEnds,
+    FasterThanAssumed,
+    JointJumps,
+    LineNotChecked,
+    MeetsSingularity,
+    PassesSingularity,
+    TurnsAtStart,
+    WayOutOfReach,
+    WholeTurn,
+)
+from er3a.programs.instructions import ArmMotion, Rate
+from er3a.robots.joint_limits import joint_shown
+from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE
+
+RAMP_OF_A_DURATION = 1 / 3  # of the time that a program gives for a motion, on the way up and on the way down
+
+
+@dataclass(frozen=True)
+class MotionLaw:
+    """A trapezoid of speed.
+
+    Attributes
+    ----------
+    duration : s; ramp : share of it that each ramp takes, at most 1/2
+    """
+
+    duration: float
+    ramp: float
+
+    @property
+    def breaks(self) -> Reals:
+        """Times (s) at which the acceleration steps."""
+        ramp = self.ramp * self.duration
+        return np.unique([0.0, ramp, self.duration - ramp, self.duration])
+
+    @property
+    def saved_by_blend(self) -> float:
+        """Time (s) that is saved where the arm does not stop at one end."""
+        return self.duration * self.ramp / 2
+
+
+@dataclass(frozen=True)
+class AssumedRates:
+    """What is assumed where a program does not say.
+
+    Attributes
+    ----------
+    tool_speed : m/s; tool_acceleration : m/s^2; joint_share : of the joints' greatest speed
+    """
+
+    tool_speed: float = 0.25
+    tool_acceleration: float = 2.0
+    joint_share: float = 0.1
+
+
+def law_of(way: float, speed: float, acceleration: float) -> MotionLaw:
+    """The trapezoid that covers a way at a speed and an acceleration, in any one unit of length."""
+    if way * acceleration >= speed * speed:
+        duration = way / speed + speed / acceleration
+        return MotionLaw(duration, speed / acceleration / duration)
+    return MotionLaw(2 * math.sqrt(way / acceleration), 0.5)
+
+
+def tool_law(motion: ArmMotion, size: float, assumed: AssumedRates) -> MotionLaw:
+    """The law of a line or arc; ``size`` in m, where turns count too."""
+    speed, acceleration = motion.speed, motion.acceleration
+    if speed is not None and speed.unit == "s" and speed.value > 0:
+        return MotionLaw(speed.value, RAMP_OF_A_DURATION)
+    v = _given(speed, "m/s") or assumed.tool_speed
+    a = _given(acceleration, "m/s2") or assumed.tool_acceleration
+    return law_of(size, v, a)
+
+
+def joint_law(motion: ArmMotion, steps: Reals, limits: JointLimits, assumed: AssumedRates) -> MotionLaw:
+    """The law of a joint move whose joints turn by ``steps`` (n,) in rad, all together."""
+    speed, acceleration = motion.speed, motion.acceleration
+    if speed is not None and speed.unit == "s" and speed.value > 0:
+        return MotionLaw(speed.value, RAMP_OF_A_DURATION)
+    size = np.abs(steps)
+    lead = int(np.argmax(size))
+    if speed is not None and speed.unit == "rad/s" and speed.value > 0:
+        a = _given(acceleration, "rad/s2") or float(limits.acceleration[lead])
+        return law_of(float(size[lead]), speed.value, a)
+    share = _given(speed, "share") or assumed.joint_share
+    quick = _given(acceleration, "share") or 1.0
+    laws = [
+        law_of(float(way), float(v) * share, float(a) * quick)
+        for way, v, a in zip(size, limits.speed, limits.acceleration)
+        if way > 0
+    ]
+    return max(laws, key=lambda law: law.duration)
+
+
+def is_given(motion: ArmMotion) -> bool:
+    """Whether a motion's speed is one that its law uses."""
+    units = ("s", "rad/s", "share") if motion.kind == "joint" else ("s", "m/s")
+    return motion.speed is not None and motion.speed.unit in units and motion.speed.value > 0
+
+
+def progress(law: MotionLaw, t: Reals) -> tuple[Reals, Reals, Reals]:
+    """Share of the way done at times (n,) in s, with its first and second derivative."""
+    return trapezoid(np.clip(t, 0.0, law.duration), law.duration, law.ramp)
+
+
+def _given(rate: Rate | None, unit: str) -> float | None:
+    return rate.value if rate is not None and rate.unit == unit and rate.value > 0 else None
+
+
+PARTS, HALVINGS = 200, 50
+
+
+def time_of_share(law: MotionLaw, share: float) -> float:
+    """When (s) a law has done a share (0 to 1) of the way."""
+    low, high = 0.0, law.duration
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        early = float(progress(law, np.array(middle))[0]) < share
+        low, high = (middle, high) if early else (low, middle)
+    return high
+
+
+def limit_moment(law: MotionLaw, side: LimitSide, start: Reals, end: Reals) -> float:
+    """When (s) a joint move between joints (n,) goes beyond a side of a limit that its end is beyond; 0 if it begins
+    there."""
+    before, behind, bound = float(side.of(start)), float(side.of(end)), side.sign * side.limit
+    return 0.0 if before >= bound else time_of_share(law, (bound - before) / (behind - before))
+
+
+def speed_moment(law: MotionLaw, share_of_greatest: float) -> float:
+    """When (s) the speed comes to a share (0 to 1) of its greatest, on the ramp up."""
+    return law.ramp * law.duration * share_of_greatest
+
+
+def change_moment(law: MotionLaw, kind: Callable[[float], int | None]) -> float:
+    """When (s) the kind of pose, by shares of the way, first is another than at the start."""
+    shares = np.linspace(0.0, 1.0, PARTS + 1)
+    first = kind(0.0)
+    other = next((i for i, share in enumerate(shares) if kind(float(share)) not in (first, None)), PARTS)
+    low, high = float(shares[other - 1]), float(shares[other])
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if kind(middle) == first else (low, middle)
+    return time_of_share(law, high)
+
+
+POINTS_APART_M, POINTS_APART_RAD = 0.01, np.radians(2.0)
+FEWEST_POINTS, MOST_POINTS = 21, 501
+NO_WAY = 1e-9  # m or rad
+SPEED_TOLERANCE = 1e-6  # relative
+FAR_TURN, NEAR_MOVE = np.radians(90.0), 0.05  # of a joint that jumps: it turns so far where the tool moves less
+SAME_ARRIVAL = 1e-4  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class CheckRules(ByValue):
+    """What ways are checked against.
+
+    Attributes
+    ----------
+    near : distances below which a pose of a line counts as near-singular
+    limits : of the joints, assumed where no document gives them
+    """
+
+    near: NearSingular
+    limits: JointLimits
+    assumed: AssumedRates
+
+
+@dataclass(frozen=True, eq=False)
+class MotionWay(ByValue):
+    """A motion's way.
+
+    Attributes
+    ----------
+    t : (N,), s, rising from 0; q : (N, n), rad, NaN where unreachable
+    joints : angles (..., n) at times (...,)
+    joints_at : angles (..., n) at shares of the way (...,)
+    rates : bounds of speeds and accelerations between times
+    length : m, of the tool point's way; for a joint move of the straight line between its ends
+    turned : rad, by which the tool turns, or for a joint move the joint that turns most
+    end : (n,), rad; None where the end is not reached
+    tool_path : of the tool; None for a joint move
+    moments : s, when what is found begins; not of findings about the way as a whole
+    """
+
+    arm: Robot
+    law: MotionLaw
+    t: Reals
+    q: Reals
+    joints: Callable[[Reals], Reals]
+    joints_at: Callable[[Reals], Reals]
+    rates: RateBounds
+    length: float
+    turned: float
+    end: Reals | None
+    findings: tuple[CheckFinding, ...]
+    tool_path: Segment | None = None
+    moments: Mapping[CheckFinding, float] = field(default_factory=dict)
+
+    def sagitta(self, share: float) -> float:
+        """By how much (m) a share of the tool's way bulges over the straight line between its ends."""
+        if not isinstance(self.tool_path, Arc):
+            return 0.0
+        half = min(self.tool_path.angle * share / 2, np.pi)
+        return float(self.tool_path.radius * (1 - np.cos(half)))
+
+    def along_mm(self, t: float) -> float:
+        """How far (mm) the tool point of a line has come at a time."""
+        return round(1000 * self.length * float(progress(self.law, np.array(t))[0]), 3)
+
+
+@dataclass(frozen=True, eq=False)
+class _JointMove(ByValue):
+    """All joints from ``start`` by ``step`` (n,), in proportion."""
+
+    law: MotionLaw
+    start: Reals
+    step: Reals
+
+    def joints_at(self, share: Reals) -> Reals:
+        """Joint values (..., n) at shares of the way (...,)."""
+        return self.start + np.asarray(share)[..., None] * self.step
+
+    def joints(self, t: Reals) -> Reals:
+        """Joint values (..., n) at times (...,)."""
+        return self.joints_at(progress(self.law, np.asarray(t, float))[0])
+
+    def rates(self, t: Reals) -> tuple[Reals, Reals, Reals]:
+        """Joint values, speeds and accelerations (N, n) at times (N,)."""
+        share, speed, acceleration = (each[..., None] * self.step for each in progress(self.law, t))
+        return self.start + share, speed, acceleration
+
+
+def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> MotionWay | None:
+    """A joint move; None if no joint moves."""
+    step = end - start
+    if np.abs(step).max() < NO_WAY:
+        return None
+    law = joint_law(motion, step, rules.limits, rules.assumed)
+    move = _JointMove(law, start, step)
+    tool = forward(arm, np.stack([start, end]))
+    moved = float(np.linalg.norm(tool[1, :3, 3] - tool[0, :3, 3]))
+    turn = tool[1, :3, :3] @ tool[0, :3, :3].T
+    turned = float(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
+    times = np.linspace(0.0, law.duration, _points(0.0, float(np.abs(step).max())))
+    top = 1 / (1 - law.ramp) / law.duration
+    peaks = np.abs(step) * top, np.abs(step) * top / (law.ramp * law.duration)
+    moments = {
+        **_limit_moments(arm, law, start, end),
+        **_rate_moments(arm, law, peaks, rules.limits),
+        **_configuration_moment(arm, law, move.joints_at),
+    }
+    findings = (*moments, *_joint_jumps(arm, start, end, moved, turned))
+    lead = float(np.abs(step).max())
+    rates = polynomial_motion(move.rates, law.breaks, 2).rate_bounds
+    return MotionWay(
+        *(arm, law, times, move.joints(times), move.joints, move.joints_at, rates, moved, lead, end, findings),
+        moments=moments,
+    )
+
+
+def limit_findings(arm: Robot, q: Reals) -> tuple[LimitCause, ...]:
+    """Joints (n,) in rad or m, and sums of them, that are beyond a limit."""
+    return tuple(side.cause(float(side.of(q))) for side in _sides_left(arm, q))
+
+
+def _sides_left(arm: Robot, q: Reals) -> list[LimitSide]:
+    return [side for side in limit_sides(arm) if float(side.of(q)) > side.sign * side.limit + LIMIT_TOLERANCE]
+
+
+def _limit_moments(arm: Robot, law: MotionLaw, start: Reals, end: Reals) -> dict[CheckFinding, float]:
+    """Limits that the end (n,) of a joint move is beyond, and when (s) the move passes them."""
+    return {side.cause(float(side.of(end))): limit_moment(law, side, start, end) for side in _sides_left(arm, end)}
+
+
+def tool_way(
+    arm: Robot, motion: ArmMotion, start: Reals, goal: tuple[Reals, Reals | None, Reals | None], rules: CheckRules
+) -> MotionWay | CheckFinding | None:
+    """A line or arc from joints (n,) in rad; None if the tool does not move, a finding if it can't be followed.
+
+    Parameters
+    ----------
+    goal : T_world_tool (4, 4) at the end; joints (n,) there, where the program gives them; the arc's point (3,), m
+    """
+    end, given, via = goal
+    T_start = forward(arm, start)
+    try:
+        shape = line(T_start, end, 1.0) if via is None else _arc(T_start, via, end, (1.0, None), motion.angle)
+    except PoseError:
+        return ArcHasNoCircle()
+    size = max(shape.length, TURN_LENGTH * shape.turned)
+    if size < NO_WAY:
+        return None
+    law = tool_law(motion, size, rules.assumed)
+    path: Segment = (
+        line(T_start, end, law.duration, None, law.ramp)
+        if via is None
+        else _arc(T_start, via, end, (law.duration, law.ramp), motion.angle)
+    )
+    times = np.linspace(0.0, law.duration, _points(path.length, path.turned))
+    try:
+        followed, proof = follow_and_prove(arm, path, times, Wanted(rules.limits.rates, rules.near), start)
+    except NotWristPartitionedError:
+        return LineNotChecked()
+    last = followed.q[-1]
+    end_joints = last if np.isfinite(last).all() else None
+    way = MotionWay(
+        *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at, proof.rate_bounds),
+        *(path.length, path.turned, end_joints, (), path),
+    )
+    moments = _followed_moments(followed, proof, way, rules) | _arrival_moments(followed, given, way)
+    return replace(way, findings=tuple(moments), moments=moments)
+
+
+def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None], angle: float | None) -> Arc:
+    """An arc in a time (s) with a ramp; with an angle (rad) of its own that far along its circle."""
+    made = arc(T_start, via, end, time[0], None, time[1])
+    if angle is None:
+        return made
+    return replace(made, normal=made.normal if angle > 0 else -made.normal, angle=abs(angle))
+
+
+def _followed_moments(
+    followed: Followed, proof: ToolProof, way: MotionWay, rules: CheckRules
+) -> dict[CheckFinding, float]:
+    """Reach, configuration, limits, singular poses and speeds, each with the time (s) from which on it is wrong."""
+    arm = way.arm
+    found: dict[CheckFinding, float] = {
+        WayOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
+        for stretch in unreachable(followed)
+    }
+    for jump in followed.jumps:
+        amount, slides = joint_shown(arm, jump.joint - 1, jump.angle)
+        found[ConfigurationEnds(way.along_mm(jump.t), jump.joint, amount, slides)] = jump.t
+    ends = bool(found)
+    t, kept = np.unique(np.concatenate([way.t, proof.t]), return_index=True)
+    solved = np.concatenate([way.q, proof.q])[kept]
+    limits = {(type(each.cause), joints_of(each.cause)): each for each in out_of_limits(arm, t, solved, way.joints)}
+    found |= {each.cause: each.start for each in limits.values()}
+    events = singular_events(arm, t, solved, way.joints, rules.near)
+    at = np.unique(np.concatenate([t, [event.t for event in events]]))
+    q, velocity, acceleration = followed.rates(at)
+    bounded = not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
+    for event in events:
+        where = way.along_mm(event.t)
+        if not event.crossing:
+            scale = 1000.0 if event.type == "shoulder" else float(np.degrees(1.0))
+            found[PassesSingularity(event.type, where, event.distance * scale)] = event.t
+        elif not ends:
+            found[MeetsSingularity(event.type, where, bounded)] = event.t
+    if ends:  # towards the end of reach joint speeds grow without bound
+        return found
+    stretches: list[Interval[RateCause]] = []
+    for limit in rules.limits.rates[:2]:
+        values = velocity if limit.order == 1 else acceleration
+        stretches += rates_exceeded(at, values, limit, lambda t, order=limit.order: followed.rates(t)[order])  # type: ignore[misc]
+    worst: dict[tuple[type, int], Interval[RateCause]] = {}
+    for stretch in sorted(stretches, key=lambda stretch: stretch.cause.ratio):
+        worst[type(stretch.cause), stretch.cause.joint] = stretch
+    found |= {_as_checked(each.cause): each.start for _, each in sorted(worst.items(), key=lambda item: item[0][1])}
+    return found | {part.cause: part.start for part in reversed(proof.undecided)}
+
+
+def _as_checked(cause: RateCause) -> CheckFinding:
+    if isinstance(cause, TooFastIfAssumed):
+        return FasterThanAssumed(cause.joint, cause.needed_deg_s, cause.limit_deg_s, cause.slides)
+    if isinstance(cause, TooFast):
+        return cause
+    assert isinstance(cause, AccelerationTooGreatIfAssumed | AccelerationTooGreat)
+    return AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2, cause.slides)
+
+
+def _arrival_moments(followed: Followed, given: Reals | None, way: MotionWay) -> dict[CheckFinding, float]:
+    """Turns at rest at the start, and whether the end has the joints that the program gives; with their times, s."""
+    found: dict[CheckFinding, float] = {}
+    turn, last = followed.start_turn, followed.q[-1]
+    joint = int(np.argmax(np.abs(turn)))
+    if abs(turn[joint]) > SAME_ARRIVAL:
+        found[TurnsAtStart(joint + 1, float(np.degrees(turn[joint])))] = 0.0
+    if given is not None and np.isfinite(last).all() and np.abs(last - given).max() > SAME_ARRIVAL:
+        joint = int(np.argmax(np.abs(last - given)))
+        other = joint_shown(way.arm, joint, float(last[joint] - given[joint]))
+        found[ArrivesOtherwise(joint + 1, *other)] = way.law.duration
+    return found
+
+
+def _points(length: float, turned: float) -> int:
+    wanted = max(length / POINTS_APART_M, turned / POINTS_APART_RAD)
+    return int(np.clip(np.ceil(wanted) + 1, FEWEST_POINTS, MOST_POINTS))
+
+
+def _rate_moments(
+    arm: Robot, law: MotionLaw, greatest: tuple[Reals, Reals], limits: JointLimits
+) -> dict[CheckFinding, float]:
+    """Of a joint move with greatest speeds and accelerations (n,), each with when (s) it gets too great."""
+    found: dict[CheckFinding, float] = {}
+    speed = greatest[0]
+    for j in np.flatnonzero(speed > limits.speed * (1 + SPEED_TOLERANCE)).tolist():
+        (needed, slides), (able, _) = (joint_shown(arm, j, float(rates[j])) for rates in (speed, limits.speed))
+        made = TooFast if np.isfinite(arm.speed[j]) else FasterThanAssumed
+        found[made(j + 1, needed, able, slides)] = speed_moment(law, float(limits.speed[j] / speed[j]))
+    return found | dict.fromkeys(_acceleration_findings(arm, greatest[1], limits), 0.0)
+
+
+def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits) -> list[CheckFinding]:
+    """The joint that asks most of its acceleration, if that is too much."""
+    ratio = acceleration / limits.acceleration
+    worst = int(np.argmax(ratio))
+    if ratio[worst] <= 1 + SPEED_TOLERANCE:
+        return []
+    (needed, slides), (able, _) = (
+        joint_shown(arm, worst, float(rates[worst])) for rates in (acceleration, limits.acceleration)
+    )
+    return [AcceleratesMoreThanAssumed(worst + 1, needed, able, slides)]
+
+
+def _configuration_moment(arm: Robot, law: MotionLaw, joints_at: Callable[[Reals], Reals]) -> dict[CheckFinding, float]:
+    """Whether a joint move ends in another configuration, and when (s) it leaves that of its start."""
+    if closed_form_missing(arm) is not None:
+        return {}
+
+    def slot(share: float) -> int | None:
+        return _slot(arm, joints_at(np.array(share)))
+
+    labels, first, last = branch_labels(arm), slot(0.0), slot(1.0)
+    if first is None or last is None or first == last:
+        return {}
+    return {ConfigurationChanges(labels[first], labels[last]): change_moment(law, slot)}
+
+
+def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: float) -> list[CheckFinding]:
+    found: list[CheckFinding] = []
+    step = end - start
+    turned_by = np.where(arm.slides, 0.0, np.abs(step))
+    lead = int(np.argmax(turned_by))
+    if turned_by[lead] > FAR_TURN and moved < NEAR_MOVE and turned < turned_by[lead] / 2:
+        found.append(JointJumps(lead + 1, float(np.degrees(step[lead])), moved * 1000))
+    for j in np.flatnonzero(turned_by > np.pi + NO_WAY).tolist():
+        nearer = float(wrap_to_pi(step[j]))
+        if arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
+            found.append(WholeTurn(j + 1, *np.degrees([step[j], nearer]).tolist()))
+    return found
+
+
+def _slot(arm: Robot, q: Reals) -> int | None:
+    """The closed-form branch of joint angles; None on a singular pose, which belongs to two."""
+    found = determinant_factors(arm, q)
+    factors = np.array([found.shoulder, found.elbow, found.wrist])
+    if np.abs(factors).min() < NO_WAY:
+        return None
+    back, down, flip = (bool(factor) for factor in (factors[0] > 0, factors[1] < 0, factors[2] < 0))
+    return 4 * back + 2 * down + flip
