@@ -1,9 +1,8 @@
 """Lines and arcs one after another, their corners rounded or stopped at.
 
-The whole runs on one parameter: the way of each segment, where a turn counts as TURN_LENGTH per radian if that is
-more. Position and orientation are both rounded at a corner (:mod:`er3a.planning.sequences`); the orientation as rotation
-vector about the corner's own, in which each side is straight. A corner that is not rounded is a halt, unless the
-sides run on into each other.
+The whole runs on one parameter: the arc length of each segment, where a turn counts as TURN_LENGTH per radian if that
+is more. Position and orientation are both rounded at a corner; the orientation as rotation vector about the corner's
+own, in which each side is straight. A corner that is not rounded is a halt, unless the sides run on into each other.
 
 Curves put together from pieces of fifth degree, and the pieces that round their corners.
 

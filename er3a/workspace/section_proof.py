@@ -6,7 +6,7 @@ For a point x of the cell at the angle phi, the sphere of radius d about W must 
 zone. Move joints 1 to 3 along a short straight line from a configuration where every point of the cell lies inside the
 sphere to one where every point lies outside: by the intermediate value theorem the sphere passes through each point on
 the way. If the direction stays in the zone all along, for all points of the cell, the cell is filled. Standing still in
-joints 2 and 3 (:mod:`er3a.workspace.section_proof`) is the case of a line along phi, with exact ranges; here any joint may
+joints 2 and 3 is the case of a line along phi, with exact ranges; here any joint may
 move, which is what it takes where the wrist must lie in the cell's own half plane.
 
 Proof that the tool point can't enter a cell: branch and bound over joints 1 to 3.
@@ -521,7 +521,7 @@ def judge_cells(
     Parameters
     ----------
     cells : (n, 4), m: rho_0, rho_1, z_0, z_1
-    grid : configurations (m, 9), see :func:`er3a.workspace.section_proof.fill_configurations`, and their spacing in theta_2
+    grid : configurations (m, 9), see :func:`fill_configurations`, and their spacing in theta_2
         and tau, rad
     most_boxes : of one emptiness proof; 0: nothing is proven empty, only filled
     unfilled, empty : (n, MOST_ARCS, 2), azimuths (rad) that are not proven filled, and those of them that are proven

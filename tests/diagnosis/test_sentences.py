@@ -7,7 +7,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from er3a.diagnosis import conclusions
+from er3a.diagnosis import conclusions, faults
 from er3a.diagnosis.conclusions import (
     Conclusion,
     FlangePositionDecides,
@@ -135,7 +135,7 @@ def test_fitted_numbers_to_four_digits_are_the_same_fault():
     assert rounded(WrongScale(np.float64(0.9523809))) == WrongScale(0.952381)
 
 
-@pytest.mark.parametrize("room", [conclusions, fault_kinds])
+@pytest.mark.parametrize("room", [conclusions, faults])
 def test_codes_are_different(room):
     codes = [kind.code for kind in vars(room).values() if isinstance(kind, type) and hasattr(kind, "code")]
     assert len(set(codes)) == len(codes)

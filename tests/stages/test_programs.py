@@ -13,6 +13,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.results import Stored, read_results
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.programs.compute import compute as compute_programs
 from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults, SomeProgramsFail
@@ -20,7 +21,6 @@ from er3a.pipeline.stages.programs.record import record
 from er3a.pipeline.stages.programs.report import report
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.study import Study, load_study
 from er3a.programs.csv_program import write_csv
 

@@ -27,10 +27,10 @@ from er3a.pipeline.results import (
     read_results,
     write_results,
 )
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.model import (
     FASTEST,
     RESULTS,

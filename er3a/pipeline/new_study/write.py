@@ -26,7 +26,7 @@ from er3a.formats.urdf import import_urdf, robot_name
 from er3a.formats.xacro import plain_urdf
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.new_study.tasks import LEAST_TARGETS, Spot, TaskSearch, reach_of, scenes
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.robots.robot import Robot
 
 SCHEMA_LINE = "# yaml-language-server: $schema=../../config/robot.schema.json\n"

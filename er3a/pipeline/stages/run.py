@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from er3a.errors import Er3aError, InputError, ResultError, WriteError
 from er3a.pipeline.messages.common import say
@@ -16,17 +16,33 @@ from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
     Results,
+    Stored,
     Summary,
     Verdict,
     read_stage,
     write_results,
 )
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.stage import Compute, Stage, View
+from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
 
 FOR_A_PERSON = (InputError, ResultError, WriteError, MemoryError, OSError, ImportError)
 """What a person corrects and runs again; anything else belongs to the stage and the robot, and others go on."""
+
+
+class Compute(Protocol):
+    """What a stage's ``compute.compute`` is: a robot's results from the study.
+
+    A stage that is sampled takes the files of its ``parts`` besides.
+    """
+
+    def __call__(self, study: Study, name: str, /) -> Results[Any]: ...
+
+
+class View(Protocol):
+    """What a stage's ``record.record`` and ``report.report`` are: they write a view of stored results."""
+
+    def __call__(self, study: Study, stored: Stored[Any], output: Path, /) -> None: ...
 
 
 def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path] | None = None) -> str | None:

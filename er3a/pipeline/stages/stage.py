@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
+from er3a.files.robot_library import LoadFields
 from er3a.files.yaml_file import StrictModel
 from er3a.findings import Finding
 from er3a.numerics.jit import cache_folder
@@ -15,9 +16,27 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.tables import table_types
 from er3a.robots.robot import Robot
 
-if TYPE_CHECKING:
-    from er3a.pipeline.results import Results, Stored
-    from er3a.pipeline.study import Study
+
+class RobotFiles(Protocol):
+    """The files that a study names for a robot."""
+
+    @property
+    def targets(self) -> str: ...
+    @property
+    def paths(self) -> str: ...
+    @property
+    def programs(self) -> str | None: ...
+    @property
+    def vision(self) -> str | None: ...
+
+
+class StudyFiles(Protocol):
+    """What a stage asks of a study to name its inputs; :class:`er3a.pipeline.study.StudyBase` says what each gives."""
+
+    def entry(self, name: str) -> RobotFiles: ...
+    def references(self, name: str) -> list[str]: ...
+    def scenes(self, name: str, stage: str) -> list[Path]: ...
+    def loads(self, name: str) -> list[LoadFields]: ...
 
 
 def applies_to_all(robot: Robot) -> Finding | None:
@@ -25,29 +44,14 @@ def applies_to_all(robot: Robot) -> Finding | None:
     return None
 
 
-def no_files(study: Study, robot: str) -> list[Path]:
+def no_files(study: StudyFiles, robot: str) -> list[Path]:
     """For stages that read nothing but the robot's file."""
     return []
 
 
-def wanted_of_all(study: Study, robot: str) -> bool:
+def wanted_of_all(study: StudyFiles, robot: str) -> bool:
     """For stages that every robot of a study goes through."""
     return True
-
-
-class Compute(Protocol):
-    """What a stage's ``compute.compute`` is: a robot's results from the study.
-
-    A stage that is sampled takes the files of its ``parts`` besides.
-    """
-
-    def __call__(self, study: Study, name: str, /) -> Results[Any]: ...
-
-
-class View(Protocol):
-    """What a stage's ``record.record`` and ``report.report`` are: they write a view of stored results."""
-
-    def __call__(self, study: Study, stored: Stored[Any], output: Path, /) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -74,8 +78,8 @@ class Stage:
     title: str
     question: str
     settings: Mapping[str, type[StrictModel]]
-    inputs: Callable[[Study, str], list[Path]] = no_files
-    wanted: Callable[[Study, str], bool] = wanted_of_all
+    inputs: Callable[[StudyFiles, str], list[Path]] = no_files
+    wanted: Callable[[StudyFiles, str], bool] = wanted_of_all
     applies: Callable[[Robot], Finding | None] = applies_to_all
     absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")

@@ -23,7 +23,7 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
 from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_verdict
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.scripts import import_map
 from er3a.pipeline.viewing.page import render, run_command

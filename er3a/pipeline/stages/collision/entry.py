@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field
 
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.stage import Stage, StudyFiles
 from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-
-if TYPE_CHECKING:
-    from er3a.pipeline.study import Study
 
 
 class CollisionSettings(StrictModel):
@@ -34,7 +31,7 @@ class CollisionSettings(StrictModel):
     penetration_tolerance_mm: Annotated[float, Field(ge=0.01, le=100)] = 1.0
 
 
-def _inputs(study: Study, robot: str) -> list[Path]:
+def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     named = [Path(study.entry(robot).targets), *TRAJECTORY.inputs(study, robot), *study.scenes(robot, STAGE.name)]
     return list(dict.fromkeys(named))
 

@@ -26,6 +26,7 @@ from er3a.dynamics.wrist import load_diagram, wrist_use
 from er3a.files.robot_library import load_of
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.dynamics.model import (
     AllWithin,
@@ -51,7 +52,6 @@ from er3a.pipeline.stages.dynamics.model import (
     WristMoment,
     hardest_held,
 )
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, study_motions
 from er3a.pipeline.study import Study
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along

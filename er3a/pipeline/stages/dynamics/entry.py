@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field
 
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.stages.stage import Stage
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.stage import Stage, StudyFiles
 from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-
-if TYPE_CHECKING:
-    from er3a.pipeline.study import Study
 
 
 class DynamicsSettings(StrictModel):
@@ -33,7 +30,7 @@ class DynamicsSettings(StrictModel):
     capsule_density_kg_m3: Annotated[float, Field(ge=10, le=20_000)] | None = None
 
 
-def _inputs(study: Study, robot: str) -> list[Path]:
+def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     meshes = [file for load in study.loads(robot) for file in load.files]
     return [*TRAJECTORY.inputs(study, robot), *meshes]
 

@@ -33,6 +33,7 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches,
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.progress import shown_progress
 from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.stages.inverse.model import (
@@ -69,7 +70,6 @@ from er3a.pipeline.stages.inverse.model import (
     UnsolvedTarget,
     VisitOrder,
 )
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, shown

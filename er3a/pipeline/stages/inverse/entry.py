@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.stages.stage import Stage
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-
-if TYPE_CHECKING:
-    from er3a.pipeline.study import Study
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.stage import Stage, StudyFiles
 
 RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
 
@@ -32,7 +29,7 @@ class InverseSettings(StrictModel):
     mix: Annotated[dict[RuleName, Annotated[float, Field(ge=0, le=1000)]], Field(min_length=1)] = {"nearest": 1}
 
 
-def _inputs(study: Study, robot: str) -> list[Path]:
+def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     return [Path(study.entry(robot).targets), *study.scenes(robot, STAGE.name)]
 
 

@@ -15,6 +15,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
 from er3a.pipeline.stages.programs.model import (
@@ -30,7 +31,6 @@ from er3a.pipeline.stages.programs.model import (
     SomeProgramsCaution,
     SomeProgramsFail,
 )
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import assumed_speeds
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program

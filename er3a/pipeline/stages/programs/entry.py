@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field
 
 from er3a.files.program_file import load_programs
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.stages.stage import Stage
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.stage import Stage, StudyFiles
 from er3a.programs.read_program import files_of
-
-if TYPE_CHECKING:
-    from er3a.pipeline.study import Study
 
 
 class ProgramsSettings(StrictModel):
@@ -32,7 +29,7 @@ class ProgramsSettings(StrictModel):
     loop_rounds: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
 
 
-def _inputs(study: Study, robot: str) -> list[Path]:
+def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     file = study.entry(robot).programs
     if file is None:
         return []
@@ -40,7 +37,7 @@ def _inputs(study: Study, robot: str) -> list[Path]:
     return [Path(file), *programs, *study.scenes(robot, "trajectory")]
 
 
-def _wanted(study: Study, robot: str) -> bool:
+def _wanted(study: StudyFiles, robot: str) -> bool:
     return study.entry(robot).programs is not None
 
 

@@ -19,8 +19,8 @@ from er3a.kinematics.singularity import NearSingular, characteristic_length, con
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import (
     Judgement,
     Surroundings,

@@ -3,54 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field
-
-from er3a.files.robot_file import Text
-from er3a.files.yaml_file import StrictModel, read_yaml
+from er3a.files.yaml_file import read_yaml
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.stages.stage import Stage
-from er3a.planning.avoidance.avoidance_findings import StrategyName
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.stage import Stage, StudyFiles
 from er3a.programs.read_program import files_of
-from er3a.programs.syntax import Language
-from er3a.robots.robot import MOST_JOINTS
-
-if TYPE_CHECKING:
-    from er3a.pipeline.study import Study
 
 
-class TrajectorySettings(StrictModel):
-    """Where a path counts as near-singular, and how many points are checked between two samples.
-
-    ``avoidance`` chooses the avoidance strategy, or compares all of them. Joints of unknown speed are taken to do
-    ``assumed_speed_deg_s`` (those beyond its end the last of it), those that slide ``assumed_speed_mm_s``; all joints
-    to reach full speed in ``acceleration_time_s``, unless their greatest accelerations are given
-    (``acceleration_deg_s2``, one for each joint). ``jerk_deg_s3`` bounds the jerk; left out, nothing does.
-    ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between
-    points. Safe paths are written as programs in the languages ``programs``; others only with ``write_unsafe``, with
-    the reason in the file.
-    """
-
-    checks_per_sample: Annotated[int, Field(ge=1, le=1000)]
-    near_wrist_deg: Annotated[float, Field(gt=0, le=90)]
-    near_elbow_deg: Annotated[float, Field(gt=0, le=90)]
-    near_shoulder_mm: Annotated[float, Field(gt=0, le=10_000)]
-    avoidance: Literal["compare"] | StrategyName = "compare"
-    assumed_speed_deg_s: Annotated[
-        list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=1, max_length=MOST_JOINTS)
-    ] = [180, 180, 180, 360, 360, 360]
-    assumed_speed_mm_s: Annotated[float, Field(gt=0, le=100_000)] = 500
-    acceleration_time_s: Annotated[float, Field(gt=0, le=10)] = 0.25
-    acceleration_deg_s2: Annotated[list[Annotated[float, Field(gt=0, le=1e6)]], Field(min_length=1)] | None = None
-    jerk_deg_s3: Annotated[list[Annotated[float, Field(gt=0, le=1e9)]], Field(min_length=1)] | None = None
-    scene: Text | None = None
-    penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
-    programs: list[Language] = ["krl", "urscript", "rpl", "xpl", "csv"]
-    write_unsafe: bool = False
-
-
-def _inputs(study: Study, robot: str) -> list[Path]:
+def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     paths = study.entry(robot).paths
     return [Path(paths), *_tables_of(paths), *study.scenes(robot, STAGE.name)]
 

@@ -20,7 +20,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.planning.build import Built, build
 from er3a.planning.class_follow import PathEndsError, follow_by_class

@@ -25,7 +25,7 @@ from er3a.pipeline.messages.trajectory import (
 )
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.figures import PathFigure, clearance_section, turning_figure
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field
 
 from er3a.files.reference_sets import reference_folder
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.stages.stage import Stage
-
-if TYPE_CHECKING:
-    from er3a.pipeline.study import Study
+from er3a.pipeline.stages.stage import Stage, StudyFiles
 
 
 class ValidationSettings(StrictModel):
@@ -23,7 +20,7 @@ class ValidationSettings(StrictModel):
     reach_starts: Annotated[int, Field(ge=1, le=10_000)]
 
 
-def _inputs(study: Study, robot: str) -> list[Path]:
+def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     return [file for name in study.references(robot) for file in sorted(reference_folder(name).glob("*.csv"))]
 
 

@@ -23,8 +23,8 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision.entry import VisionSettings
 from er3a.pipeline.stages.vision.model import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field
 
@@ -11,11 +11,8 @@ from er3a.files.robot_file import Text
 from er3a.files.vision_file import vision_files
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.stages.stage import Stage
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
-
-if TYPE_CHECKING:
-    from er3a.pipeline.study import Study
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.stage import Stage, StudyFiles
 
 
 class VisionSettings(StrictModel):
@@ -36,12 +33,12 @@ class VisionSettings(StrictModel):
     line_speed_mm_s: Annotated[float, Field(gt=0, le=10_000)] = 100.0
 
 
-def _inputs(study: Study, robot: str) -> list[Path]:
+def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     file = study.entry(robot).vision
     return [*vision_files(file), *study.scenes(robot, STAGE.name)] if file else []
 
 
-def _wanted(study: Study, robot: str) -> bool:
+def _wanted(study: StudyFiles, robot: str) -> bool:
     return study.entry(robot).vision is not None
 
 

@@ -19,7 +19,7 @@ from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.messages.vision import FIGURES, METHODS, direction_word, pose_words
 from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, player, player_style
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.trajectory.entry import TrajectorySettings
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.vision.model import (
     CalibrationResult,
     CornerRows,

@@ -362,11 +362,11 @@ def _raster(points: Reals, steps: list[float], percent: Singles, proven: Flags) 
 def _draw_boxes(axes: Axes, listed: Sequence[PlaceSummary], shown: list[int]) -> None:
     """Outlines with their numbers; boxes that fall on each other share a label."""
     labels: dict[tuple[float, float], list[str]] = {}
-    for number, place in enumerate(listed, start=1):
+    for position, place in enumerate(listed, start=1):
         centre, size = (1000 * np.array(part)[shown] for part in (place.centre_m, place.size_m))
         low = centre - size / 2
         axes.add_patch(Rectangle((low[0], low[1]), *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
-        labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(str(number))
+        labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(str(position))
     shade = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
     near = _LABEL * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
     taken: list[tuple[float, float]] = []

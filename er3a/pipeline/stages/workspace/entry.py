@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
@@ -13,10 +13,7 @@ from er3a.files.robot_file import Text
 from er3a.files.units import FARTHEST_MM, Triple, check_millimetres
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.stages.stage import Stage
-
-if TYPE_CHECKING:
-    from er3a.pipeline.study import Study
+from er3a.pipeline.stages.stage import Stage, StudyFiles
 
 SAMPLES_PER_JOB = 1_000_000_000
 """About ten seconds, of which starting is a tenth."""
@@ -98,7 +95,7 @@ class CapabilitySettings(StrictModel):
     placement: BoxTask = BoxTask()
 
 
-def _inputs(study: Study, robot: str) -> list[Path]:
+def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     drawings = [reference_folder(name) / "envelope.csv" for name in study.references(robot)]
     return [*(file for file in drawings if file.is_file()), *study.scenes(robot, "capability")]
 
