@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-NEAR = {"wrist": 0.1, "elbow": 0.1, "shoulder": 0.03}
+from er3a.kinematics.singularity import NearSingular
+
+NEAR = NearSingular(0.1, 0.1, 0.03)
 
 SOLVE = """
 const [panel, joints, done] = arguments;

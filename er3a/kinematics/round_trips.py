@@ -15,7 +15,7 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import arm_solver, parameters_of, task_mask
 from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import NearSingular, determinant_factors
+from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Flags, Integers
 from er3a.robots.robot import Robot
@@ -133,8 +133,7 @@ def _block(robot: Robot, random: np.random.Generator, count: int) -> tuple[float
     gap = np.abs(wrap_to_pi(found - q[:, None])).max(axis=2)
     nearest = np.where(solved, gap, np.inf).min(axis=1)
 
-    factors = determinant_factors(robot, q)
-    near = NEAR.contains(factors)
+    near = NEAR.contains(robot, q)
     judged = nearest[~near & solved.any(axis=1)]
 
     rows, slots = np.nonzero(solved)

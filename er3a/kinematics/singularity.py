@@ -387,9 +387,10 @@ class NearSingular:
         """Distances from the three singular sets over their thresholds, (3, ...) in the order of TYPES."""
         return np.stack([np.abs(factor_of(factors, kind)) / self.of(kind) for kind in TYPES])
 
-    def contains(self, factors: DeterminantFactors) -> Flags:
-        """Whether poses (...,) are near-singular; False where the factors are NaN."""
-        near: Flags = np.any([self.is_near(kind, np.abs(factor_of(factors, kind))) for kind in TYPES], axis=0)
+    def contains(self, robot: Robot, q: Reals) -> Flags:
+        """Whether any arm is near-singular at joint values (N, J) in rad or m; False where they are NaN."""
+        near = np.array(np.isfinite(q).all(axis=1))
+        near[near] = self.margin(robot, q[near]) < 1.0
         return near
 
     def margin(self, robot: Robot, q: Reals) -> Reals:

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from er3a.errors import NotWristPartitionedError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import jacobian
-from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, determinant_factors
+from er3a.pipeline.teach.panel import panel_data
 from testing.arms import arms, joints_at_random, joints_within, make_arm, number
 
 
@@ -105,3 +106,23 @@ def test_batches_keep_their_shape(robot, shape):
 
 def test_characteristic_length_is_the_reach_from_axis_two(robot):
     assert characteristic_length(robot) == pytest.approx(robot.a[1] + np.hypot(robot.a[2], robot.d[3]))
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "oblique"])
+def test_page_and_panel_call_the_same_poses_near_singular(name, random):
+    """The panel compares with the thresholds that it is given; here the same is done by NumPy alone."""
+    robot = load_robot(name) if name == "er3a_c60" else make_arm(alpha=np.radians([-90, 20, -90, 90, -90, 0]))
+    near = NearSingular(0.1, 0.2, 0.03)
+    given = panel_data(robot, near)["near"]
+    q = joints_at_random(robot, random, 4000)
+    if name == "er3a_c60":
+        factors = determinant_factors(robot, q)
+        expected = np.any([np.abs(getattr(factors, kind)) < given[kind] for kind in ("wrist", "elbow", "shoulder")], 0)
+    else:
+        J = jacobian(robot, q)
+        J[:, :3] /= characteristic_length(robot)
+        expected = np.linalg.svd(J, compute_uv=False)[:, -1] < given["value"]
+    assert 0 < expected.mean() < 1
+    np.testing.assert_array_equal(near.contains(robot, q), expected)
+    q[:5] = np.nan
+    assert not near.contains(robot, q)[:5].any()

@@ -14,7 +14,7 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import PairsUnexamined, arm_shapes
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
-from er3a.kinematics.singularity import characteristic_length
+from er3a.kinematics.singularity import TYPES, NearSingular, characteristic_length
 from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.foundations import caveat
@@ -254,7 +254,6 @@ NEAR_LIMIT = np.radians(5.0)
 NEAR_END = 0.01  # m, of a joint that slides
 NEAR_TOUCH = 0.03  # m
 KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
-NEAR_SINGULAR = 1e-2  # smallest singular value below which an arm without named singularities is warned of one
 
 
 def write_teach_page(study: Study, name: str, results: Path, output: Path) -> None:
@@ -263,14 +262,9 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     validated = results / name / "validation"
     told_first = caveat(read_verdict(validated)[0] if (validated / SUMMARY).exists() else "not_computed")
     settings = study.section(TrajectorySettings)
-    near = {
-        "wrist": np.radians(settings.near_wrist_deg),
-        "elbow": np.radians(settings.near_elbow_deg),
-        "shoulder": settings.near_shoulder_mm / 1000,
-    }
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
-    panel = panel_data(robot, near) | {
+    panel = panel_data(robot, settings.near_singular) | {
         "scene": scene_data(scene.solids if scene else ()),
         "carried": scene_data(scene.carried if scene else ()),
         "floor": floor_of(scene),
@@ -298,14 +292,15 @@ def _provenance(study: Study, name: str) -> Provenance:
     return Provenance(inputs=inputs, code=code_digest(__name__), config=study.settings(name, "trajectory"))
 
 
-def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
+def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
     """What the scripts take of a robot, as plain data; SI units.
 
     Parameters
     ----------
-    near : per type of singularity the distance (rad; m for shoulder) below which the panel warns
+    near : where the panel warns of a singularity
     """
     missing = closed_form_missing(robot) or (None if robot.coupling is None else CoupledJoints())
+    thresholds = {kind: near.of(kind) for kind in TYPES}
     labels = [] if missing else [branch_word(label) for label in branch_labels(robot)]
     return {
         "name": robot.name,
@@ -315,7 +310,7 @@ def panel_data(robot: Robot, near: dict[str, float]) -> dict[str, Any]:
         "characteristic_length": characteristic_length(robot),
         "no_closed_form": say(missing) if missing else None,
         "branch_labels": labels,
-        "near": {**near, "limit": NEAR_LIMIT, "slide": NEAR_END, "value": NEAR_SINGULAR},
+        "near": {**thresholds, "value": near.smallest, "limit": NEAR_LIMIT, "slide": NEAR_END},
         "programs": robot.joints == robot.rows == SIX and not robot.sliding.any() and robot.coupling is None,
         "joint_names": joint_names(robot),
         "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},

@@ -12,7 +12,6 @@ from er3a.collision.shapes import PairsUnexamined
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
@@ -85,11 +84,7 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
     paths, own = study.section(TrajectorySettings), study.section(ProgramsSettings)
     return CheckOptions(
         frames=listed.transforms(),
-        near=NearSingular(
-            float(np.radians(paths.near_wrist_deg)),
-            float(np.radians(paths.near_elbow_deg)),
-            paths.near_shoulder_mm / 1000,
-        ),
+        near=paths.near_singular,
         assumed_speed=assumed_speeds(robot, paths),
         acceleration_time=paths.acceleration_time_s,
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,

@@ -451,9 +451,6 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
     part = conditioning(robot, found.q[reached], characteristic_length(robot))
     measures[reached] = np.stack([part.manipulability, part.condition_number, part.smallest_singular_value], axis=1)
     factors = factors_where_defined(robot, found.q)
-    near_singular = near.contains(factors)
-    if not has_branches(robot):
-        near_singular[reached] = near.margin(robot, found.q[reached]) < 1.0
     return PathChecks(
         path=np.full(len(found.times), motion.entry.name, object),
         t_s=found.times,
@@ -471,7 +468,7 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
         shoulder_mm=factors.shoulder * 1000,
         reachable=reached,
         within_limits=within(robot, found.q) & reached,
-        near_singular=near_singular,
+        near_singular=near.contains(robot, found.q),
         sample=np.isin(found.times, motion.samples),
     )
 

@@ -17,7 +17,6 @@ from er3a.files.path_file import PathEntry, ProgramPath, load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.settings import TrajectorySettings
@@ -261,9 +260,7 @@ def _joint_motion(
 
 def wanted_of(robot: Robot, settings: TrajectorySettings) -> Wanted:
     """What is to be settled of paths of the tool."""
-    wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg])
-    near = NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
-    return Wanted(limits_of(robot, settings).rates, near)
+    return Wanted(limits_of(robot, settings).rates, settings.near_singular)
 
 
 def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:
