@@ -1,8 +1,10 @@
-"""The house rules that can be read off the source: short functions, few arguments, names that stand for one thing."""
+"""The house rules that can be read off the source: short functions, few arguments, names that stand for one thing, no
+circle of files, documents that name files where they stand."""
 
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
@@ -72,3 +74,38 @@ def test_no_two_classes_share_a_name():
             if isinstance(node, ast.ClassDef):
                 places[node.name].add(f"{path}:{node.lineno}")
     assert several(places) == {}
+
+
+def modules_imported(tree: ast.Module) -> set[str]:
+    """Full names that a module may import, those within functions and for type checkers too."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return found
+
+
+def test_no_files_import_each_other_in_a_circle():
+    """Files that import nothing left are taken away until none is; what stays imports itself by a detour."""
+    names = {path.removesuffix(".py").removesuffix("/__init__").replace("/", "."): path for path in trees()}
+    left = {name: modules_imported(trees()[path]) & {*names} - {name} for name, path in names.items()}
+    while free := [name for name, others in left.items() if not others & {*left}]:
+        for name in free:
+            del left[name]
+    assert sorted(left) == []
+
+
+def test_documents_name_files_where_they_stand():
+    missing = []
+    for document in (*(ROOT / "docs").glob("*.md"), ROOT / "CONTRIBUTING.md", ROOT / "README.md"):
+        for named in re.findall(r"`((?:er3a/)?[a-z_]+/[a-z_/]+\.py)`", document.read_text(encoding="utf-8")):
+            places = [
+                ROOT / named,
+                ROOT / "er3a" / named,
+                ROOT / "er3a/pipeline" / named,
+                ROOT / "er3a/pipeline/stages" / named,
+            ]
+            missing += [] if any(map(Path.exists, places)) else [f"{document.name}: {named}"]
+    assert missing == []

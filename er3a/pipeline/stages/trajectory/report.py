@@ -26,7 +26,6 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.trajectory.figures import PathFigure, clearance_section, turning_figure
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,
     NearThresholds,
@@ -39,6 +38,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectoryResults,
     TriedStrategy,
 )
+from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, turning_figure
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings

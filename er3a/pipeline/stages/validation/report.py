@@ -18,6 +18,7 @@ from er3a.pipeline.messages.say import counted, joined, say, sentence, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
 from er3a.pipeline.messages.validation_verdict import counted_checks
 from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.validation.arm_figures import axis_deviation, link_frames, side_view, workspace_drawing
 from er3a.pipeline.stages.validation.diagnosis_figures import (
     corrected_robot,
     correction_stories,
@@ -25,7 +26,6 @@ from er3a.pipeline.stages.validation.diagnosis_figures import (
     typographic,
 )
 from er3a.pipeline.stages.validation.evidence_section import OTHER_TITLES, evidence_section, other_robot
-from er3a.pipeline.stages.validation.figures import axis_deviation, link_frames, side_view, workspace_drawing
 from er3a.pipeline.stages.validation.model import (
     Axes,
     Check,

@@ -21,7 +21,6 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.workspace import STATUS
-from er3a.pipeline.stages.workspace.figures import slide_names
 from er3a.pipeline.stages.workspace.model import (
     BoxPlaces,
     CapabilityCells,
@@ -37,6 +36,7 @@ from er3a.pipeline.stages.workspace.model import (
     TaskSummary,
     WorkspaceResults,
 )
+from er3a.pipeline.stages.workspace.workspace_figures import slide_names
 from er3a.pipeline.viewing.arm import skeleton
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number

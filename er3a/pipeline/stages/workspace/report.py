@@ -13,7 +13,14 @@ from er3a.pipeline.messages.say import counted, joined, say, word
 from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace.capability_section import capability_context
-from er3a.pipeline.stages.workspace.figures import (
+from er3a.pipeline.stages.workspace.model import (
+    GrowthCurve,
+    VoidSummary,
+    VoidUnexpected,
+    WorkspaceResults,
+    WorkspaceSummary,
+)
+from er3a.pipeline.stages.workspace.workspace_figures import (
     arc_rows,
     convergence,
     sections,
@@ -21,13 +28,6 @@ from er3a.pipeline.stages.workspace.figures import (
     slices,
     top_view,
     turning_figure,
-)
-from er3a.pipeline.stages.workspace.model import (
-    GrowthCurve,
-    VoidSummary,
-    VoidUnexpected,
-    WorkspaceResults,
-    WorkspaceSummary,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
