@@ -8,8 +8,8 @@ from er3a import forward, load_robot
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import collision_matrix
+from er3a.collision.pairs import LinkPair, Pair
 from er3a.collision.scene import Cylinder, Scene, Sphere
-from er3a.collision.shapes import LinkPair, Pair
 from er3a.geometry.transforms import transform
 from er3a.planning.moves import JointMove
 from testing.dense_contacts import Contacts

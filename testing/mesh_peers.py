@@ -20,7 +20,8 @@ import pinocchio as pin
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import measure
-from er3a.collision.shapes import arm_bodies, layout_of, link_label
+from er3a.collision.pairs import link_label
+from er3a.collision.shapes import arm_bodies, layout_of
 from er3a.formats.urdf import UrdfImport
 from er3a.formats.urdf_tree import mesh_of
 from er3a.robots.robot import Robot

@@ -19,7 +19,7 @@ from er3a.kinematics.singularity import TYPES, NearSingular
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
-from er3a.planning.intervals import PathVerdict
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.planning.tool_proof import Wanted
 from testing.dense_contacts import Contacts

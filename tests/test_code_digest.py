@@ -90,7 +90,7 @@ EDITS = {
     "pipeline/viewing/base.html.j2": (False, True),
     "pipeline/viewing/style.css": (False, True),
     "pipeline/stages/made/script.js": (False, True),
-    "kinematics/inverse.py": (False, False),
+    "workspace/general_proof.py": (False, False),
     "pipeline/stages/workspace/report.html.j2": (False, False),
     "pipeline/stages/workspace/compute.py": (False, False),
     "pipeline/cli.py": (False, False),

@@ -33,8 +33,9 @@ import numpy as np
 import scipy
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import Pair, link_frames
+from er3a.collision.shapes import link_frames
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.runs import runs
 from er3a.robots.robot import Robot

@@ -20,22 +20,9 @@ from er3a.collision.distances import (
     which_overlap,
 )
 from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
+from er3a.collision.pairs import BASE, CarriedAndLink, CarriedAndSolid, LinkAndSolid, LinkPair, Pair, link_label
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import (
-    BASE,
-    Body,
-    CarriedAndLink,
-    CarriedAndSolid,
-    LinkAndSolid,
-    LinkPair,
-    Pair,
-    arm_bodies,
-    carried_bodies,
-    layout_of,
-    link_frames,
-    link_label,
-    solid_bodies,
-)
+from er3a.collision.shapes import Body, arm_bodies, carried_bodies, layout_of, link_frames, solid_bodies
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import but_for_turns

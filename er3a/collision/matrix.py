@@ -34,8 +34,9 @@ import numpy as np
 import scipy
 
 from er3a.collision.distances import FREE, MEETS, ROOM, Layout, measure, pair_distance, place, search_boxes
+from er3a.collision.pairs import BASE, TRIED
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import BASE, TRIED, Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
+from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points

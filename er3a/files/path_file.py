@@ -42,7 +42,7 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
     ToolTableCommand,
 )
-from er3a.planning.intervals import PathVerdict
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.robots.joint_limits import joint_columns
 from er3a.robots.robot import MOST_JOINTS, Robot

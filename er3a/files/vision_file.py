@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 import scipy
@@ -15,7 +14,7 @@ from er3a.files.hand_eye_file import Positive, StandardDeviations
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import UNIT_LENGTH_TOLERANCE, Line
 from er3a.files.units import PositionMm, RpyDeg, Triple
-from er3a.files.yaml_file import StrictModel, load, read_yaml
+from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
@@ -175,26 +174,3 @@ def load_vision(path: str | Path, robot: Robot | None = None) -> VisionFile:
             problem = f"{len(angles)} angles, and the robot {robot.name} has {len(robot.lower)} joints"
             raise InputError(path, key, problem, "Give one for each joint")
     return found
-
-
-def vision_files(path: str | Path) -> list[Path]:
-    """A vision file, its calibration set, and the tables and images of that."""
-    own = Path(path)
-    calibration = read_yaml(own).get("calibration")
-    return [own, *(calibration_files(own.parent / calibration) if isinstance(calibration, str) else [])]
-
-
-def calibration_files(path: str | Path) -> list[Path]:
-    """A calibration set's own file and the tables and images that it names."""
-    path = Path(path)
-    head: dict[str, Any] = read_yaml(path)
-    streams = head.get("streams")
-    named = [head.get("samples"), head.get("touched")]
-    named += [streams.get("flange"), streams.get("target")] if isinstance(streams, dict) else []
-    files = [path, *(path.parent / name for name in named if isinstance(name, str))]
-    if head.get("images") is not None and isinstance(head.get("samples"), str):
-        table = path.parent / head["samples"]
-        if table.is_file():
-            with table.open(encoding="utf-8-sig", newline="") as lines:
-                files += [table.parent / row["image"] for row in csv.DictReader(lines) if row.get("image")]
-    return files

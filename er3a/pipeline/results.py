@@ -29,7 +29,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from er3a.by_value import ByValue
-from er3a.collision.shapes import Pair, PairsUnexamined
+from er3a.collision.pairs import Pair, PairsUnexamined
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
-from er3a.kinematics.singularity import NearSingular
-from er3a.planning.avoidance.avoidance_findings import StrategyName
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.programs.syntax import Language
 from er3a.robots.robot import MOST_JOINTS
 
@@ -43,9 +41,3 @@ class TrajectorySettings(StrictModel):
     penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
     programs: list[Language] = ["krl", "urscript", "rpl", "xpl", "csv"]
     write_unsafe: bool = False
-
-    @property
-    def near_singular(self) -> NearSingular:
-        """Where a pose counts as near-singular, for all stages and the teach panel."""
-        wrist, elbow = np.radians([self.near_wrist_deg, self.near_elbow_deg])
-        return NearSingular(float(wrist), float(elbow), self.near_shoulder_mm / 1000)

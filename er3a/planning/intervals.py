@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar, get_args
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
 import scipy
@@ -333,19 +333,3 @@ def _root(function: Callable[[float], float], t: Reals, values: Reals, a: int, b
     if not low * high < 0:
         return float(t[a] if abs(values[a]) < abs(values[b]) else t[b])
     return float(scipy.optimize.brentq(function, t[a], t[b], xtol=1e-12 * (t[-1] - t[0])))
-
-
-PathVerdict = Literal[
-    "unreachable",
-    "none found",
-    "leaves limits",
-    "collides",
-    "too fast",
-    "singular",
-    "too fast for the assumed limits",
-    "undecided",
-    "near-singular",
-    "safe",
-]
-PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
-"""The gravest first."""

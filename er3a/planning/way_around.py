@@ -27,7 +27,8 @@ import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.shapes import PairOverlaps, link_frames
+from er3a.collision.pairs import PairOverlaps
+from er3a.collision.shapes import link_frames
 from er3a.errors import PathError
 from er3a.numerics.arrays import Reals
 from er3a.planning.piecewise import PiecewiseMotion

@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 
 from er3a.by_value import ByValue
+from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import PairsUnexamined
 from er3a.errors import InputError
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular

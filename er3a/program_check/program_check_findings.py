@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.collision.shapes import Pair, PairsUnexamined
+from er3a.collision.pairs import Pair, PairsUnexamined
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.solutions import Unsolved

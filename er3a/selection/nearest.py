@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.shapes import PairOverlaps
+from er3a.collision.pairs import PairOverlaps
 from er3a.geometry.vectors import greatest_move
 from er3a.kinematics.solutions import Label, Solutions, Unsolved
 from er3a.numerics.arrays import Integers, Reals

@@ -18,8 +18,8 @@ import numpy as np
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.collision.along import bodies_of, clearance
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import PairOverlaps
 from er3a.errors import Er3aError, ShapeError
 from er3a.geometry.vectors import greatest_move
 from er3a.kinematics.inverse import checked_reference

@@ -18,7 +18,7 @@ import numpy as np
 
 from er3a.collision.along import RateBounds, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.shapes import Pair
+from er3a.collision.pairs import Pair
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm
 from er3a.numerics.arrays import Reals

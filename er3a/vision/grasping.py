@@ -19,8 +19,8 @@ import numpy as np
 
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import Pair
 from er3a.geometry.transforms import rot_z, translation
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve

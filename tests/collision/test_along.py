@@ -7,8 +7,8 @@ import pytest
 
 from er3a.collision.along import clearance, clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import LinkAndSolid, LinkPair
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.geometry.transforms import transform

@@ -8,8 +8,9 @@ import yaml
 
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import LinkAndSolid, LinkPair, arm_bodies, arm_shapes, capsule_poses, default_envelopes
+from er3a.collision.shapes import arm_bodies, arm_shapes, capsule_poses, default_envelopes
 from er3a.dynamics.arm_model import estimated_links
 from er3a.errors import InputError, InputWarning
 from er3a.files.robot_library import ROBOTS, load_robot

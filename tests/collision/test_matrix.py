@@ -11,8 +11,9 @@ import pytest
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import collision_matrix
+from er3a.collision.pairs import CarriedAndLink, CarriedAndSolid, LinkPair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import CarriedAndLink, CarriedAndSolid, LinkPair, arm_shapes
+from er3a.collision.shapes import arm_shapes
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot

@@ -15,9 +15,9 @@ from er3a.kinematics.singularity import NearSingular, characteristic_length, det
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
 from er3a.planning.avoidance import avoidance_findings, strategies, via_point
-from er3a.planning.avoidance.avoidance_findings import StrategyName
 from er3a.planning.avoidance.singular_segment import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare, deviation
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
 from er3a.planning.singular_events import singular_events

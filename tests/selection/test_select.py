@@ -9,7 +9,7 @@ import pytest
 
 import er3a
 from er3a.collision.along import clearance
-from er3a.collision.shapes import PairOverlaps
+from er3a.collision.pairs import PairOverlaps
 from er3a.errors import Er3aError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.collision.shapes import LinkAndSolid, PairOverlaps
+from er3a.collision.pairs import LinkAndSolid, PairOverlaps
 from er3a.errors import InputError
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward

@@ -75,7 +75,7 @@ def record(
     The viewer draws it as a picture for the stage's page; of the many variants of a sweep the picture stays empty.
     """
     from er3a.pipeline.results import write_checksum
-    from er3a.pipeline.viewing.viewer import draw_preview, write_empty
+    from er3a.pipeline.viewing.preview import draw_preview, write_empty
 
     loaded, folder = _folder(study, results, robot, stage)
     recording = reports / robot / f"{stage}.rrd"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from er3a.collision.matrix import PairState
-from er3a.collision.shapes import BASE, TRIED, link_label
+from er3a.collision.pairs import BASE, TRIED, link_label
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import sentence, word
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.pairs  # noqa: F401
-from er3a.collision.shapes import TRIED
+from er3a.collision.pairs import TRIED
 from er3a.pipeline.messages.say import joined, listed, say, sentence
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
 

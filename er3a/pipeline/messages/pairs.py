@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from er3a.collision.shapes import (
+from er3a.collision.pairs import (
     BASE,
     TRIED,
     CarriedAndLink,

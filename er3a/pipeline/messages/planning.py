@@ -6,7 +6,7 @@ import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.say import joined, listed, say, sentence, word
 from er3a.planning.avoidance import avoidance_findings
-from er3a.planning.avoidance.avoidance_findings import StrategyName
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import (
     AboveLimit,
     AccelerationTooGreat,

@@ -17,7 +17,7 @@ from er3a.pipeline.stages.trajectory.model import (
     Stretch,
     TriedStrategy,
 )
-from er3a.planning.avoidance.avoidance_findings import StrategyName
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import JerkTooGreat, RateCause
 
 FIGURES = {

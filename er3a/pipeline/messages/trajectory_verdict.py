@@ -6,7 +6,7 @@ import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.say import counted, joined, say, sentence
 from er3a.pipeline.stages.trajectory.model import PathCounts
-from er3a.planning.intervals import PathVerdict
+from er3a.planning.path_verdicts import PathVerdict
 
 
 @say.register

@@ -85,7 +85,7 @@ def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: P
     import_module(stage.verdict_messages)
     stored = read_stage(folder, stage)
     if isinstance(stored.results, AbsentResults):
-        from er3a.pipeline.viewing.page import record_absent, report_absent  # computing needs no pictures
+        from er3a.pipeline.viewing.absent import record_absent, report_absent
 
         view: View = {"record": record_absent, "report": report_absent}[verb]
     else:

@@ -10,8 +10,9 @@ import numpy as np
 import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
+from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import PairsUnexamined, arm_shapes
+from er3a.collision.shapes import arm_shapes
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import TYPES, NearSingular, characteristic_length
@@ -24,6 +25,7 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
 from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_verdict
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.scripts import import_map
 from er3a.pipeline.viewing.page import render, run_command
@@ -264,7 +266,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     settings = study.section(TrajectorySettings)
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
-    panel = panel_data(robot, settings.near_singular) | {
+    panel = panel_data(robot, near_singular(settings)) | {
         "scene": scene_data(scene.solids if scene else ()),
         "carried": scene_data(scene.carried if scene else ()),
         "floor": floor_of(scene),

@@ -23,17 +23,15 @@ from er3a.errors import ResultError
 from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.common import say
 from er3a.pipeline.messages.foundations import Caveat, caveat
 from er3a.pipeline.messages.glossary import glossary
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say_all
-from er3a.pipeline.results import AbsentResults, Provenance, Stored, read_verdict
+from er3a.pipeline.results import Provenance, Stored, read_verdict
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings, svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.recording import escaped, log_note, note_view, recording
 from er3a.version import __version__
 
 _HERE = Path(__file__).parent
@@ -304,24 +302,6 @@ def table_instead(study: Study, name: str, results: Path) -> str | None:
         if status in ("pass", "caution"):
             return other
     return None
-
-
-def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
-    """Write the page: the verdict, and where it comes from."""
-    render(
-        Path(__file__).with_name("absent.html.j2"),
-        output,
-        head=head_of(stored, {}),
-        command=run_command(study, f"{stored.robot}/{stored.stage}.html"),
-        robot=study.robot(stored.robot),
-        robot_pages=study.pages(stored.robot),
-    )
-
-
-def record_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
-    """Write a recording that holds the reason alone."""
-    with recording(output, stored.robot, stored.stage, note_view(stored.stage)) as stream:
-        log_note(stream, stored.stage, escaped(say(stored.results.summary.verdict.finding)))
 
 
 def panel_link(q_deg: Iterable[float], text: str) -> str:

@@ -140,6 +140,3 @@ class AccelerationExceeded:
 
     ratio: float
     code: Literal["acceleration_exceeded"] = "acceleration_exceeded"
-
-
-StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop", "planned"]

@@ -45,9 +45,9 @@ from er3a.planning.avoidance.avoidance_findings import (
     PartlyOutOfReach,
     PathNotFinished,
     SpeedExceeded,
-    StrategyName,
 )
 from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, Strategy, coarse, singular_segment
+from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
 from er3a.planning.follow import Followed, follow
 from er3a.planning.timing import Timed, TimingError, joined, straight, through

@@ -17,7 +17,7 @@ from er3a.collision.free_space import (
     sample_joint_space,
 )
 from er3a.collision.matrix import base_contacts
-from er3a.collision.shapes import Pair
+from er3a.collision.pairs import Pair
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse

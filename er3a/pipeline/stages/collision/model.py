@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.collision.matrix import PairState
-from er3a.collision.shapes import Pair
+from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import ListedColormap
 
-from er3a.collision.shapes import TRIED
+from er3a.collision.pairs import TRIED
 from er3a.files.scene_file import load_scene
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
@@ -27,11 +27,11 @@ from er3a.pipeline.stages.collision.model import (
     TargetClearances,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import skeleton
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 

@@ -10,8 +10,8 @@ import scipy
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import PairOverlaps
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.geometry.transforms import rotation_angle, rpy_of, transform

@@ -15,9 +15,10 @@ from er3a.pipeline.messages.selection import say
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult, shown_targets
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion, skeleton
+from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, log_scene, note_view, recording
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
 from er3a.robots.robot import Robot
 

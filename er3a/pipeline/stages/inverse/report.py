@@ -45,11 +45,11 @@ from er3a.pipeline.stages.inverse.model import (
     shown_targets,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import skeleton
 from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, colour_of, shape_of
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import LimitsExceeded, meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES

@@ -18,7 +18,7 @@ from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import log_arm, send_motion, skeleton
+from er3a.pipeline.viewing.arm import log_arm, send_motion
 from er3a.pipeline.viewing.palette import JOINT_NAMES, JOINTS, VERDICTS, rgb
 from er3a.pipeline.viewing.recording import (
     ARM,
@@ -31,6 +31,7 @@ from er3a.pipeline.viewing.recording import (
     recording,
     send_series,
 )
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.program_check.program_check_findings import Level
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot

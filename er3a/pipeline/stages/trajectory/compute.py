@@ -10,7 +10,7 @@ import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.shapes import PairOverlaps
+from er3a.collision.pairs import PairOverlaps
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
@@ -57,10 +57,11 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
-from er3a.planning.avoidance.avoidance_findings import StrategyName
 from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
-from er3a.planning.intervals import PATH_VERDICTS, Interval, PathVerdict
+from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.intervals import Interval
+from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
 from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between

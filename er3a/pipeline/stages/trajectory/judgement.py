@@ -20,13 +20,13 @@ from er3a.planning.intervals import (
     Interval,
     LimitCause,
     PathOutOfReach,
-    PathVerdict,
     RateCause,
     TooFastIfAssumed,
     out_of_limits,
     rates_exceeded,
     unreachable,
 )
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.polynomial_checks import GreatestRates, LimitCheck, RateCheck, SingularCheck
 from er3a.planning.singular_events import SingularEvent, singular_events

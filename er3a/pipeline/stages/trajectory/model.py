@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
-from er3a.collision.shapes import Pair, PairOverlaps
+from er3a.collision.pairs import Pair, PairOverlaps
 from er3a.findings import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
@@ -17,9 +17,10 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
-from er3a.planning.avoidance.avoidance_findings import StrategyName
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.intervals import LimitCause, PathOutOfReach, PathVerdict, RateCause
+from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.intervals import LimitCause, PathOutOfReach, RateCause
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.tool_proof import Undecided
 from er3a.planning.way_around import NoWayAround
 

@@ -17,6 +17,7 @@ from er3a.files.path_file import PathEntry, ProgramPath, load_paths
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
+from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.settings import TrajectorySettings
@@ -25,8 +26,8 @@ from er3a.planning.build import Built, build
 from er3a.planning.class_follow import PathEndsError, follow_by_class
 from er3a.planning.commands import Command, CommandSource, PlanCommand
 from er3a.planning.follow import Followed
-from er3a.planning.intervals import PathVerdict
 from er3a.planning.moves import JointMove
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.sequences import JointSequence
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
@@ -258,9 +259,15 @@ def _joint_motion(
     )
 
 
+def near_singular(settings: TrajectorySettings) -> NearSingular:
+    """Where a pose counts as near-singular, for all stages and the teach panel."""
+    wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg])
+    return NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
+
+
 def wanted_of(robot: Robot, settings: TrajectorySettings) -> Wanted:
     """What is to be settled of paths of the tool."""
-    return Wanted(limits_of(robot, settings).rates, settings.near_singular)
+    return Wanted(limits_of(robot, settings).rates, near_singular(settings))
 
 
 def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:

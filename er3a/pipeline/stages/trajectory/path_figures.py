@@ -34,7 +34,6 @@ from er3a.pipeline.stages.trajectory.model import (
     Stretch,
     TrajectoryResults,
 )
-from er3a.pipeline.viewing.arm import skeleton
 from er3a.pipeline.viewing.figures import new_figure, svg_data_uri, turning_html
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
@@ -51,6 +50,7 @@ from er3a.pipeline.viewing.palette import (
     VERDICTS,
 )
 from er3a.pipeline.viewing.palette import JOINTS as COLOURS
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 

@@ -24,7 +24,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectorySummary,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import LABEL, log_arm, send_motion, skeleton
+from er3a.pipeline.viewing.arm import LABEL, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import (
     ARM,
@@ -37,7 +37,8 @@ from er3a.pipeline.viewing.recording import (
     recording,
     send_series,
 )
-from er3a.planning.intervals import PathVerdict
+from er3a.pipeline.viewing.skeleton import skeleton
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 

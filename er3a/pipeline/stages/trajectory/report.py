@@ -44,7 +44,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, render, run_command, text_address
-from er3a.planning.intervals import PathVerdict
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.programs.writing import WORDS, not_written
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot

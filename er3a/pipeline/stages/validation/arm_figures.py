@@ -13,9 +13,9 @@ from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.stages.validation.model import Axes, KeyPoses, Section
-from er3a.pipeline.viewing.arm import skeleton
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.references.quantities import nearest_on_axis, point_of
 from er3a.robots.robot import Robot
 

@@ -16,9 +16,10 @@ from er3a.pipeline.stages.validation.model import Axes, KeyPoses, NamedPose, Val
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
-from er3a.pipeline.viewing.arm import log_arm, send_motion, skeleton
+from er3a.pipeline.viewing.arm import log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from er3a.files.robot_file import Text
-from er3a.files.vision_file import vision_files
+from er3a.files.vision_inputs import vision_files
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings

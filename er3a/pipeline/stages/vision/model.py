@@ -9,7 +9,7 @@ import numpy as np
 
 from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import Held, LevelName
-from er3a.collision.shapes import Pair
+from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet

@@ -37,11 +37,11 @@ from er3a.pipeline.stages.workspace.model import (
     WorkspaceResults,
 )
 from er3a.pipeline.stages.workspace.workspace_figures import slide_names
-from er3a.pipeline.viewing.arm import skeleton
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 

@@ -24,10 +24,11 @@ from er3a.pipeline.stages.workspace.model import (
     WorkspaceSummary,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import arm_view, log_arm, skeleton
+from er3a.pipeline.viewing.arm import arm_view, log_arm
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import ARM, escaped, log_note, note_view, recording
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 _CLASSES = (0.0, 0.25, 0.5, 0.75, 1.0)

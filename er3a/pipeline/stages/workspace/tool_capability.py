@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import Pair
 from er3a.kinematics.by_class import parameters_of
 from er3a.kinematics.configuration import slot_labels
 from er3a.numerics.arrays import Reals

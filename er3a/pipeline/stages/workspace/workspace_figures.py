@@ -35,10 +35,10 @@ from er3a.pipeline.stages.workspace.model import (
     SideViewCells,
     WorkspaceResults,
 )
-from er3a.pipeline.viewing.arm import skeleton
 from er3a.pipeline.viewing.figures import equal_scale, new_figure, turning_html
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 DENSITY = "YlGnBu"

@@ -1,0 +1,91 @@
+"""Pairs of bodies that can meet, by number and name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+BASE = 0  # number of the link that stands still
+TRIED = 1024  # joint vectors, spread over the limits, in which each pair is tried
+
+
+@dataclass(frozen=True)
+class LinkPair:
+    """Two links: 0 for the base, 1..6 for the link that joint 1..6 turns."""
+
+    first: int
+    second: int
+    code: Literal["link_pair"] = "link_pair"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.first)}/{link_label(self.second)}"
+
+
+@dataclass(frozen=True)
+class LinkAndSolid:
+    """A link and a solid of the scene, by its name."""
+
+    link: int
+    solid: str
+    code: Literal["link_and_solid"] = "link_and_solid"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.link)}/{self.solid}"
+
+
+@dataclass(frozen=True)
+class CarriedAndLink:
+    """What the tool carries, by its name, and a link."""
+
+    carried: str
+    link: int
+    code: Literal["carried_and_link"] = "carried_and_link"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{link_label(self.link)}/{self.carried}"
+
+
+@dataclass(frozen=True)
+class CarriedAndSolid:
+    """What the tool carries and a solid of the scene, by their names."""
+
+    carried: str
+    solid: str
+    code: Literal["carried_and_solid"] = "carried_and_solid"
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return f"{self.carried}/{self.solid}"
+
+
+Pair = LinkPair | LinkAndSolid | CarriedAndLink | CarriedAndSolid
+
+
+@dataclass(frozen=True)
+class PairOverlaps:
+    """Two bodies overlap, by a depth."""
+
+    pair: Pair
+    depth_mm: float
+    code: Literal["pair_overlaps"] = "pair_overlaps"
+
+
+@dataclass(frozen=True)
+class PairsUnexamined:
+    """Pairs whose collisions were not looked at, because their shapes overlap in all joint vectors tried
+    and so can't be right."""
+
+    pairs: tuple[Pair, ...]
+    code: Literal["pairs_unexamined"] = "pairs_unexamined"
+
+
+def link_label(number: int) -> str:
+    """A link's name in columns of text."""
+    return "base" if number == BASE else f"link_{number}"
