@@ -25,12 +25,21 @@ def trees() -> dict[str, ast.Module]:
     return {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in paths}
 
 
+@cache
+def definitions() -> tuple[tuple[str, ast.FunctionDef | ast.ClassDef], ...]:
+    """All functions and classes of the package, with the place that each begins at."""
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    walked = ((path, node) for path, tree in trees().items() for node in ast.walk(tree) if isinstance(node, kinds))
+    return tuple((f"{path}:{node.lineno}", node) for path, node in walked)
+
+
 def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
-    """All functions that are no kernels, with the place that each begins at."""
-    for path, tree in trees().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef) and not KERNELS & {*map(ast.unparse, node.decorator_list)}:
-                yield f"{path}:{node.lineno} {node.name}", node
+    """All functions that are no kernels, with place and name."""
+    for place, node in definitions():
+        if isinstance(node, ast.FunctionDef) and not KERNELS & {
+            getattr(each, "id", "") for each in node.decorator_list
+        }:
+            yield f"{place} {node.name}", node
 
 
 def several(places: dict[str, set[str]]) -> dict[str, set[str]]:
@@ -69,10 +78,9 @@ def test_stages_alone_have_the_modules_of_a_stage():
 
 def test_no_two_classes_share_a_name():
     places: dict[str, set[str]] = defaultdict(set)
-    for path, tree in trees().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef):
-                places[node.name].add(f"{path}:{node.lineno}")
+    for place, node in definitions():
+        if isinstance(node, ast.ClassDef):
+            places[node.name].add(place)
     assert several(places) == {}
 
 

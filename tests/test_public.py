@@ -454,14 +454,14 @@ def test_joint_values_that_can_be_radians_are_not_warned_of(arm, random):
         er3a.forward(arm, [400, 0, 0, 0, 0, 0])  # neither rad nor deg
 
 
-def test_evidence_is_a_table_of_a_screen(arm):
-    lines = str(er3a.evidence(arm)).splitlines()
+def test_evidence_is_a_table_of_a_screen(shown):
+    found = shown["evidence"]
+    lines = str(found).splitlines()
     assert len(lines) < 15
     assert max(map(len, lines)) <= 100
     (open_row,) = (line.split() for line in lines if line.split()[0] == "open")
     assert open_row == ["open", "6", "alpha6", "offset6", "direction1,4-6"]
     counts = {line.split()[0]: int(line.split()[1]) for line in lines if line.split()[1].isdigit()}
-    found = er3a.evidence(arm)
     assert sum(counts.values()) == len(found.entries) + len(found.combinations)
 
 

@@ -19,8 +19,9 @@ from er3a.errors import ShapeError
 from er3a.geometry.transforms import as_floats
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
+from er3a.kinematics.classes.arm_angle import is_out_of_reach
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
-from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, LinkedRows, Redundancy
+from er3a.kinematics.classes.class_solvers import ArmAngle, ArmClassCode, ChainSolver, LinkedRows, Redundancy
 from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
@@ -206,6 +207,9 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
 
 def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
     """Self-motions of a pose (4, 4) of an arm with one redundancy parameter, from rows at values all over its range."""
+    solver = arm_solver(robot)
+    if isinstance(solver.chain, ArmAngle) and is_out_of_reach(solver.chain.arm, T):
+        return Settled(np.empty((0, robot.joints)))
     span = np.linspace(-np.pi, np.pi, SCANNED, endpoint=False)
     parameter = parameters_of(robot)[0]
     if parameter.joint >= 0:
@@ -216,7 +220,6 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
         span = robot.direction[j] * span + joint_starts(robot)[j]
     grid = np.concatenate([values, span[:, None]])
     q = class_rows(robot, np.broadcast_to(T, (len(grid), 4, 4)), grid).q.reshape(-1, robot.joints)
-    solver = arm_solver(robot)
     more = to_joints(robot, solver.poses_at(T).roots(_starts(robot, STARTS)))  # curves between the values scanned
     return settle(robot, T, np.concatenate([q[np.isfinite(q[:, 0])], more]), q_ref, values, CERTAIN)
 

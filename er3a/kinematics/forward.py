@@ -12,7 +12,7 @@ import numpy as np
 from er3a.errors import ArgumentError, ShapeError
 from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Reals, for_kernel
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot
@@ -103,7 +103,7 @@ def checked_joints(robot: Robot, q: Reals, argument: str = "q") -> Reals:
 
 def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Flags]:
     """What kernels take: each row's motion u (N, m), its direction, what x begins with, and whether it slides."""
-    u = row_values(robot, q).reshape(-1, robot.rows)
+    u = for_kernel(row_values(robot, q)).reshape(-1, robot.rows)
     return u, robot.direction, joint_starts(robot), robot.sliding
 
 

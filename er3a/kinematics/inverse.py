@@ -26,7 +26,7 @@ from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TO
 from er3a.kinematics.configuration import side_of, slot_labels
 from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints, forward
-from er3a.kinematics.numerical import all_found, solve
+from er3a.kinematics.numerical import all_found, nearest_arm, solve
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import (
@@ -212,10 +212,10 @@ def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
     """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
     it can."""
     open_pose = bool(parameters_of(robot))
-    near = solve(robot, T, q_ref, mask=task_mask(robot), respect_limits=open_pose, restarts=MISS_RESTARTS)
+    near = nearest_arm(robot, T, q_ref, task_mask(robot), open_pose, MISS_RESTARTS)
     if open_pose or not near.solved or within(robot, near.q):
         return near
-    inside = solve(robot, T, q_ref, mask=task_mask(robot), restarts=MISS_RESTARTS)
+    inside = nearest_arm(robot, T, q_ref, task_mask(robot), True, MISS_RESTARTS)
     return inside if inside.solved else near
 
 

@@ -57,7 +57,7 @@ from er3a.kinematics.solutions import (
     Solutions,
     Unreachable,
 )
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.numerics.threads import parallel_for
@@ -516,6 +516,7 @@ def _rotation_vector(D: Reals) -> tuple[Reals, Reals]:
 
 RESTARTS = 500
 DIAGNOSIS_RESTARTS = 100
+TOLERANCE = 1e-10  # m or rad
 NEARLY = 1e-6  # m (in parts of the arm's length) or rad: so near, only a singularity keeps the iteration from its end
 RANK = 1e-3  # smallest singular value below which the end of an iteration counts as singular
 SAME_ARM = 1e-6
@@ -530,8 +531,8 @@ def solve(
     mask: Reals | None = None,
     respect_limits: bool = True,
     restarts: int = RESTARTS,
-    position_tolerance: float = 1e-10,
-    rotation_tolerance: float = 1e-10,
+    position_tolerance: float = TOLERANCE,
+    rotation_tolerance: float = TOLERANCE,
     seed: int = 0,
     threads: int = 1,
 ) -> Solutions:
@@ -569,26 +570,14 @@ def solve(
     if not np.isfinite(q0).all():
         raise PoseError("q0 holds NaN or infinity")
     search = _Search(robot, mask, np.array([position_tolerance, rotation_tolerance]), seed)
-    poses = T.reshape(-1, 4, 4)
-    starts_at = np.broadcast_to(q0, (*shape, n)).reshape(-1, n)
-    q, error, starts = search.run(poses, starts_at, respect_limits, restarts, threads)
-    unsolved = tuple(
-        PoseUnsolved(int(n), search.explain(poses[n], q[n], error[n], respect_limits, restarts))
-        for n in np.flatnonzero(starts == 0)
-    )
-    q = q.reshape(*shape, n)
-    return Solutions(
-        robot,
-        q,
-        solved=(starts > 0).reshape(shape),
-        within_limits=(starts > 0).reshape(shape) & within(robot, q),
-        branch=np.full(shape, -1),
-        method=Iteration(1 + restarts),
-        unsolved=unsolved,
-        position_error=error[:, 0].reshape(shape),
-        rotation_error=error[:, 1].reshape(shape),
-        starts=starts.reshape(shape),
-    )
+    return search.solutions(T, q0, respect_limits, restarts, threads, explained=True)
+
+
+def nearest_arm(robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: bool, restarts: int) -> Solutions:
+    """What :func:`solve` gives for one pose (4, 4), without the reason where it finds none: that takes ten times as
+    long as the search."""
+    search = _Search(robot, mask, np.full(2, TOLERANCE), seed=0)
+    return search.solutions(np.ascontiguousarray(T), q0, respect_limits, restarts, threads=1, explained=False)
 
 
 def all_found(robot: Robot, T: Reals, starts: int, seed: int = 0) -> Reals:
@@ -615,20 +604,49 @@ class _Search:
     tolerances: Reals
     seed: int
 
+    def solutions(
+        self, T: Reals, q0: Reals, respect: bool, restarts: int, threads: int, *, explained: bool
+    ) -> Solutions:
+        """Of poses (..., 4, 4) from starts (n,) or (..., n)."""
+        robot, shape = self.robot, T.shape[:-2]
+        poses = T.reshape(-1, 4, 4)
+        starts_at = np.broadcast_to(q0, (*shape, robot.joints)).reshape(-1, robot.joints)
+        q, error, starts = self.run(poses, starts_at, respect, restarts, threads)
+        unsolved = tuple(
+            PoseUnsolved(int(n), self.explain(poses[n], q[n], error[n], respect, restarts))
+            for n in (np.flatnonzero(starts == 0) if explained else ())
+        )
+        q = q.reshape(*shape, robot.joints)
+        return Solutions(
+            robot,
+            q,
+            solved=(starts > 0).reshape(shape),
+            within_limits=(starts > 0).reshape(shape) & within(robot, q),
+            branch=np.full(shape, -1),
+            method=Iteration(1 + restarts),
+            unsolved=unsolved,
+            position_error=error[:, 0].reshape(shape),
+            rotation_error=error[:, 1].reshape(shape),
+            starts=starts.reshape(shape),
+        )
+
     def run(self, T: Reals, q0: Reals, respect: bool, restarts: int, threads: int) -> tuple[Reals, Reals, Integers]:
         """Joint values (N, n), errors (N, 2) in m and rad, and starts (N,) for poses (N, 4, 4)."""
         robot, count = self.robot, len(T)
         q, error, starts = np.empty((count, robot.joints)), np.empty((count, 2)), np.empty(count, dtype=np.int64)
-        limits = (robot.lower, robot.upper, True) if respect else (*self.without_limits(), False)
-        q0, length = np.ascontiguousarray(q0), arm_length(robot)
+        low, high = (for_kernel(each) for each in ((robot.lower, robot.upper) if respect else self.without_limits()))
+        limits, mask, tolerances = (low, high, respect), for_kernel(self.mask), for_kernel(self.tolerances)
+        T, q0, length = for_kernel(T), for_kernel(q0), arm_length(robot)
         plain = robot.joints == robot.rows == 6 and robot.coupling is None and not robot.sliding.any()
-        lanes = robot.direction, robot.offset, constant_links(robot)
-        coupling = np.eye(robot.rows) if robot.coupling is None else np.ascontiguousarray(robot.coupling)
-        units = np.where(robot.slides, length, 1.0)
-        each = robot.direction, joint_starts(robot), constant_links(robot), robot.sliding, coupling, units
+        links = for_kernel(constant_links(robot))
+        lanes = for_kernel(robot.direction), for_kernel(robot.offset), links
+        coupling = for_kernel(np.eye(robot.rows) if robot.coupling is None else robot.coupling)
+        units = for_kernel(np.where(robot.slides, length, 1.0))
+        starts_at, sliding = for_kernel(joint_starts(robot)), for_kernel(robot.sliding)
+        each = for_kernel(robot.direction), starts_at, links, sliding, coupling, units
 
         def part(rows: slice) -> None:
-            goal, draws = (self.mask, self.tolerances, length), (restarts, np.uint64(self.seed), rows.start)
+            goal, draws = (mask, tolerances, length), (restarts, np.uint64(self.seed), rows.start)
             out = q[rows], error[rows], starts[rows]
             if plain:
                 solve_numerically(lanes, limits, T[rows], q0[rows], goal, draws, out)

@@ -430,7 +430,7 @@ def _followed(robot: Robot, path: ToolPath, start: Reals, rows_at: Callable[[Rea
         nodes, between = chebyshev_times(times, DEGREE)
         t, back = np.unique(np.concatenate([nodes.ravel(), between.ravel()]), return_inverse=True)
         q = np.empty((len(t), robot.joints))
-        ended, reached = _tracked(rows_at(t), (turns.steps, turns.counts), start, q)
+        ended, reached = _tracked(np.ascontiguousarray(rows_at(t)), (turns.steps, turns.counts), start, q)
         more = pieces < MOST_PIECES
         if ended < len(t) and not (reached and more):
             raise PathEndsError(robot.name, "singular" if reached else "out_of_reach", float(t[ended]))

@@ -13,7 +13,8 @@ import er3a
 from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
-from er3a.identifiability.entries import continuous_of, entries_of
+from er3a.identifiability.alternatives import Flip
+from er3a.identifiability.entries import TableNumber, continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of, parts_of, settles_tool
 from er3a.identifiability.proposals import (
@@ -25,6 +26,7 @@ from er3a.identifiability.proposals import (
     measured,
     proposals_of,
 )
+from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.references.quantities import CarriedCoordinate, PointCoordinate
 from er3a.references.reference import Document, Documents, Reference
 from er3a.references.subjects import PointAtPose
@@ -71,6 +73,18 @@ def test_signs_that_no_document_fixes_are_open():
     assert found["direction5"].off.mm == pytest.approx(2 * 78.5)
     same = [{name for name, _ in each.entries} for each in found["direction5"].alternatives if not each.off.moves]
     assert {"direction5", "offset4", "offset6"} in same
+
+
+@pytest.mark.parametrize("name", ["er3_600", "er3a_c60"])
+@pytest.mark.parametrize("joint", [2, 3, 5])
+def test_a_joint_reversed_about_an_angle_stands_there_as_before_and_mirrored_beside_it(name, joint):
+    robot, about, moved = load_robot(name), 30.0, 0.2
+    flip = Flip("reversed", TableNumber("direction", joint), about)
+    other = robot_of(flip.apply(tables_of(robot)), 0, robot)
+    q = np.tile(np.radians([10.0, 20.0, -15.0, 40.0, 25.0, 5.0]), (3, 1))
+    q[:, joint - 1] = np.radians(about) + np.array([0.0, moved, -moved])
+    np.testing.assert_allclose(er3a.forward(other, q), er3a.forward(robot, q[[0, 2, 1]]), atol=1e-12)
+    assert flip.entries == (f"direction{joint}", f"offset{joint}")
 
 
 def test_joints_reversed_that_no_document_fixes_are_still_open():

@@ -13,6 +13,7 @@ from er3a.kinematics.classes.arm_angle import (
     arm_angle_arm,
     arm_angles_of,
     feasible_arm_angles,
+    is_out_of_reach,
     solve_at_arm_angle,
     widest_margin,
 )
@@ -229,6 +230,29 @@ def test_arm_angle(name):
         assert np.abs(turn(arm_angles_of(arm, solved) - psi[n])).max() < 1e-9
         for row in solved:
             assert np.abs(pose_by_hand(ROWS[name], row) - T[n]).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", ["iiwa", "oblique_srs"])
+@pytest.mark.parametrize("bent", [0.0, np.pi])
+def test_out_of_reach_begins_where_the_elbow_is_straight_or_folded(name, bent):
+    """With joint 4 at the least (0) and greatest distance of S and W, and W moved 0.1 mm along their line."""
+    random = np.random.default_rng(8)
+    arm = arm_angle_arm(links(name))
+    k = arm.constants
+    for q in random.uniform(-3, 3, (20, 7)):
+        q[3] = bent - k.zero_4
+        T = pose_by_hand(ROWS[name], q)
+        along = T[:3, 3] + T[:3, :3] @ np.array(k.wrist_in_tool) - np.array(k.shoulder)
+        if bent == 0.0 and np.linalg.norm(along) < 1e-3:  # forearm and upper arm of one length: S is as near as it gets
+            assert not is_out_of_reach(arm, T)
+            continue
+        outward = (along if bent else -along) / np.linalg.norm(along)
+        beyond, inside = T.copy(), T.copy()
+        beyond[:3, 3] += 1e-4 * outward
+        inside[:3, 3] -= 1e-4 * outward
+        assert is_out_of_reach(arm, beyond)
+        assert not is_out_of_reach(arm, inside)
+        assert np.isnan(solve_at_arm_angle(arm, np.tile(beyond, (9, 1, 1)), np.linspace(-3, 3, 9))[0]).all()
 
 
 def test_arm_angles_within_limits_are_those_that_a_fine_grid_finds():

@@ -72,6 +72,7 @@ def test_no_start_leads_to_an_arm_that_is_not_told(name, random):
         assert reached
 
 
+@pytest.mark.long  # kernels of elimination and of self-motions that no other fast test compiles
 @pytest.mark.parametrize("name", ARMS)
 def test_own_joints_are_found_at_singular_poses_and_each_pose_by_itself(name, random):
     rows = ARMS[name] + WRIST
@@ -86,6 +87,7 @@ def test_own_joints_are_found_at_singular_poses_and_each_pose_by_itself(name, ra
     assert any(motion.within_limits for motion in inverse(robot, poses[0], q[0]).families)
 
 
+@pytest.mark.long
 def test_the_wrist_centre_on_axis_1_leaves_that_joint_free():
     rows = [("R", 0, -90, 412, -170, 170), ("R", 0, 90, 0, -170, 170), ("P", 0, 0, 0, 300, 1200), *WRIST]
     robot, q = made_of(rows), np.array([0.4, 0.0, 0.7, 0.3, 0.9, -0.4])

@@ -195,6 +195,28 @@ def test_no_place_that_is_chosen_is_another_turned_about_axis_1():
             assert apart[0] >= TRAY.box[:2].min() - 1e-6 or apart[1] >= TRAY.box[2] - 1e-6
 
 
+def test_boxes_that_overlap_by_less_than_half_are_not_chosen_both():
+    """Of a tool that points ahead, so that no place is another turned about axis 1; one box stands turned by 90 deg."""
+    task = replace(TRAY, box=np.array([0.06, 0.04, 0.02]), axis=np.array([1.0, 0.0, 0.0]))
+    robot = narrowed(load_robot("er3_600"), task.margin)
+    steps = np.array([[0, 0, 0], [0.04, 0, 0], [0, 0.03, 0], [0, 0, 0.015], [0.045, 0, 0], [0, 0.045, 0], [0, 0, 0.02]])
+    turned = np.array([False, False, False, False, True, True, False])
+    count = len(steps)
+    places = Places(
+        np.array([0.35, 0.0, 0.5]) + steps,
+        turned,
+        np.full(count, MIXED),
+        np.linspace(1.0, 0.5, count),
+        np.full(count, np.nan),
+        np.zeros(count, dtype=bool),
+    )
+    chosen = choose_places(robot, task, places, roll_of(robot, 1), count, 0)
+    assert chosen.refuted == 0
+    assert chosen.row == [0, 6]  # the one on top; turned boxes reach 50 mm along both axes
+    farther = replace(places, centre=places.centre + 0.0051 * (steps > 0.04))
+    assert choose_places(robot, task, farther, roll_of(robot, 1), count, 0).row == [0, 4, 5, 6]
+
+
 def test_a_turned_base_turns_the_places():
     task = replace(TRAY, half_angle=np.radians(10))
     robot = load_robot("er3_600")

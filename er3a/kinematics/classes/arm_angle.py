@@ -154,6 +154,7 @@ SLOTS = 8
 BLOCK = 64
 MEETS_M = 1e-9
 NEAR = 1e-9
+OUT_OF_REACH = 1e-6  # of the squared reach, beyond what a search takes for solved
 
 
 class ArmAngleConstants(NamedTuple):
@@ -258,6 +259,16 @@ def solve_at_arm_angle(arm: ArmAngleArm, T: Reals, psi: Reals | float) -> tuple[
     q, singular = np.empty((len(T), SLOTS, 7)), np.empty(len(T), dtype=bool)
     solve_arm_angle_blocks(arm.constants, T, angles, q, singular)
     return q, singular
+
+
+def is_out_of_reach(arm: ArmAngleArm, T: Reals) -> bool:
+    """Whether S and W of a pose (4, 4), m, are too far or near for the elbow: then no arm angle solves it."""
+    k = arm.constants
+    W = T[:3, :3] @ np.array(k.wrist_in_tool) + T[:3, 3]
+    squared = float(np.sum((W - np.array(k.shoulder)) ** 2)) - k.height**2
+    reach, least = k.upper_arm + k.lower_arm, k.upper_arm - k.lower_arm
+    slack = OUT_OF_REACH * reach**2
+    return squared > reach**2 + slack or squared < least**2 - slack
 
 
 def arm_angles_of(arm: ArmAngleArm, q: Reals) -> Reals:

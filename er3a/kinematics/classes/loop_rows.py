@@ -27,7 +27,7 @@ from er3a.kinematics.classes.hidden_joint import (
     zeros_on_circle,
 )
 from er3a.kinematics.classes.links import multiply_rigid, turn_behind
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 
 MOST_ZEROS = 48
@@ -77,7 +77,7 @@ def new_memory(sliding: Flags) -> LoopMemory:
         x=np.zeros((2, 6)),
         candidate=np.zeros(6),
         start=np.zeros(6),
-        sliding=sliding,
+        sliding=for_kernel(sliding),
     )
 
 
