@@ -13,7 +13,8 @@ harmless:
   of lines from where they are nearest in the pose that holds them farthest apart. What is left of them is judged again,
   so that an arm that folds onto itself is seen.
   A default shape that slides in a thicker one is joined to it likewise: of the guide only what lies along the sliding
-  axis is left out, and of what slides nothing;
+  axis is left out, and of what slides nothing. Of links with several bodies those that lie beside two that a joint
+  holds are joined too, if what is left without that joint's region comes apart;
 - *overlaps*: they overlap in all joint vectors drawn, none in which they don't was found in the boxes, and no joint
   explains it. No arm is built like that, so the shapes are wrong: what overlaps is left out, and has to be named
   wherever it is not examined;
@@ -169,6 +170,7 @@ class JudgedPair:
     least : m, a lower bound of the distance of bodies that never meet; NaN for others
     left_out : m, radius of the region around the joint that is left out, 0 where there is none
     boxes : how many boxes of joint vectors were looked at
+    hub : (3,), m, in the outer link's frame, where a joint is proven to hold the two; None where none is
     """
 
     state: PairState
@@ -177,6 +179,7 @@ class JudgedPair:
     least: float = np.nan
     left_out: float = 0.0
     boxes: int = 0
+    hub: Reals | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,7 +288,7 @@ def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = 
             found.append(JudgedPair("never", least=bound, boxes=looked))
         else:
             found.append(JudgedPair("undecided", (pair,), boxes=looked))
-    return found
+    return _beside(robot, pairs, found, q[distance.argmax(axis=0)], boxes)
 
 
 def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Reals, boxes: int) -> JudgedPair:
@@ -303,6 +306,23 @@ def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Real
     if neighbours or held:
         return _joined(robot, pair, q[distance.argmax()], Held(held.hub if held else None, looked), boxes)
     return JudgedPair("overlaps", witness=q[0], boxes=looked)
+
+
+def _beside(
+    robot: Robot, pairs: Sequence[tuple[Body, Body]], found: list[JudgedPair], farthest: Reals, boxes: int
+) -> list[JudgedPair]:
+    """Judgements of all bodies of two links; of those that no joint explains, the ones beside bodies that one holds.
+
+    Housings are often drawn as several bodies, which overlap in the joint's region too. Nothing beyond the region of
+    those that are held is left out for them. ``farthest``: (K, n), joint vectors that hold each pair farthest apart.
+    """
+    held = [each for each in found if each.state == "joined" and each.hub is not None]
+    for k, pair in enumerate(pairs):
+        for other in held:
+            if found[k].state == "overlaps":
+                joined = _joined(robot, pair, farthest[k], Held(other.hub, found[k].boxes), boxes, other.left_out)
+                found[k] = joined if joined.state == "joined" else found[k]
+    return found
 
 
 def _neighbours(robot: Robot, pair: tuple[Body, Body]) -> bool:
@@ -374,24 +394,30 @@ def _in_frame(T: Reals, point: Reals, axis: Reals) -> tuple[Reals, Reals]:
     return T[:3, :3].T @ (point - T[:3, 3]), T[:3, :3].T @ axis
 
 
-def _joined(robot: Robot, pair: tuple[Body, Body], farthest: Reals, held: Held, boxes: int) -> JudgedPair:
-    """A pair that overlaps in every pose: without the region around the joint, judged again."""
+def _joined(
+    robot: Robot, pair: tuple[Body, Body], farthest: Reals, held: Held, boxes: int, most: float = np.inf
+) -> JudgedPair:
+    """A pair that overlaps in every pose: without the region around the joint, judged again.
+
+    It just overlaps if that region would have to be larger than ``most`` (m) by more than one step of its growth.
+    """
     centres = _centres(robot, pair, farthest, held.hub)
     last, radius = np.inf, sum(girth(body, centre) for body, centre in zip(pair, centres))
     while radius < SETTLED * last:  # girths of less and less of the bodies, until they hold for what is cut off
         radius, last = sum(girth(body, centre, radius) for body, centre in zip(pair, centres)), radius
     for _ in range(GROWTHS):
+        if radius > most * GROWTH:
+            return JudgedPair("overlaps", witness=farthest, boxes=held.boxes)
         parts = [trimmed(body, centre, radius) for body, centre in zip(pair, centres)]
         rest = [(first, second) for first in parts[0] for second in parts[1]]
         found = _without_joining(robot, rest, boxes)
         if found is not None:
             watched = tuple(pair for each in found for pair in each.bodies)
             witness = next((each.witness for each in found if each.witness is not None), None)
-            return JudgedPair(
-                "joined", watched, witness, left_out=radius, boxes=held.boxes + sum(each.boxes for each in found)
-            )
+            looked = held.boxes + sum(each.boxes for each in found)
+            return JudgedPair("joined", watched, witness, left_out=radius, boxes=looked, hub=held.hub)
         radius *= GROWTH
-    return JudgedPair("joined", left_out=radius, boxes=held.boxes)
+    return JudgedPair("joined", left_out=radius, boxes=held.boxes, hub=held.hub)
 
 
 def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int) -> list[JudgedPair] | None:

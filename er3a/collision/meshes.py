@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -23,6 +24,19 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Envelope
 
 CONVEX = 1e-6  # share of the volume by which a convex mesh may differ from its hull
+NEARLY_CONVEX = 0.1  # and by which a link's may, whose hull is then the better shape: pieces need a margin
+LINK_TRIANGLES = 5000  # of the mesh that is split for a link
+LINK_SEARCH: dict[str, Any] = {
+    "threshold": 0.1,
+    "max_convex_hull": 8,
+    "resolution": 500,
+    "mcts_iterations": 20,
+    "mcts_nodes": 8,
+    "mcts_max_depth": 2,
+    "preprocess_mode": "on",
+    "preprocess_resolution": 40,
+}
+"""coacd's settings for a link: seconds of work, and few pieces, because all pairs of them are judged."""
 MOST_CORNERS = 64  # of a piece
 AGREE = 2e-5  # m, to which the bound of what stands out is brought down
 CUTS = 12
@@ -39,7 +53,7 @@ class ConvexPieces(ByValue):
     ----------
     pieces : corners (k, 3), m, of each
     uncovered : m, a bound of how far the mesh stands out of the pieces, which are to be taken larger by it
-    excess : m, how far the pieces stand out of the mesh, as measured
+    excess : m, how far the pieces stand out of the mesh, as measured; NaN where it was not
     """
 
     pieces: tuple[Reals, ...]
@@ -60,11 +74,48 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
     Er3aError
         if the mesh is not convex and coacd, which splits it, is not installed
     """
-    hull = scipy.spatial.ConvexHull(vertices)
-    corners = vertices[faces]
-    volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6
-    if hull.volume - volume <= CONVEX * hull.volume:
+    if _beyond_hull(vertices, faces) <= CONVEX:
         return hull_of(vertices)
+    pieces = _split(vertices, faces, seed, threshold=threshold)
+    return ConvexPieces(pieces, uncovered(vertices, faces, pieces), _excess(vertices, faces, pieces, seed))
+
+
+def link_pieces(vertices: Reals, faces: Integers, closed: bool, seed: int) -> ConvexPieces:
+    """At most 8 convex pieces that hold the surface of a link's mesh, which need not be closed.
+
+    The hull where that is hardly larger than a closed mesh. The excess is not measured: NaN for pieces.
+
+    Parameters
+    ----------
+    vertices, faces : as of :func:`convex_pieces`
+
+    Raises
+    ------
+    Er3aError
+        as :func:`convex_pieces`
+    """
+    if closed and _beyond_hull(vertices, faces) <= NEARLY_CONVEX:
+        return hull_of(vertices)
+    coarse = vertices, faces
+    if len(faces) > LINK_TRIANGLES:
+        library = load_open3d()
+        points, corners = library.utility.Vector3dVector(vertices), library.utility.Vector3iVector(faces)
+        simple = library.geometry.TriangleMesh(points, corners).simplify_quadric_decimation(LINK_TRIANGLES)
+        coarse = np.asarray(simple.vertices), np.asarray(simple.triangles)
+    pieces = _split(coarse[0], coarse[1], seed, **LINK_SEARCH)
+    return ConvexPieces(pieces, uncovered(vertices, faces, pieces), np.nan)
+
+
+def _beyond_hull(vertices: Reals, faces: Integers) -> float:
+    """The share of its hull that a closed mesh leaves empty."""
+    hull, corners = scipy.spatial.ConvexHull(vertices), vertices[faces]
+    volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6
+    return float(hull.volume - volume) / float(hull.volume)
+
+
+def _split(vertices: Reals, faces: Integers, seed: int, **settings: Any) -> tuple[Reals, ...]:
+    """Convex pieces (k, 3) by coacd."""
+    load_open3d()  # fails where coacd was loaded before it
     try:
         import coacd
     except ImportError:
@@ -73,9 +124,8 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
     coacd.set_log_level("error")
     middle, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
     mesh = coacd.Mesh((vertices - middle) / size, faces)
-    parts = coacd.run_coacd(mesh, threshold=threshold, seed=seed, decimate=True, max_ch_vertex=MOST_CORNERS)
-    pieces = tuple(_corners(np.asarray(points) * size + middle) for points, _ in parts)
-    return ConvexPieces(pieces, uncovered(vertices, faces, pieces), _excess(vertices, faces, pieces, seed))
+    parts = coacd.run_coacd(mesh, seed=seed, decimate=True, max_ch_vertex=MOST_CORNERS, **settings)
+    return tuple(_corners(np.asarray(points) * size + middle) for points, _ in parts)
 
 
 def hull_of(points: Reals) -> ConvexPieces:

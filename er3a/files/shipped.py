@@ -21,6 +21,12 @@ def own_or_shipped(place: str) -> Path:
     return own if own.exists() else ROOT / place
 
 
+def given_file(path: Path) -> Path:
+    """A file that a person names: their own, else the project's at a place such as ``data/paths/arm.yaml``."""
+    shipped = ROOT / path
+    return shipped if path.parts[:1] == ("data",) and not path.exists() and shipped.is_file() else path
+
+
 def names(folder: str, pattern: str) -> list[str]:
     """The stems of what stands in a folder of the study or of the project, sorted."""
     places = (Path(folder), ROOT / folder)

@@ -40,15 +40,21 @@ def read_mesh(path: str | Path, unit: Unit) -> ClosedMesh:
         for a file that is no such mesh, is too large, is not closed, or can only be in the other unit
     """
     path = Path(path)
-    mesh = _closed(path, _loaded(path), np.full(3, 1.0 if unit == "m" else 1e-3))
+    mesh = _closed(path, _loaded(path), 1.0 if unit == "m" else 1e-3)
     _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), unit)
     return mesh
 
 
-def read_link_mesh(path: Path, scale: Reals) -> ClosedMesh:
-    """A closed mesh of a URDF's link, each axis times ``scale`` (3,); lengths and errors as of its vertices."""
+def read_link_mesh(path: Path, scale: Reals) -> tuple[Reals, Integers, bool]:
+    """Vertices (V, 3), m, and faces (F, 3) of a mesh of a URDF's link, each axis times ``scale`` (3,), and whether it
+    is closed; lengths and errors as of :func:`read_link_vertices`."""
     loaded = _loaded(path)
-    return _closed(path, loaded, _link_scale(path, loaded, scale))
+    loaded.merge_vertices()
+    loaded.vertices = loaded.vertices * _link_scale(path, loaded, scale)
+    closed = bool(loaded.is_watertight)
+    if closed:
+        loaded.fix_normals()
+    return np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64), closed
 
 
 def read_link_vertices(path: Path, scale: Reals) -> Reals:
@@ -65,8 +71,8 @@ def read_link_vertices(path: Path, scale: Reals) -> Reals:
     return np.asarray(loaded.vertices, float) * _link_scale(path, loaded, scale)
 
 
-def _closed(path: Path, loaded: Any, scale: Reals) -> ClosedMesh:
-    """A mesh that must be closed, each axis times ``scale`` (3,)."""
+def _closed(path: Path, loaded: Any, scale: float) -> ClosedMesh:
+    """A mesh that must be closed, in metres."""
     loaded.merge_vertices()
     if not loaded.is_watertight:
         edges = np.unique(loaded.edges_sorted, axis=0, return_counts=True)[1]

@@ -32,7 +32,9 @@ import scipy
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.errors import Er3aError, InputError
 from er3a.formats.urdf_tree import (
+    CylinderOfLink,
     LinkPlaces,
+    Split,
     UrdfChain,
     UrdfJoint,
     collision_shapes,
@@ -40,6 +42,7 @@ from er3a.formats.urdf_tree import (
     peak_torque,
     read_chain,
     urdf_root,
+    with_capsules,
     write_friction,
     write_masses,
     write_shapes,
@@ -232,7 +235,12 @@ class UrdfImport(ByValue, Displayed):
 
 
 def import_urdf(
-    path: str | Path, *, base: str | None = None, tip: str | None = None, snap: bool = False, split: bool = False
+    path: str | Path,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    snap: bool = False,
+    split: bool | Split = False,
 ) -> UrdfImport:
     """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over its shapes and masses.
 
@@ -248,7 +256,8 @@ def import_urdf(
     path : a URDF, or expanded xacro
     base, tip : links at which the arm begins and ends; None where the file leaves no choice
     snap : take angles within 1e-4 rad of a multiple of 90 deg for that multiple; each such change is noted
-    split : split closed collision meshes into convex pieces; else their hulls are taken
+    split : split meshes that fill less than nine tenths of their hulls into at most 8 convex pieces, which takes
+        seconds for each; a function gets each mesh's file before that. Else their hulls are taken
 
     Raises
     ------
@@ -268,18 +277,16 @@ def import_urdf(
     table = table_from_axes(directions, points, T)
     plain = np.array_equal(coupling, np.eye(*coupling.shape))
     limits, notes = _limits(path, sources)
-    source = Source(f"Derived from the joint axes of {path.name}", "export")
     groups = ("dh", "zero", "limits", "speeds", "base", "flange", *(() if plain else ("coupling",)))
-    named = sources[0].name, path.stem[:200]
     robot = Robot(
         name=robot_name(path),
-        title=named[1] or named[0],
+        title=path.stem[:200] or sources[0].name,
         convention="standard",
         lower=limits[:, 0],
         upper=limits[:, 1],
         speed=np.array([joint.speed if joint.speed < FASTEST else math.nan for joint in sources]),
         zero_pose="As the URDF has it with all joints at 0.",
-        sources=dict.fromkeys(groups, source),
+        sources=dict.fromkeys(groups, Source(f"Derived from the joint axes of {path.name}", "export")),
         sliding=sliding,
         coupling=None if plain else coupling,
         continuous=np.array([joint.type == "continuous" for joint in sources]),
@@ -289,7 +296,7 @@ def import_urdf(
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = urdf_root(path), link_places(found, shift)
-    envelopes, hulls, shaped = link_shapes(path, root, robot, placed, split)
+    envelopes, hulls, shaped = link_shapes(path, root, robot, placed, _asked(split))
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     stated = {
@@ -306,6 +313,12 @@ def import_urdf(
     first, last = found.joints[0].parent, found.joints[-1].child
     beyond = _followers_beyond(moving, coupling, shift, limits)
     return UrdfImport(robot, (*found.notes, *notes, *beyond, *shaped, *weighed), float(misfit), names, first, last)
+
+
+def _asked(split: bool | Split) -> Split | None:
+    if callable(split):
+        return split
+    return (lambda _: None) if split else None
 
 
 def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
@@ -343,7 +356,7 @@ def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
 
 
 def link_shapes(
-    path: Path, root: ElementTree.Element, robot: Robot, placed: LinkPlaces, split: bool
+    path: Path, root: ElementTree.Element, robot: Robot, placed: LinkPlaces, split: Split | None
 ) -> tuple[tuple[Envelope, ...], tuple[ConvexPiece, ...], tuple[str, ...]]:
     """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words."""
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
@@ -355,15 +368,18 @@ def link_shapes(
                 notes.append(f"link {link.get('name')} does not move with the arm's chain; its shape is left out")
             continue
         T, number = place
+        made = list[Envelope | ConvexPiece | CylinderOfLink]()
         for collision in shapes:
             frame = np.linalg.inv(zero[number]) @ T
             try:
-                made = collision_shapes(path, link.get("name", "?"), collision, (frame, number), notes, split)
+                made += collision_shapes(path, link.get("name", "?"), collision, (frame, number), notes, split)
             except InputError as error:
                 notes.append(f"link {link.get('name')} has a shape that is left out ({error})")
-                continue
-            envelopes += [shape for shape in made if isinstance(shape, Envelope)]
-            hulls += [shape for shape in made if isinstance(shape, ConvexPiece)]
+        for shape in with_capsules(made):
+            if isinstance(shape, Envelope):
+                envelopes.append(shape)
+            else:
+                hulls.append(shape)
     capsules, pieces = sorted(envelopes, key=lambda each: each.link), sorted(hulls, key=lambda each: each.link)
     return tuple(capsules), tuple(pieces), tuple(notes)
 

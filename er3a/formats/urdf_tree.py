@@ -10,8 +10,9 @@ Reference: the ROS URDF specification (an inertia is about the centre of mass, i
 
 Collision geometry of a URDF's links as capsules and convex hulls, and the way back.
 
-Boxes become hulls, cylinders prisms around them, spheres capsules without length. A mesh is taken as its hull, which
-holds it, or split into convex pieces if it is closed and that is asked for. The way back writes a mesh for each hull,
+Boxes become hulls, cylinders prisms around them, spheres capsules without length; a cylinder of a link with a sphere of
+its radius about each end is the capsule that they make. A mesh is taken as its hull, which holds it, or split into
+convex pieces if that is asked for. The way back writes a mesh for each hull,
 and for a capsule its cylinder and two spheres. By how much a hull is to be taken larger stands beside its mesh as
 ``<collision margin="...">`` (m), which other readers pass over.
 """
@@ -22,7 +23,7 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -32,7 +33,7 @@ import scipy
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.distances import cylinder_points
-from er3a.collision.meshes import ConvexPieces, convex_pieces, hull_of
+from er3a.collision.meshes import ConvexPieces, hull_of, link_pieces
 from er3a.collision.shapes import CORNERS
 from er3a.errors import Er3aError, InputError
 from er3a.formats.mesh_file import read_link_mesh, read_link_vertices, read_text
@@ -550,19 +551,36 @@ def _triple(origin: ElementTree.Element | None, key: str) -> Reals:
 
 PRISM_SIDES = 24
 SMALLEST_SPHERE_M = 0.002
-THRESHOLD, SEED = 0.05, 0
+SAME_M = 1e-6  # to which a sphere's centre and radius are those of a cylinder's end
+SEED = 0
+
+Split = Callable[[Path], object]
+
+
+@dataclass(frozen=True, eq=False)
+class CylinderOfLink:
+    """A cylinder of a link: as the prism around it, and as the capsule that it makes with a ball about each end."""
+
+    prism: ConvexPiece
+    capsule: Envelope
 
 
 def collision_shapes(
-    path: Path, name: str, collision: ElementTree.Element, place: tuple[Reals, int], notes: list[str], split: bool
-) -> list[Envelope | ConvexPiece]:
+    path: Path,
+    name: str,
+    collision: ElementTree.Element,
+    place: tuple[Reals, int],
+    notes: list[str],
+    split: Split | None,
+) -> list[Envelope | ConvexPiece | CylinderOfLink]:
     """Shapes of one ``<collision>``.
 
     Parameters
     ----------
     name : of its link in the URDF
     place : (4, 4), from the URDF link's frame to that of our link, and the number of that link
-    notes : gets what was assumed or left out; split : whether meshes are split into convex pieces
+    notes : gets what was assumed or left out
+    split : gets each mesh before it is split into convex pieces; None takes hulls
 
     Raises
     ------
@@ -575,6 +593,7 @@ def collision_shapes(
     xyz, rpy = (numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
     T = T_link @ transform(xyz, rpy)
     shape = geometry[0] if geometry is not None and len(geometry) else None
+    core = None
     match shape.tag if shape is not None else "":
         case "box":
             size = _sizes(path, where, numbers(path, where, shape, "size", (1.0, 1.0, 1.0)))
@@ -584,6 +603,7 @@ def collision_shapes(
             radius, length = _sizes(path, where, np.concatenate(given)).tolist()
             ends = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
             pieces = ConvexPieces((cylinder_points(ends, radius, PRISM_SIDES),), 0.0, 0.0)
+            core = ends @ T[:3, :3].T + T[:3, 3]
         case "sphere":
             x, y, z = T[:3, 3].tolist()
             radius = float(_sizes(path, where, numbers(path, where, shape, "radius", None))[0])
@@ -603,7 +623,33 @@ def collision_shapes(
     placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
     stated = float(numbers(path, where, collision, "margin", None)[0]) if "margin" in collision.attrib else 0.0
     margin = pieces.uncovered + max(stated, 0.0)
-    return [ConvexPiece(link, tuple((x, y, z) for x, y, z in piece.tolist()), margin) for piece in placed]
+    made = [ConvexPiece(link, tuple((x, y, z) for x, y, z in piece.tolist()), margin) for piece in placed]
+    if core is None:
+        return [*made]
+    start, end = ((x, y, z) for x, y, z in core.tolist())
+    return [CylinderOfLink(made[0], Envelope(link, start, end, radius))]
+
+
+def with_capsules(shapes: Sequence[Envelope | ConvexPiece | CylinderOfLink]) -> list[Envelope | ConvexPiece]:
+    """The shapes of one link, each cylinder as a prism, or as its capsule if a sphere of its radius is at each end."""
+    found, at_ends = list[Envelope | ConvexPiece](), set[int]()
+    for shape in shapes:
+        if isinstance(shape, CylinderOfLink):
+            capsule = shape.capsule
+            balls = [_balls(shapes, end, capsule.radius) for end in (capsule.start, capsule.end)]
+            found.append(capsule if all(balls) else shape.prism)
+            at_ends |= {id(ball) for at_end in balls for ball in at_end if all(balls)}
+        else:
+            found.append(shape)
+    return [shape for shape in found if id(shape) not in at_ends]
+
+
+def _balls(
+    shapes: Sequence[Envelope | ConvexPiece | CylinderOfLink], end: Sequence[float], radius: float
+) -> list[Envelope]:
+    wanted = (*end, radius)
+    balls = [each for each in shapes if isinstance(each, Envelope)]
+    return [ball for ball in balls if np.abs(np.subtract((*ball.start, ball.radius), wanted)).max() <= SAME_M]
 
 
 def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, meshes: Path | None) -> None:
@@ -673,7 +719,7 @@ def _sizes(path: Path, where: str, sizes: Reals) -> Reals:
 
 
 def _mesh(
-    path: Path, where: str, shape: ElementTree.Element | None, notes: list[str], split: bool
+    path: Path, where: str, shape: ElementTree.Element | None, notes: list[str], split: Split | None
 ) -> ConvexPieces | None:
     name = shape.get("filename", "") if shape is not None else ""
     file = mesh_of(path, name)
@@ -681,10 +727,12 @@ def _mesh(
         notes.append(f"{where}: the mesh {name} was not found; the link has no shape of it")
         return None
     scale = numbers(path, where, shape, "scale", (1.0, 1.0, 1.0))
-    if split:
+    if split is not None:
+        split(file)
         try:
-            mesh = read_link_mesh(file, scale)
-            return convex_pieces(mesh.vertices, mesh.faces, THRESHOLD, SEED)
+            found = link_pieces(*read_link_mesh(file, scale), SEED)
+            notes.append(_quality(f"{where}: {file.name}", found))
+            return found
         except Er3aError as error:
             notes.append(f"{where}: the hull of {file.name} is taken ({error})")
     try:
@@ -692,6 +740,14 @@ def _mesh(
     except Er3aError as error:
         notes.append(f"{where}: {error}; the link has no shape of it")
         return None
+
+
+def _quality(mesh: str, found: ConvexPieces) -> str:
+    """How well convex pieces stand for a mesh."""
+    if len(found.pieces) == 1:
+        return f"{mesh} fills its hull but for a tenth at most; the hull is taken"
+    away = 1000 * found.uncovered
+    return f"{mesh} is split into {len(found.pieces)} convex pieces, taken larger by {away:.1f} mm so that they hold it"
 
 
 def mesh_of(path: Path, name: str) -> Path | None:

@@ -357,10 +357,20 @@ def _taken_lock() -> int:
 
 def _snakemake(words: list[str]) -> bool:
     """Run Snakemake in this process, so that what stops the one stops the other."""
-    from snakemake.cli import main
+    from snakemake.cli import args_to_api, parse_args
+    from snakemake.exceptions import print_exception
 
+    said = StringIO()  # which profile it takes, that of this project
     try:
-        main(words)
+        with redirect_stderr(said):
+            parser, asked = parse_args(words)
+    except SystemExit as end:
+        print(said.getvalue(), end="", file=sys.stderr)
+        return end.code in (0, None)
+    try:
+        return bool(args_to_api(asked, parser))
     except SystemExit as end:
         return end.code in (0, None)
-    return True
+    except Exception as error:
+        print_exception(error)
+        return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pinocchio
 import pytest
 
 import er3a
+from er3a.collision.matrix import collision_matrix
 from er3a.dynamics.arm_model import drives_of
 from er3a.dynamics.torques import friction_torques
 from er3a.errors import InputError
@@ -204,16 +206,38 @@ def test_what_a_urdf_holds_comes_back(tmp_path, random):
     np.testing.assert_allclose(after.torques(q, qd, qdd), before.torques(q, qd, qdd), atol=1e-9)
 
 
-def test_a_capsule_is_written_as_the_shapes_that_make_it(tmp_path):
+def test_a_capsule_comes_back_from_the_shapes_that_make_it(tmp_path):
     robot = import_urdf(written(tmp_path, arm_text())).robot
-    robot = robot.replace(
-        envelopes=(Envelope(3, (0, 0.1, 0), (0.1, 0.1, 0.2), 0.04),), base=placement([1, 2, 3], [0, 0, 1])
-    )
+    capsule = Envelope(3, (0, 0.1, 0), (0.1, 0.1, 0.2), 0.04)
+    robot = robot.replace(envelopes=(capsule,), base=placement([1, 2, 3], [0, 0, 1]))
     again = import_urdf(exported(robot, tmp_path)).robot
-    assert [each.radius for each in again.envelopes] == [0.04, 0.04]
-    np.testing.assert_allclose([each.start for each in again.envelopes], [(0, 0.1, 0), (0.1, 0.1, 0.2)], atol=1e-12)
-    (prism,) = again.hulls
-    np.testing.assert_allclose(np.mean(prism.points, axis=0), [0.05, 0.1, 0.1], atol=1e-12)
+    (found,) = again.envelopes
+    assert again.hulls == ()
+    assert found.radius == capsule.radius
+    ends = sorted((found.start, found.end))
+    np.testing.assert_allclose(ends, [capsule.start, capsule.end], atol=1e-12)
+
+
+def judged(robot: Robot) -> list[tuple[str, str, str]]:
+    return [(row.first, row.second, row.state) for row in collision_matrix(robot).rows]
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+def test_pairs_of_links_are_judged_as_before_after_export_and_import(name, tmp_path):
+    robot = load_robot(name)
+    assert judged(import_urdf(exported(robot, tmp_path)).robot) == judged(robot)
+
+
+def test_bodies_beside_those_that_a_joint_holds_are_no_error_of_the_shapes(tmp_path):
+    """Housings drawn as cylinder and balls that make no capsule."""
+    path = exported(load_robot("er3a_c60"), tmp_path)
+    thinner = re.sub(
+        r'<cylinder radius="([^"]+)"', lambda found: f'<cylinder radius="{0.98 * float(found[1])}"', path.read_text()
+    )
+    path.write_text(thinner)
+    robot = import_urdf(path).robot
+    assert len(robot.hulls) == 6
+    assert "overlaps" not in {state for *_, state in judged(robot)}
 
 
 @pytest.fixture(scope="module")

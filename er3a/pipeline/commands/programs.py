@@ -15,7 +15,7 @@ import typer
 
 from er3a.errors import Er3aError, InputError
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, print_json, print_note
+from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, given_files, print_json, print_note
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -39,17 +39,23 @@ class ProgramLanguage(StrEnum):
 
 
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
-SceneFile = Annotated[Path | None, typer.Option(help="a scene file: what the arm may not touch")]
+SceneFile = Annotated[Path | None, typer.Option(callback=given_files, help="a scene file: what the arm may not touch")]
 
 
 @app.command(rich_help_panel=PROGRAMS)
 def check_program(
-    files: Annotated[list[Path], typer.Argument(help="programs: .src, .script, .pgm, .XPL, or .csv of joints")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(callback=given_files, help="programs: .src, .script, .pgm, .XPL, or .csv of joints"),
+    ],
     *,
     robot: RobotOption,
     start: Annotated[str | None, typer.Option(help="joint values before it, deg or mm: 0,-10,...")] = None,
     frames: Annotated[
-        Path | None, typer.Option(help="a file of kind programs, whose frames TOOL_DATA[3] and the like stand for")
+        Path | None,
+        typer.Option(
+            callback=given_files, help="a file of kind programs, whose frames TOOL_DATA[3] and the like stand for"
+        ),
     ] = None,
     scene: SceneFile = None,
     verdicts: Annotated[
@@ -116,7 +122,7 @@ app.add_typer(program_app, name="program", rich_help_panel=PROGRAMS)
 
 @program_app.command()
 def write(
-    paths: Annotated[Path, typer.Argument(help="a path file")],
+    paths: Annotated[Path, typer.Argument(callback=given_files, help="a path file")],
     *,
     robot: RobotOption,
     language: Annotated[ProgramLanguage, typer.Option(help="the controller's language, or a table over time")],

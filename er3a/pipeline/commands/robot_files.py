@@ -12,7 +12,17 @@ import typer
 from er3a.errors import Er3aError
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.formats.mesh_file import Unit
-from er3a.pipeline.commands.options import ROBOT_FILES, AnyRobot, AsJson, Split, Xacro, app, print_json, print_note
+from er3a.pipeline.commands.options import (
+    ROBOT_FILES,
+    AnyRobot,
+    AsJson,
+    Split,
+    Xacro,
+    app,
+    given_files,
+    print_json,
+    print_note,
+)
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 
@@ -35,11 +45,9 @@ def import_urdf(
     from er3a.formats.urdf import robot_name
     from er3a.formats.xacro import plain_urdf
 
-    with (
-        shown_work(f"{file}: the arm is read" + (", meshes are split into convex pieces" if split else "")),
-        plain_urdf(file, xacro or ()) as plain,
-    ):
-        imported = read_urdf(plain, base=base, tip=tip, snap=snap, split=split)
+    with shown_work(f"{file}: the arm is read") as at, plain_urdf(file, xacro or ()) as plain:
+        shown = split and (lambda mesh: at(f"{mesh}: split into convex pieces"))
+        imported = read_urdf(plain, base=base, tip=tip, snap=snap, split=shown)
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(imported.robot.replace(name=output.stem), output)
@@ -122,7 +130,7 @@ def calibrate(
 
 @app.command(rich_help_panel=ROBOT_FILES)
 def hand_eye(
-    file: Annotated[Path, typer.Argument(help="a calibration set (YAML, kind: hand_eye)")],
+    file: Annotated[Path, typer.Argument(callback=given_files, help="a calibration set (YAML, kind: hand_eye)")],
     robot: Annotated[str | None, typer.Option(help="whose table turns joint angles into poses: a name or file")] = None,
     as_json: AsJson = False,
 ):

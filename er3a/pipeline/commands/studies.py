@@ -26,6 +26,7 @@ from er3a.pipeline.commands.options import (
     StudyFile,
     Xacro,
     app,
+    given_files,
     print_error,
     print_json,
     print_note,
@@ -55,7 +56,8 @@ def new(
 
     ends, arguments = (base, tip), tuple(xacro or ())
     with shown_work(f"{folder}: the arm is read") as at:
-        arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=ends, xacro=arguments, split=split)
+        shown = split and (lambda mesh: at(f"{mesh}: split into convex pieces"))
+        arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=ends, xacro=arguments, split=shown)
         at(f"{folder}: targets and paths that the arm can do are looked for")
         written = write_study(arm, folder)
     for note in (*arm.notes, *written.missing):
@@ -69,7 +71,10 @@ def new(
 
 @app.command(rich_help_panel=FIRST)
 def check(
-    files: Annotated[list[Path], typer.Argument(help="robot, study, target, path, scene or reference files")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(callback=given_files, help="robot, study, target, path, scene or reference files"),
+    ],
     as_json: AsJson = False,
 ):
     """Check input files and say of each what it is, or what is wrong with it."""

@@ -23,6 +23,7 @@ from er3a.files.shipped import ROOT
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.formats.mesh_file import read_text
 from er3a.formats.urdf import import_urdf, robot_name
+from er3a.formats.urdf_tree import Split
 from er3a.formats.xacro import plain_urdf
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.new_study.tasks import LEAST_TARGETS, Spot, TaskSearch, reach_of, scenes
@@ -58,7 +59,7 @@ def arm_of(
     modified: bool = False,
     ends: tuple[str | None, str | None] = (None, None),
     xacro: Sequence[str] = (),
-    split: bool = False,
+    split: bool | Split = False,
 ) -> Arm:
     """The arm that exactly one of a URDF, a D-H table and a robot's name or file describes.
 
@@ -68,7 +69,8 @@ def arm_of(
     modified : whether the D-H table is modified (Craig)
     ends : the URDF's links at which the arm begins and ends, where the file leaves a choice
     xacro : arguments ``NAME:=VALUE`` of a URDF that is xacro
-    split : whether collision meshes of a URDF are split into convex pieces; else their hulls are taken
+    split : whether collision meshes of a URDF are split into convex pieces (a function gets each before that); else
+        their hulls are taken
 
     Raises
     ------
@@ -95,7 +97,7 @@ def arm_of(
     return _known(str(robot), name)
 
 
-def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None], split: bool) -> Arm:
+def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None], split: bool | Split) -> Arm:
     imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True, split=split)
     robot = imported.robot.replace(name=name)
     content = robot_file(robot, path)
