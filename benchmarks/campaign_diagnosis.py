@@ -10,11 +10,19 @@ from dataclasses import replace
 import numpy as np
 
 from er3a import load_references, load_robot
-from er3a.diagnosis.mutations import Mutation, Outcome, mutations_of, noisy, try_mutation
 from er3a.diagnosis.ranking import case_of, rank, usable
-from er3a.diagnosis.scans import is_identifiable, random_pairs, single_scan
 from er3a.pipeline.messages.diagnosis import both
 from testing.evidence import sized
+from testing.known_faults import (
+    Mutation,
+    Outcome,
+    is_identifiable,
+    mutations_of,
+    noisy,
+    random_pairs,
+    single_scan,
+    try_mutation,
+)
 
 ROBOTS = ("er3a_c60", "er3_600")
 NOISE_MM, DRAWS, RIGHT_DRAWS, BLIND_DRAWS, SEED = 0.5, sized(3), sized(150), sized(30), 20261120

@@ -22,7 +22,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -35,11 +34,6 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import GRAVITY, Drives, LinkMass, Load, MassBody, moved, no_body, six_moments, together
 from er3a.robots.robot import Envelope, Robot, derived
-
-
-def can_compute() -> bool:
-    """Whether Pinocchio is installed."""
-    return find_spec("pinocchio") is not None
 
 
 def pinocchio() -> Any:

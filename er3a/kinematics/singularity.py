@@ -353,12 +353,6 @@ def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
     return best[1]
 
 
-def is_singular(robot: Robot, q: Reals, threshold: float) -> Flags:
-    """Whether the smallest singular value at joint values (..., n) is below a threshold."""
-    below: Flags = np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[..., -1] < threshold
-    return below
-
-
 LEAST_SINGULAR_VALUE = 0.02
 
 

@@ -23,7 +23,6 @@ from er3a.diagnosis.faults import (
     WrongUnit,
     rounded,
 )
-from er3a.diagnosis.mutations import mutations_of, noisy, try_mutation
 from er3a.diagnosis.ranking import rank, usable
 from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
@@ -31,6 +30,7 @@ from er3a.files.robot_library import load_robot
 from er3a.references.reference import expected_of
 from er3a.references.subjects import PointAtPose
 from er3a.robots.conventions import to_modified
+from testing.known_faults import mutations_of, noisy, try_mutation
 
 TRUSTED = ("er3a_c60", "er3_600")
 OFFSET_MISSING = WrongOffset(2, 0.0, -90.0)
