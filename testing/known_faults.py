@@ -1,4 +1,4 @@
-"""Known faults put into a right table, of every size and one or two at a time: how often is a diagnosis right about them?"""
+"""Known faults put into a right table, one entry at a time or two, to count how often a diagnosis finds them."""
 
 from __future__ import annotations
 
