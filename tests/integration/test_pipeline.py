@@ -9,8 +9,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,8 +23,8 @@ from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
 from er3a.pipeline.results import FORMAT_VERSION, check_results, write_checksums
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
-from testing.small_study import STUDY, stages_of
-from tests.conftest import ALL_THERE, ROBOT, leave_one_robot
+from testing.small_study import stages_of
+from tests.conftest import ALL_THERE
 
 STAGES = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
 
@@ -168,26 +166,6 @@ def test_changing_the_workspace_budget_reruns_only_workspaces(small_study):
         planned = small_study.planned()
     assert {f"{robot}: compute workspace" for robot in small_study.robots} <= planned
     assert all("workspace" in job for job in planned - {"write the index"})
-
-
-@pytest.mark.long
-def test_results_are_the_same_bytes_on_one_core_and_with_another_scatter(small_study, fresh_project):
-    again = fresh_project("again")
-    leave_one_robot(again.folder / STUDY)
-    again.snakemake("--cores", "1", "--set-scatter", "blocks=3", "--until", "record")
-    compared = 0
-    for path in sorted((small_study.folder / "results" / ROBOT).rglob("*")):
-        if path.is_file():
-            twin = again.folder / path.relative_to(small_study.folder)
-            assert path.read_bytes() == twin.read_bytes(), path.name
-            compared += 1
-    assert compared >= 2 * len(STAGES)
-    rerun = Path(sys.executable).with_name("rerun")
-    for path in sorted((small_study.folder / "reports" / ROBOT).rglob("*.rrd")):
-        twin = again.folder / path.relative_to(small_study.folder)
-        command = [rerun, "rrd", "compare", "--unordered", path, twin]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, f"{path}: {done.stderr[-500:]}"
 
 
 @pytest.mark.long
