@@ -94,13 +94,18 @@ def filled(kind: Any, found: object, given: Mapping[str, Any]) -> dict[str, Any]
     return values
 
 
+def in_si(kind: type[KindT], entry: object, /, **given: Any) -> KindT:
+    """A dataclass of the library, filled with what a file says in its own units: the way back from :func:`stated`.
+
+    What is given stands in place of what the entry says. Fields that neither fills keep their defaults.
+    """
+    said = {split_unit(name): value for name, value in vars(entry).items()}
+    found = {stem: plain(to_si(unit, value)) for (stem, unit), value in said.items()} | given
+    return kind(**{each.name: found[each.name] for each in fields(kind) if each.name in found})  # type: ignore[arg-type]
+
+
 def plain(value: Any) -> Any:
-    """An array as nested tuples, a number of NumPy's as one of Python's, and anything else as it is."""
+    """An array or a list as nested tuples, a number of NumPy's as one of Python's, and anything else as it is."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
-        return _tuples(value) if isinstance(value, list) else value
-    return value
-
-
-def _tuples(values: list[Any]) -> tuple[Any, ...]:
-    return tuple(_tuples(value) if isinstance(value, list) else value for value in values)
+    return tuple(map(plain, value)) if isinstance(value, list) else value

@@ -12,7 +12,6 @@ from er3a.collision.shapes import PairsUnexamined
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
@@ -31,7 +30,7 @@ from er3a.pipeline.stages.programs.model import (
     SomeProgramsCaution,
     SomeProgramsFail,
 )
-from er3a.pipeline.stages.trajectory.motion import assumed_speeds
+from er3a.pipeline.stages.trajectory.motion import assumed_speeds, near_of
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
 from er3a.program_check.motion_checks import AssumedRates
@@ -85,11 +84,7 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
     paths, own = study.section(TrajectorySettings), study.section(ProgramsSettings)
     return CheckOptions(
         frames=listed.transforms(),
-        near=NearSingular(
-            float(np.radians(paths.near_wrist_deg)),
-            float(np.radians(paths.near_elbow_deg)),
-            paths.near_shoulder_mm / 1000,
-        ),
+        near=near_of(paths),
         assumed_speed=assumed_speeds(robot, paths),
         acceleration_time=paths.acceleration_time_s,
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,

@@ -261,9 +261,13 @@ def _joint_motion(
 
 def wanted_of(robot: Robot, settings: TrajectorySettings) -> Wanted:
     """What is to be settled of paths of the tool."""
+    return Wanted(limits_of(robot, settings).rates, near_of(settings))
+
+
+def near_of(settings: TrajectorySettings) -> NearSingular:
+    """How near to a singular set a pose counts as near-singular."""
     wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg])
-    near = NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
-    return Wanted(limits_of(robot, settings).rates, near)
+    return NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
 
 
 def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:
