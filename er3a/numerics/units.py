@@ -74,6 +74,8 @@ def stated(kind: type[KindT], found: object = None, /, **given: Any) -> KindT:
     ------
     AttributeError
         for a field that nothing fills
+    TypeError
+        for something given that fills no field
     """
     return kind(**{name: plain(value) for name, value in filled(kind, found, given).items()})
 
@@ -81,6 +83,9 @@ def stated(kind: type[KindT], found: object = None, /, **given: Any) -> KindT:
 def filled(kind: Any, found: object, given: Mapping[str, Any]) -> dict[str, Any]:
     """The values of a dataclass by field, as :func:`stated` says, before they become plain."""
     values = {}
+    names = {each.name for each in fields(kind)}
+    if unused := given.keys() - names - {split_unit(name)[0] for name in names}:
+        raise TypeError(f"{kind.__name__} has no field for {', '.join(sorted(unused))}")
     for each in fields(kind):
         stem, unit = split_unit(each.name)
         if each.name in given:

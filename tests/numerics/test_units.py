@@ -58,3 +58,8 @@ def test_what_is_given_stands_in_place_of_what_was_found():
 def test_a_field_that_nothing_fills_is_an_error():
     with pytest.raises(AttributeError):
         stated(Written, None, reach=np.zeros(1), turn=0.0, gap=None)
+
+
+def test_something_given_that_fills_no_field_is_an_error():
+    with pytest.raises(TypeError, match="raech"):
+        stated(Written, Found(np.zeros(1), 0.0, None, 3), raech=np.zeros(1))

@@ -220,9 +220,8 @@ def _first_of_branch(branch: Integers, rank: Integers) -> Flags:
 
 
 def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
-    robot, free = family.robot, np.degrees(1.0)
-    direction = shown(robot, family.direction) / free
-    return stated(SelfMotion, family, q0_deg=shown(robot, family.q0), direction=direction)
+    direction = shown(family.robot, family.direction) / np.degrees(1.0)
+    return stated(SelfMotion, family, q0_deg=shown(family.robot, family.q0), direction=direction)
 
 
 def _method(robot: Robot, method: Method) -> Method:
