@@ -58,11 +58,11 @@ class MadeSummary(Summary):
 class Rows(Table):
     """One column of each kind."""
 
-    x_m: Reals = column("how far", "m")
-    count: Integers = column("how many", dtype=np.int32)
-    label: Texts = column("what", dtype=object)
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    point_mm: Reals = vector("{}_mm", "where", "mm")
+    x_m: Reals = column("how far")
+    count: Integers = column("how many")
+    label: Texts = column("what")
+    q_deg: Reals = per_joint("joint angle")
+    point_mm: Reals = vector("{}_mm", "where")
 
 
 @dataclass(frozen=True, eq=False)

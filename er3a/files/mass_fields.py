@@ -12,6 +12,7 @@ from er3a.files.units import FARTHEST_MM, Triple, check_degrees, suspect
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import rot_z, transform
 from er3a.kinematics.chain import constant_links, joint_starts
+from er3a.numerics.units import in_si
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
 from er3a.robots.robot import MOST_JOINTS, Robot
 
@@ -74,10 +75,7 @@ class BodyFields(StrictModel):
     @property
     def body(self) -> MassBody:
         """In SI units, in the frame of the file."""
-        x, y, z = (value / 1000 for value in self.centre_mm)
-        xx, yy, zz, xy, xz, yz = self.inertia_kg_m2
-        offset = None if self.centre_tolerance_mm is None else self.centre_tolerance_mm / 1000
-        return MassBody(self.mass_kg, (x, y, z), (xx, yy, zz, xy, xz, yz), self.mass_tolerance_kg, offset)
+        return in_si(MassBody, self)
 
 
 class LinkRow(BodyFields):

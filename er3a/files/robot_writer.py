@@ -12,11 +12,14 @@ import yaml
 
 from er3a.errors import InputWarning
 from er3a.files.kept_files import write_atomically
-from er3a.files.mass_fields import SLIDING, TURNING
+from er3a.files.mass_fields import SLIDING, TURNING, BodyFields
 from er3a.files.robot_file import LEAST_LONGEST_MM, SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
+from er3a.numerics.units import from_si, split_unit
+from er3a.robots.joint_limits import shown
+from er3a.robots.masses import MassBody
 from er3a.robots.robot import CombinedLimit, Robot, Source
 
 
@@ -41,18 +44,10 @@ def mass_groups(robot: Robot) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _link(link: int, body: Any) -> dict[str, Any]:
-    row = {
-        "link": link,
-        "mass_kg": body.mass,
-        "centre_mm": [round(value * 1000, 11) + 0.0 for value in body.centre],
-        "inertia_kg_m2": list(body.inertia),
-    }
-    if body.mass_tolerance is not None:
-        row["mass_tolerance_kg"] = body.mass_tolerance
-    if body.centre_tolerance is not None:
-        row["centre_tolerance_mm"] = body.centre_tolerance * 1000
-    return row
+def _link(link: int, body: MassBody) -> dict[str, Any]:
+    named = {name: split_unit(name) for name in BodyFields.model_fields}
+    row = {name: np.asarray(from_si(unit, getattr(body, stem))).tolist() for name, (stem, unit) in named.items()}
+    return row | {"link": link, "centre_mm": [_tidy(value) for value in row["centre_mm"]]}
 
 
 def _drive(robot: Robot, k: int) -> dict[str, float]:
@@ -123,7 +118,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
                 **({keys[k]: _tidy(value)} if np.isfinite(value) else {}),
                 **_origins(robot, "speeds", k + 1),
             }
-            for k, value in enumerate(_shown(robot, robot.speed))
+            for k, value in enumerate(shown(robot, robot.speed))
         ]
         content["speeds"] = sourced("speeds") | {"rows": speeds}
     if robot.coupling is not None:
@@ -149,14 +144,9 @@ def _short(lengths_mm: np.ndarray) -> bool:
     return bool(short.any() or 0 < lengths_mm.max() < LEAST_LONGEST_MM)
 
 
-def _shown(robot: Robot, values: np.ndarray) -> np.ndarray:
-    """Values (n,) of the joints in degrees, or mm of those that slide."""
-    return np.where(robot.slides, 1000 * values, np.degrees(values))
-
-
 def _limit_rows(robot: Robot) -> list[dict]:
     found = []
-    ends = zip(_shown(robot, robot.lower), _shown(robot, robot.upper), robot.slides, robot.continuous)
+    ends = zip(shown(robot, robot.lower), shown(robot, robot.upper), robot.slides, robot.continuous)
     for k, (lower, upper, sliding, continuous) in enumerate(ends):
         unit = "mm" if sliding else "deg"
         limits = {"continuous": True} if continuous else {f"lower_{unit}": _tidy(lower), f"upper_{unit}": _tidy(upper)}

@@ -17,6 +17,7 @@ from er3a.files.units import PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
+from er3a.numerics.units import in_si
 from er3a.robots.robot import Robot
 from er3a.vision.grasping import DetectedObject, Grasp
 from er3a.vision.next_view import FieldOfView
@@ -120,14 +121,13 @@ class ObjectEntry(StrictModel):
 
     def detected(self) -> DetectedObject:
         """In the units of the library."""
-        return DetectedObject(
-            name=self.name,
+        return in_si(
+            DetectedObject,
+            self,
             T_camera_object=self.pose(),
             covariance=self.standard_deviation.covariance(),
             turns=self.symmetry_turns,
             grasps=tuple(entry.grasp() for entry in self.grasps),
-            approach=self.approach_mm / 1000,
-            retreat=self.retreat_mm / 1000,
         )
 
 

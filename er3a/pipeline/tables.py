@@ -4,14 +4,15 @@ A table is a frozen dataclass of equally long arrays::
 
     @dataclass(frozen=True, eq=False)
     class Samples(Table):
-        path: Texts = column("name of the path", dtype=object)
-        t_s: Reals = column("time since the path's start", "s")
-        q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-        point_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
+        path: Texts = column("name of the path")
+        t_s: Reals = column("time since the path's start")
+        q_deg: Reals = per_joint("joint angle")
+        point_mm: Reals = vector("{}_mm", "tool point in the base frame")
 
 ``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg`` (of joints that slide ``q3_mm``, in mm), ``point_mm``
-(rows, 3) as ``x_mm, y_mm, z_mm``. Unit and meaning go into the file. A column of findings is written as JSON texts,
-with each finding's code and parameters.
+(rows, 3) as ``x_mm, y_mm, z_mm``. Unit and meaning go into the file; the unit is the name's ending
+(:mod:`er3a.numerics.units`) unless a column states another, and the annotation says what kind of numbers it holds. A
+column of findings is written as JSON texts, with each finding's code and parameters.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_type_hints
 
 import numpy as np
 import pyarrow as pa
@@ -31,6 +32,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from er3a.by_value import ByValue
+from er3a.numerics.units import filled, split_unit, unit_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,33 +98,55 @@ class Column:
         return [numbered[number] for number in sorted(numbered)]
 
 
-def column(meaning: str, unit: str = "", *, name: str = "", dtype: Any = np.float64) -> Any:
+def column(meaning: str, unit: str = "", *, name: str = "") -> Any:
     """A column (rows,); ``name`` in the file is the attribute's where it is left out."""
-    return _declared(name, meaning, unit, dtype, None)
+    return _declared(name, meaning, unit)
 
 
 def findings(meaning: str, kind: Any) -> Any:
     """A column (rows,) of findings, or None; ``kind`` says which ones they can be."""
-    return field(metadata={"column": Column("", meaning, "", np.dtype(object), None, kind)})
+    return _declared("", meaning, kind=kind)
 
 
-def per_joint(pattern: str, meaning: str, unit: str = "", *, dtype: Any = np.float64) -> Any:
-    """One column for each joint, (rows, n): ``"q{}_deg"`` is written as ``q1_deg ... qn_deg``."""
-    return _declared(pattern, meaning, unit, dtype, None)
+def per_joint(meaning: str, unit: str = "", *, name: str = "") -> Any:
+    """One column for each joint, (rows, n): ``q_deg`` is written as ``q1_deg ... qn_deg``."""
+    return _declared(_numbered(name) if name else PER_JOINT, meaning, unit)
 
 
-def vector(pattern: str, meaning: str, unit: str = "", *, parts: Iterable[str] = "xyz", dtype: Any = np.float64) -> Any:
+def vector(pattern: str, meaning: str, unit: str = "", *, parts: Iterable[str] = "xyz") -> Any:
     """Columns that belong together, (rows, len(parts)): ``"{}_mm"`` is written as ``x_mm, y_mm, z_mm``."""
-    return _declared(pattern, meaning, unit, dtype, tuple(parts))
+    return _declared(pattern, meaning, unit, parts=tuple(parts))
 
 
 def lists(meaning: str, unit: str = "") -> Any:
     """A column (rows,) with a list of real numbers in each row."""
-    return field(metadata={"column": Column("", meaning, unit, np.dtype(object), lists=True)})
+    return _declared("", meaning, unit, lists=True)
 
 
-def _declared(pattern: str, meaning: str, unit: str, dtype: Any, parts: tuple[str, ...] | None) -> Any:
-    return field(metadata={"column": Column(pattern, meaning, unit, np.dtype(dtype), parts)})
+def _declared(pattern: str, meaning: str, unit: str = "", **more: Any) -> Any:
+    return field(metadata={"column": Column(pattern, meaning, unit, np.dtype(object), **more)})
+
+
+PER_JOINT = "{}"
+"""In place of a pattern until the attribute's name is known."""
+
+
+@cache
+def _columns(table: type[Table]) -> dict[str, Column]:
+    """The columns of a table by attribute, with what follows from the attribute's name and annotation."""
+    hints, found = get_type_hints(table), {}
+    for each in fields(table):
+        spec: Column = each.metadata["column"]
+        of_joints = spec.pattern == PER_JOINT and not spec.parts
+        pattern = _numbered(each.name) if of_joints else spec.pattern or each.name
+        numbers = get_args(get_args(hints[each.name])[1])[0]
+        found[each.name] = replace(spec, pattern=pattern, unit=spec.unit or unit_text(pattern), dtype=np.dtype(numbers))
+    return found
+
+
+def _numbered(name: str) -> str:
+    stem, unit = split_unit(name)
+    return f"{stem}{{}}_{unit}" if unit else f"{stem}{{}}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,12 +191,7 @@ class Table(ByValue):
     @classmethod
     def columns(cls) -> dict[str, Column]:
         """The columns by attribute."""
-        found = {}
-        for attribute in fields(cls):
-            spec: Column = attribute.metadata["column"]
-            name = spec.pattern or attribute.name
-            found[attribute.name] = replace(spec, pattern=name)
-        return found
+        return _columns(cls)  # type: ignore[arg-type]  # a class can be hashed
 
     @classmethod
     def empty(cls) -> Self:
@@ -190,6 +209,14 @@ class Table(ByValue):
         if not parts:
             return cls.empty()
         return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in cls.columns()})
+
+    @classmethod
+    def of(cls, found: object = None, /, **given: Any) -> Self:
+        """A table filled with what the library found, as :func:`er3a.numerics.units.stated` fills a dataclass; a single
+        text or number that is given stands in every row."""
+        values = filled(cls, found, given)
+        rows = max(len(value) for value in values.values() if np.ndim(value))
+        return cls(**{name: value if np.ndim(value) else _repeated(value, rows) for name, value in values.items()})
 
     @classmethod
     def of_rows(cls, rows: Iterable[tuple[Any, ...]]) -> Self:
@@ -261,6 +288,10 @@ class Table(ByValue):
         if slides:
             object.__setattr__(found, "slides", slides)
         return found
+
+
+def _repeated(value: Any, rows: int) -> NDArray[Any]:
+    return np.full(rows, value, object if isinstance(value, str) else None)
 
 
 def _array(values: tuple[Any, ...], spec: Column) -> NDArray[Any]:

@@ -57,7 +57,7 @@ class ToySummary(Summary):
 @dataclass(frozen=True, eq=False)
 class Lengths(Table):
     """Each length."""
-    a_m: Reals = column("length of a link", "m")
+    a_m: Reals = column("length of a link")
 
 @dataclass(frozen=True, eq=False)
 class ToyResults(Results[ToySummary]):

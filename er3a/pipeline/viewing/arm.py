@@ -6,6 +6,8 @@ joint) and ``tool``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -40,6 +42,20 @@ def arm_view(
     eye = rrb.EyeControls3D(
         kind="Orbital",
         position=centre + np.array([0.5, -1.15, 0.45]) * radius,
+        look_target=centre,
+        eye_up=[0, 0, 1],
+    )
+    return rrb.Spatial3DView(origin="/", contents=contents, name=name, eye_controls=eye)
+
+
+def view_of(robot: Robot, name: str, contents: list[str], points: Sequence[np.ndarray]) -> rrb.Spatial3DView:
+    """A 3-D view that opens with the arm and points, several arrays (N, 3), m, in sight."""
+    placed = np.concatenate(points)
+    centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
+    distance = 0.85 * max(float(np.linalg.norm(np.ptp(placed, axis=0))), 2 * size_of(robot))
+    eye = rrb.EyeControls3D(
+        kind="Orbital",
+        position=centre + distance * np.array([0.6, -0.7, 0.35]),
         look_target=centre,
         eye_up=[0, 0, 1],
     )

@@ -23,6 +23,11 @@ from er3a.robots.joint_limits import size_of
 
 TIMELINE = "t"
 ARM = "/arm/**"
+SHOWN_S = rr.TimeRange(
+    start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
+)
+AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
+"""Colours of a frame's x, y and z."""
 
 
 @contextmanager
@@ -62,14 +67,45 @@ def recording(output: Path, robot: str, stage: str, layout: rrb.View | rrb.Conta
     write_atomically(output, lambda file: file.write_bytes(content))
 
 
+def log_text(stream: rr.RecordingStream, entity: str, markdown: str, static: bool = False) -> None:
+    """Log a text."""
+    stream.log(entity, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN), static=static)
+
+
 def log_note(stream: rr.RecordingStream, stage: str, markdown: str) -> None:
     """Log the text that says what to look at, ``/<stage>/note``."""
-    stream.log(f"{stage}/note", rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN), static=True)
+    log_text(stream, f"{stage}/note", markdown, static=True)
+
+
+def log_now(stream: rr.RecordingStream, stage: str, t: float, markdown: str) -> None:
+    """Log what is to be seen from a time (s) on, ``/<stage>/now``."""
+    stream.set_time(TIMELINE, duration=t)
+    log_text(stream, f"{stage}/now", markdown)
+
+
+def log_event(stream: rr.RecordingStream, stage: str, t: float, text: str, level: rr.TextLogLevel) -> None:
+    """Log an event at a time (s), ``/<stage>/events``."""
+    stream.set_time(TIMELINE, duration=t)
+    stream.log(f"{stage}/events", rr.TextLog(text, level=level))
 
 
 def note_view(stage: str) -> rrb.View:
     """The view of a stage's note."""
     return rrb.TextDocumentView(origin=f"/{stage}/note", name="What to look at")
+
+
+def words_view(
+    stage: str, now: str, *more: rrb.View, row_shares: Sequence[float] | None = None, name: str = "Words"
+) -> rrb.Vertical:
+    """A stage's note, below it what is to be seen now, under that name, and more views."""
+    shown = rrb.TextDocumentView(origin=f"/{stage}/now", name=now)
+    return rrb.Vertical(note_view(stage), shown, *more, row_shares=row_shares, name=name)
+
+
+def curves_view(origin: str, name: str, legend: bool | None = None) -> rrb.View:
+    """A view of curves, some seconds around the time shown."""
+    shown = None if legend is None else rrb.PlotLegend(visible=legend)
+    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=SHOWN_S), plot_legend=shown)
 
 
 def events_view(stage: str, name: str) -> rrb.View:
@@ -107,6 +143,14 @@ def send_series(
     gap_starts = times[~known & np.append(True, known[:-1])]
     cleared = rr.Clear.columns(is_recursive=np.zeros(len(gap_starts), dtype=bool))  # type: ignore[arg-type]
     stream.send_columns(entity, [seconds(gap_starts)], cleared)
+
+
+def send_run(
+    stream: rr.RecordingStream, entity: str, times: np.ndarray, values: np.ndarray, names: list[str], colours: list[str]
+) -> None:
+    """As :func:`send_series`, with a gap behind the last point, so that the next run's curves don't join these."""
+    gap = np.full((1, values.shape[1]), np.nan)
+    send_series(stream, entity, np.append(times, times[-1] + 1e-3), np.concatenate([values, gap]), names, colours)
 
 
 _PLANE_THICKNESS = 0.002  # m

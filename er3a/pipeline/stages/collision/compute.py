@@ -23,6 +23,7 @@ from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
+from er3a.numerics.units import stated
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.collision.model import (
@@ -158,9 +159,7 @@ def compute(study: Study, name: str) -> CollisionResults:
     tolerance = settings.penetration_tolerance_mm / 1000
     paths, on_paths = path_clearances(study_motions(study, name, CHECKS), bodies, tolerance)
     pairs = _pair_shares(bodies, space)
-    mounting = tuple(
-        Mounting(contact.solid, contact.depth * 1000, contact.inside) for contact in base_contacts(robot, scene)
-    )
+    mounting = tuple(stated(Mounting, contact) for contact in base_contacts(robot, scene))
     matrix = _matrix(bodies)
     places_found = _places_summary(places)
     wrong = ShapesOverlap(bodies.unexamined, space.whole.value) if bodies.unexamined else None
@@ -184,13 +183,9 @@ def compute(study: Study, name: str) -> CollisionResults:
         ),
         matrix=matrix,
         pairs=pairs,
-        places=PlaceRows(
-            middle_mm=places.middles * 1000,
-            tries=places.tries,
-            clear=places.clear,
-            joined=places.joined,
-            witness_deg=shown(robot, places.witness),
-        ).of_joints(robot.slides),
+        places=PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness)).of_joints(
+            robot.slides
+        ),
         targets=targets,
         paths=paths,
     )

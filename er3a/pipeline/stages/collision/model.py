@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -142,15 +140,15 @@ class CollisionSummary(Summary):
 class MatrixRows(Table):
     """The allowed collision matrix: one row for each pair of links, and of a link with what is carried."""
 
-    first: Texts = column("the body nearer to the base", dtype=object)
-    second: Texts = column("the body farther out", dtype=object)
-    state: Texts = column("never, joined, overlaps, meets, undecided, allowed or watched", dtype=object)
-    watched: Flags = column("whether distances of the pair are measured", dtype=bool)
-    least_mm: Reals = column("of pairs that never meet, a proven lower bound of their distance", "mm")
-    left_out_mm: Reals = column("radius of the region around the joint that is left out; 0 where none is", "mm")
-    boxes: Integers = column("boxes of joint vectors looked at to prove it", dtype=np.int64)
-    witness_deg: Reals = per_joint("witness{}_deg", "a joint vector in which watched parts overlap; NaN: none", "deg")
-    reason: Texts = column("what the person who decided on the pair wrote", dtype=object)
+    first: Texts = column("the body nearer to the base")
+    second: Texts = column("the body farther out")
+    state: Texts = column("never, joined, overlaps, meets, undecided, allowed or watched")
+    watched: Flags = column("whether distances of the pair are measured")
+    least_mm: Reals = column("of pairs that never meet, a proven lower bound of their distance")
+    left_out_mm: Reals = column("radius of the region around the joint that is left out; 0 where none is")
+    boxes: Integers = column("boxes of joint vectors looked at to prove it")
+    witness_deg: Reals = per_joint("a joint vector in which watched parts overlap; NaN: none")
+    reason: Texts = column("what the person who decided on the pair wrote")
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,47 +156,47 @@ class PairShares(Table):
     """How often each pair overlaps among random joint vectors."""
 
     between: Findings = findings("the two bodies", Pair)
-    of_itself: Flags = column("whether both belong to the arm or to what it carries", dtype=bool)
+    of_itself: Flags = column("whether both belong to the arm or to what it carries")
     ratio: Reals = column("share of the joint vectors in which they overlap")
     low: Reals = column("lower end of its 95 % interval")
     high: Reals = column("upper end of its 95 % interval")
-    always: Flags = column("whether they overlap in every joint vector, proven", dtype=bool)
+    always: Flags = column("whether they overlap in every joint vector, proven")
 
 
 @dataclass(frozen=True, eq=False)
 class PlaceRows(Table):
     """Cells that the tool point was brought to."""
 
-    middle_mm: Reals = vector("{}_mm", "middle of the cell", "mm")
-    tries: Integers = column("arms tried with the tool in it", dtype=np.int64)
-    clear: Flags = column("whether one of them is free of overlap", dtype=bool)
-    joined: Flags = column("whether that one is joined to home by a proven motion", dtype=bool)
-    witness_deg: Reals = per_joint("witness{}_deg", "the first such arm; NaN where none was found", "deg")
+    middle_mm: Reals = vector("{}_mm", "middle of the cell")
+    tries: Integers = column("arms tried with the tool in it")
+    clear: Flags = column("whether one of them is free of overlap")
+    joined: Flags = column("whether that one is joined to home by a proven motion")
+    witness_deg: Reals = per_joint("the first such arm; NaN where none was found")
 
 
 @dataclass(frozen=True, eq=False)
 class TargetClearances(Table):
     """Clearance of each target's solutions within the limits."""
 
-    target: Texts = column("name of the target", dtype=object)
-    branch: Integers = column("number of the branch", dtype=np.int64)
-    label: Texts = column("code of the branch", dtype=object)
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    clearance_mm: Reals = column("least distance; negative by the depth of overlap", "mm")
-    between: Texts = column("what is nearest to what", dtype=object)
+    target: Texts = column("name of the target")
+    branch: Integers = column("number of the branch")
+    label: Texts = column("code of the branch")
+    q_deg: Reals = per_joint("joint angle")
+    clearance_mm: Reals = column("least distance; negative by the depth of overlap")
+    between: Texts = column("what is nearest to what")
 
 
 @dataclass(frozen=True, eq=False)
 class PathClearances(Table):
     """Clearance over time of each path, with the points of both bodies that are nearest."""
 
-    path: Texts = column("name of the path", dtype=object)
-    t_s: Reals = column("time since the path's start", "s")
-    q_deg: Reals = per_joint("q{}_deg", "joint angle; NaN where the path can't be reached", "deg")
-    clearance_mm: Reals = column("least distance; negative by the depth of overlap", "mm")
-    between: Texts = column("what is nearest to what", dtype=object)
-    from_mm: Reals = vector("from_{}_mm", "the nearest point of the first body", "mm")
-    to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body", "mm")
+    path: Texts = column("name of the path")
+    t_s: Reals = column("time since the path's start")
+    q_deg: Reals = per_joint("joint angle; NaN where the path can't be reached")
+    clearance_mm: Reals = column("least distance; negative by the depth of overlap")
+    between: Texts = column("what is nearest to what")
+    from_mm: Reals = vector("from_{}_mm", "the nearest point of the first body")
+    to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body")
 
 
 @dataclass(frozen=True, eq=False)

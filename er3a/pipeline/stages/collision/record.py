@@ -18,15 +18,15 @@ from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINTS, MODEL, MUTED, VERDICTS, rgb
 from er3a.pipeline.viewing.recording import (
     ARM,
-    TIMELINE,
     escaped,
     log_note,
+    log_now,
     log_scene,
-    note_view,
     pieces_mesh,
     recording,
     seconds,
-    send_series,
+    send_run,
+    words_view,
 )
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -54,8 +54,7 @@ def record(study: Study, stored: Stored[CollisionResults], output: Path) -> None
     robot = study.robot(name)
     view = arm_view(robot, "Places and nearest pair", [ARM, f"/{STAGE}/**"])
     curve = rrb.TimeSeriesView(origin=f"/{STAGE}/curves", name="Clearance (mm)")
-    words = rrb.Vertical(note_view(STAGE), rrb.TextDocumentView(origin=f"/{STAGE}/now", name="Now"), name="Words")
-    right = rrb.Vertical(curve, words, row_shares=[2, 3])
+    right = rrb.Vertical(curve, words_view(STAGE, "Now"), row_shares=[2, 3])
     with recording(output, name, STAGE, rrb.Horizontal(view, right, column_shares=[2, 1], name="Collision")) as stream:
         log_note(stream, STAGE, NOTE)
         log_scene(stream, study, name, STAGE)
@@ -100,16 +99,12 @@ def _paths(stream: rr.RecordingStream, robot: Robot, results: CollisionResults) 
         known = np.isfinite(rows.from_mm[:, 0]) & np.isfinite(rows.q_deg[:, 0])
         times = start + rows.t_s
         found = next((each for each in results.summary.closest if (each.kind, each.name) == ("path", name)), None)
-        stream.set_time(TIMELINE, duration=start)
         told = f"nearest: {say(found.between)}, {found.clearance_mm:.1f} mm" if found else "no pose can be reached"
-        text = rr.TextDocument(f"## {escaped(str(name))}\n{escaped(told)}", media_type=rr.MediaType.MARKDOWN)
-        stream.log(f"{STAGE}/now", text)
+        log_now(stream, STAGE, start, f"## {escaped(str(name))}\n{escaped(told)}")
         if known.any():
             send_motion(stream, robot, times[known], meant(robot, rows.q_deg[known]))
             _pair_lines(stream, times[known], rows.from_mm[known] / 1000, rows.to_mm[known] / 1000)
-        broken = np.append(times, times[-1] + 1e-3)
-        values = np.append(rows.clearance_mm, np.nan)[:, None]
-        send_series(stream, f"{STAGE}/curves/clearance", broken, values, ["clearance"], [MODEL])
+        send_run(stream, f"{STAGE}/curves/clearance", times, rows.clearance_mm[:, None], ["clearance"], [MODEL])
         start += float(rows.t_s[-1]) + PAUSE
 
 

@@ -55,6 +55,7 @@ from er3a.pipeline.stages.dynamics.model import (
 from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, study_motions
 from er3a.pipeline.study import Study
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
+from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
 from er3a.robots.robot import Grade, Robot
 
@@ -236,7 +237,7 @@ def path_torques(arm: LoadedArm, motion: Motion, samples: int, wrist: tuple[int,
     rows = TorqueRows(
         path=np.full(len(t), entry.name, object),
         t_s=t,
-        q=np.where(arm.robot.slides, 1000 * q, np.degrees(q)),
+        q=shown(arm.robot, q),
         torque=tau,
         tolerance=tolerance,
         **{name: getattr(parts, name) for name in PARTS},
@@ -471,8 +472,7 @@ def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:
     found = worst_holding(arm.model)
     rest = np.zeros_like(found.q)
     tolerance = np.diagonal(arm.tolerance(found.q, rest, rest))
-    slides = arm.robot.slides
-    q = np.where(slides, 1000 * found.q, np.degrees(found.q))
+    slides, q = arm.robot.slides, shown(arm.robot, found.q)
     return tuple(
         HoldingTorque(
             joint=j + 1,

@@ -322,26 +322,26 @@ class DynamicsSummary(Summary):
 class TorqueRows(Table):
     """Torques along the paths that the arm can follow, N m (N for joints that slide)."""
 
-    path: Texts = column("name of the path", dtype=object)
-    t_s: Reals = column("time since the path's start", "s")
-    q: Reals = per_joint("q{}", "joint value", "deg or mm")
-    torque: Reals = per_joint("torque{}", "torque of the drive", "N m or N")
-    tolerance: Reals = per_joint("tolerance{}", "by which it may be off", "N m or N")
-    gravity: Reals = per_joint("gravity{}", "part against gravity", "N m or N")
-    inertia: Reals = per_joint("inertia{}", "part of accelerations, rotors included", "N m or N")
-    velocity: Reals = per_joint("velocity{}", "centrifugal and Coriolis part", "N m or N")
-    friction: Reals = per_joint("friction{}", "part against friction, as far as known", "N m or N")
-    tool: Reals = per_joint("tool{}", "part against forces at the tool", "N m or N")
-    power_w: Reals = per_joint("power{}_w", "power of the drive", "W")
+    path: Texts = column("name of the path")
+    t_s: Reals = column("time since the path's start")
+    q: Reals = per_joint("joint value", "deg or mm")
+    torque: Reals = per_joint("torque of the drive", "N m or N")
+    tolerance: Reals = per_joint("by which it may be off", "N m or N")
+    gravity: Reals = per_joint("part against gravity", "N m or N")
+    inertia: Reals = per_joint("part of accelerations, rotors included", "N m or N")
+    velocity: Reals = per_joint("centrifugal and Coriolis part", "N m or N")
+    friction: Reals = per_joint("part against friction, as far as known", "N m or N")
+    tool: Reals = per_joint("part against forces at the tool", "N m or N")
+    power_w: Reals = per_joint("power of the drive")
 
 
 @dataclass(frozen=True, eq=False)
 class DiagramRows(Table):
     """The load diagram: how far from the last axis a point load's centre may be; NaN where it may nowhere."""
 
-    mass_kg: Reals = column("mass of the load", "kg")
-    along_mm: Reals = column("distance of its centre from the flange along the last axis", "mm")
-    across_mm: Reals = column("greatest distance of its centre from the last axis", "mm")
+    mass_kg: Reals = column("mass of the load")
+    along_mm: Reals = column("distance of its centre from the flange along the last axis")
+    across_mm: Reals = column("greatest distance of its centre from the last axis")
 
 
 @dataclass(frozen=True, eq=False)

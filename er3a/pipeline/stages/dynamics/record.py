@@ -16,8 +16,18 @@ from er3a.pipeline.stages.dynamics.model import DynamicsResults, DynamicsSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import arm_view, log_arm, send_motion
 from er3a.pipeline.viewing.palette import JOINTS, rgb
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, seconds, send_series
-from er3a.robots.joint_limits import size_of
+from er3a.pipeline.viewing.recording import (
+    ARM,
+    curves_view,
+    escaped,
+    log_note,
+    log_now,
+    recording,
+    seconds,
+    send_run,
+    words_view,
+)
+from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 STAGE = "dynamics"
@@ -26,9 +36,6 @@ LONGEST = 0.35  # of the arm's size, the arrow of the greatest torque
 WIDTH = 0.012  # of the arm's size
 CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
 CURVES = {"torque": "Drive torque ({unit})", "gravity": "Part against gravity ({unit})", "power": "Power (W)"}
-SHOWN_S = rr.TimeRange(
-    start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
-)
 
 
 def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
@@ -39,13 +46,11 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         log_note(stream, STAGE, _note(robot, summary))
         runs = [(path, results.torques.take(results.torques.path == path.name)) for path in summary.paths]
         runs = [(path, rows) for path, rows in runs if len(rows)]
-        log_arm(stream, robot, _joints(robot, runs[0][1])[0] if runs else np.zeros(robot.joints))
+        log_arm(stream, robot, meant(robot, runs[0][1].q[0]) if runs else np.zeros(robot.joints))
         scale = _arrow_scales(robot, [rows.torque for _, rows in runs])
         start = 0.0
         for path, rows in runs:
-            stream.set_time(TIMELINE, duration=start)
-            text = f"## {path.name}\n{escaped(path.title)}"
-            stream.log(f"{STAGE}/now", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+            log_now(stream, STAGE, start, f"## {path.name}\n{escaped(path.title)}")
             _run(stream, robot, rows, start, scale)
             start += path.duration_s + PAUSE
 
@@ -54,20 +59,10 @@ def _layout(robot: Robot) -> rrb.Horizontal:
     slides = robot.slides
     unit = "N" if slides.all() else "N m or N" if slides.any() else "N m"
     series = [
-        rrb.TimeSeriesView(
-            origin=f"/{STAGE}/curves/{curve}",
-            name=title.format(unit=unit),
-            axis_x=rrb.TimeAxis(view_range=SHOWN_S),
-            plot_legend=rrb.PlotLegend(visible=curve == "torque"),
-        )
+        curves_view(f"/{STAGE}/curves/{curve}", title.format(unit=unit), legend=curve == "torque")
         for curve, title in CURVES.items()
     ]
-    words = rrb.Vertical(
-        note_view(STAGE),
-        rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This path"),
-        row_shares=[5, 2],
-        name="Words",
-    )
+    words = words_view(STAGE, "This path", row_shares=[5, 2])
     view = arm_view(robot, "Arm and torques", [ARM, f"/{STAGE}/**"])
     return rrb.Horizontal(view, rrb.Vertical(*series, name="Curves"), words, column_shares=[2, 1.4, 1], name="Torques")
 
@@ -83,7 +78,7 @@ def _arrow_scales(robot: Robot, torques: list[Reals]) -> Reals:
 def _run(stream: rr.RecordingStream, robot: Robot, rows: TorqueRows, start: float, scale: Reals) -> None:
     """The arm, an arrow on each axis as long as its torque, and the curves."""
     times = start + rows.t_s
-    send_motion(stream, robot, times, _joints(robot, rows))
+    send_motion(stream, robot, times, meant(robot, rows.q))
     parts = link_parts(robot)
     for j in range(min(robot.joints, robot.rows)):
         colour = rgb(JOINTS[j % len(JOINTS)])
@@ -100,15 +95,8 @@ def _run(stream: rr.RecordingStream, robot: Robot, rows: TorqueRows, start: floa
         stream.send_columns(f"arm/link_{j + 1}/torque", [seconds(times)], arrows)
     names = [f"J{j + 1}" for j in range(robot.joints)]
     colours = [JOINTS[j % len(JOINTS)] for j in range(robot.joints)]
-    broken = np.append(times, times[-1] + 1e-3)
-    gap = np.full((1, robot.joints), np.nan)
     for curve, values in (("torque", rows.torque), ("gravity", rows.gravity), ("power", rows.power_w)):
-        send_series(stream, f"{STAGE}/curves/{curve}", broken, np.concatenate([values, gap]), names, colours)
-
-
-def _joints(robot: Robot, rows: TorqueRows) -> Reals:
-    q: Reals = np.where(robot.slides, rows.q / 1000, np.radians(rows.q))
-    return q
+        send_run(stream, f"{STAGE}/curves/{curve}", times, values, names, colours)
 
 
 def _note(robot: Robot, summary: DynamicsSummary) -> str:

@@ -31,6 +31,7 @@ from er3a.kinematics.singularity import TYPES, characteristic_length, conditioni
 from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Method, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.units import stated
 from er3a.pipeline.progress import shown_progress
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.settings import TrajectorySettings
@@ -122,18 +123,17 @@ def solve_target(
     else:
         obstacle = _obstacle(robot, target, solutions, len(found))
         if advise and has_branches(robot):
-            near = _neighbours(robot, target, random)
+            near = stated(NeighbourPoses, neighbours(robot, target.T, random))
             advice = _what_would_help(near)
-    x, y, z = (target.T[:3, 3] * 1000).tolist()
     quaternion = scipy.spatial.transform.Rotation.from_matrix(target.T[:3, :3]).as_quat(
         canonical=True, scalar_first=True
     )
-    result = TargetResult(
-        name=target.name,
-        note=target.note,
-        xyz_mm=(x, y, z),
-        rpy_deg=tuple(np.degrees(rpy_of(target.T)).tolist()),
-        quaternion_wxyz=tuple(quaternion.tolist()),
+    result = stated(
+        TargetResult,
+        target,
+        xyz=target.T[:3, 3],
+        rpy=rpy_of(target.T),
+        quaternion_wxyz=quaternion,
         q_ref_deg=target.q_ref_deg,
         solutions=len(found),
         within_limits=len(within),
@@ -144,7 +144,6 @@ def solve_target(
         reason=choice.reason,
         obstacle=obstacle,
         outcome=_outcome(obstacle),
-        expect=target.expect,
         unsolved=solutions.unsolved,
         method=_method(robot, solutions.method),
         families=tuple(map(_self_motion, solutions.families)),
@@ -168,23 +167,20 @@ def _rows(
     rank[choice.order] = np.arange(1, len(choice.order) + 1)
     why = np.full(count, None, dtype=object)
     why[:] = refused
-    return SolutionRows(
-        target=np.full(count, target.name, dtype=object),
-        branch=solutions.branch,
-        label=solutions.label,
+    return SolutionRows.of(
+        solutions,
+        target=target.name,
         q_deg=shown(robot, q) + 0.0,
-        turn=solutions.turn,
-        within_limits=solutions.within_limits,
         refusal=why,
         rank=rank,
         first_of_branch=_first_of_branch(solutions.branch, rank),
-        position_residual_mm=np.linalg.norm(back[:, :3, 3] - T[:3, 3], axis=1) * 1000,
-        orientation_residual_deg=np.degrees(_missed_orientation(robot, back[:, :3, :3], T[:3, :3])),
+        position_residual=np.linalg.norm(back[:, :3, 3] - T[:3, 3], axis=1),
+        orientation_residual=_missed_orientation(robot, back[:, :3, :3], T[:3, :3]),
         manipulability=conditioning(robot, q, characteristic_length(robot)).manipulability,
         singular=_singular(robot, solutions),
-        limit_margin_deg=np.degrees(limit_margin(robot, q)),
-        greatest_move_deg=np.degrees(choice.greatest_move),
-        distance_deg=np.degrees(choice.distance),
+        limit_margin=limit_margin(robot, q),
+        greatest_move=choice.greatest_move,
+        distance=choice.distance,
     )
 
 
@@ -224,16 +220,8 @@ def _first_of_branch(branch: Integers, rank: Integers) -> Flags:
 
 
 def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
-    low, high = np.degrees(family.range).tolist()
-    return SelfMotion(
-        kind=family.kind,
-        q0_deg=tuple(shown(family.robot, family.q0).tolist()),
-        direction=tuple((shown(family.robot, family.direction) / np.degrees(1.0)).tolist()),
-        range_deg=(low, high),
-        within_limits=family.within_limits,
-        branches=family.branches,
-        dimension=family.dimension,
-    )
+    direction = shown(family.robot, family.direction) / np.degrees(1.0)
+    return stated(SelfMotion, family, q0_deg=shown(family.robot, family.q0), direction=direction)
 
 
 def _method(robot: Robot, method: Method) -> Method:
@@ -266,21 +254,6 @@ def _outcome(obstacle: Obstacle | None) -> TargetOutcome:
             return "collides"
         case _:
             return "unreachable"
-
-
-def _neighbours(robot: Robot, target: Target, random: np.random.Generator) -> NeighbourPoses:
-    near = neighbours(robot, target.T, random)
-    return NeighbourPoses(
-        orientation_ratio=near.orientation_ratio,
-        least_turn_deg=None if near.least_turn is None else float(np.degrees(near.least_turn)),
-        least_shift_mm=None if near.least_shift is None else near.least_shift * 1000,
-        shifted_to_mm=None if near.shifted_to is None else _triple(near.shifted_to * 1000),
-    )
-
-
-def _triple(vector: Reals) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z
 
 
 def _what_would_help(near: NeighbourPoses) -> tuple[Advice, ...]:
@@ -502,13 +475,5 @@ def _worst_residuals(solutions: SolutionRows, trips: BatchRoundTrips | None) -> 
 
 
 def _round_trips(trips: BatchRoundTrips) -> RoundTrips:
-    return RoundTrips(
-        poses=trips.poses,
-        solutions=trips.solutions,
-        own_found=trips.own_found,
-        same_joints_deg=float(np.degrees(SAME_JOINTS_RAD)),
-        worst_own_deg=float(np.degrees(trips.worst_own)) if np.isfinite(trips.worst_own) else None,
-        worst_position_mm=trips.worst_position * 1000,
-        worst_orientation_deg=float(np.degrees(trips.worst_orientation)),
-        counts_within_limits=tuple(trips.counts_within_limits.tolist()),
-    )
+    own = trips.worst_own if np.isfinite(trips.worst_own) else None
+    return stated(RoundTrips, trips, same_joints=SAME_JOINTS_RAD, worst_own=own)

@@ -319,53 +319,51 @@ class InverseSummary(Summary):
 class SolutionRows(Table):
     """One row for each solution of each target, turns included."""
 
-    target: Texts = column("name of the target", dtype=object)
-    branch: Integers = column("4 * shoulder + 2 * elbow + wrist; else the number of the arm found", dtype=np.int64)
-    label: Texts = column("code of the branch", dtype=object)
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    turn: Integers = per_joint("turn{}", "full turns added to the angle in (-180, 180]", dtype=np.int64)
-    within_limits: Flags = column("whether all joints are within their limits", dtype=bool)
+    target: Texts = column("name of the target")
+    branch: Integers = column("4 * shoulder + 2 * elbow + wrist; else the number of the arm found")
+    label: Texts = column("code of the branch")
+    q_deg: Reals = per_joint("joint angle")
+    turn: Integers = per_joint("full turns added to the angle in (-180, 180]")
+    within_limits: Flags = column("whether all joints are within their limits")
     refusal: Findings = findings("which limits are left, or what overlaps; none for admissible solutions", Refusal)
-    rank: Integers = column("1 is the chosen one; 0 for refused ones", dtype=np.int64)
-    first_of_branch: Flags = column("whether it is the branch's best", dtype=bool)
-    position_residual_mm: Reals = column("by how much forward kinematics misses the target", "mm")
-    orientation_residual_deg: Reals = column("by how much forward kinematics misses the target", "deg")
+    rank: Integers = column("1 is the chosen one; 0 for refused ones")
+    first_of_branch: Flags = column("whether it is the branch's best")
+    position_residual_mm: Reals = column("by how much forward kinematics misses the target")
+    orientation_residual_deg: Reals = column("by how much forward kinematics misses the target")
     manipulability: Reals = column("of the Jacobian with lengths divided by the wrist's reach")
     singular: Flags = vector(
         "singular_{}",
         "whether the arm is on this singularity, to 1e-6 rad or m (rank: of an arm without closed form)",
         parts=SINGULAR_PARTS,
-        dtype=bool,
     )
-    limit_margin_deg: Reals = column("least distance of a joint from its limits; negative outside", "deg")
-    greatest_move_deg: Reals = column("the farthest that a joint turns from the reference", "deg")
-    distance_deg: Reals = column("root of the summed squares of the joint moves", "deg")
+    limit_margin_deg: Reals = column("least distance of a joint from its limits; negative outside")
+    greatest_move_deg: Reals = column("the farthest that a joint turns from the reference")
+    distance_deg: Reals = column("root of the summed squares of the joint moves")
 
 
 @dataclass(frozen=True, eq=False)
 class RankingRows(Table):
     """Place and measure, by each rule, of each branch's best solution within the limits."""
 
-    target: Texts = column("name of the target", dtype=object)
-    branch: Integers = column("number of the branch", dtype=np.int64)
-    label: Texts = column("code of the branch", dtype=object)
-    rule: Texts = column("name of the rule, or mix", dtype=object)
+    target: Texts = column("name of the target")
+    branch: Integers = column("number of the branch")
+    label: Texts = column("code of the branch")
+    rule: Texts = column("name of the rule, or mix")
     measure: Reals = column("in the rule's unit; for the mix its cost, 0 the best")
-    place: Integers = column("1 is the best; 0 for solutions that collide", dtype=np.int64)
+    place: Integers = column("1 is the best; 0 for solutions that collide")
 
 
 @dataclass(frozen=True, eq=False)
 class MapRows(Table):
     """Number of solutions of tool poses on a grid in the vertical plane through axis 1 (y = 0 of the base)."""
 
-    orientation: Texts = column("how the tool is held", dtype=object)
-    x_mm: Reals = column("tool position in the base's frame", "mm")
-    z_mm: Reals = column("tool position in the base's frame", "mm")
-    solutions: Integers = column("branches", dtype=np.int64)
-    within_limits: Integers = column("branches within the limits", dtype=np.int64)
+    orientation: Texts = column("how the tool is held")
+    x_mm: Reals = column("tool position in the base's frame")
+    z_mm: Reals = column("tool position in the base's frame")
+    solutions: Integers = column("branches")
+    within_limits: Integers = column("branches within the limits")
     clear: Integers = column(
-        "of these, those that touch neither the scene nor the arm itself; between poses nothing is known",
-        dtype=np.int64,
+        "of these, those that touch neither the scene nor the arm itself; between poses nothing is known"
     )
 
 

@@ -17,13 +17,22 @@ from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, Tar
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, log_scene, note_view, recording
+from er3a.pipeline.viewing.recording import (
+    ARM,
+    AXES,
+    TIMELINE,
+    escaped,
+    log_note,
+    log_scene,
+    log_text,
+    recording,
+    words_view,
+)
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
 from er3a.robots.robot import Robot
 
 STAGE = "inverse"
-AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
 NOTE = """# Joint solutions of each target
 
 **Look first** at how differently the arm can reach one and the same tool pose. Each target has one second: drag the
@@ -44,11 +53,8 @@ def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     name, solutions = stored.robot, stored.results.solutions
     robot, targets = study.robot(name), shown_targets(stored.results.summary.targets)
-    words = rrb.Vertical(
-        note_view(STAGE), rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This target"), name="Words"
-    )
     view = arm_view(robot, "Solutions", [ARM, f"/{STAGE}/**"], reach=_sight(robot, targets))
-    layout = rrb.Horizontal(view, words, column_shares=[2, 1], name="Solutions")
+    layout = rrb.Horizontal(view, words_view(STAGE, "This target"), column_shares=[2, 1], name="Solutions")
     with recording(output, name, STAGE, layout) as stream:
         log_note(stream, STAGE, NOTE)
         log_scene(stream, study, name, STAGE)
@@ -79,7 +85,7 @@ def _log_target(stream: rr.RecordingStream, robot: Robot, target: TargetResult, 
     stream.log(f"{root}/frame", frame, axes)
     ball = rr.Points3D([position], radii=0.012 * size, colors=rgb(HIGHLIGHT), labels=target.name, show_labels=True)
     stream.log(f"{root}/point", ball)
-    stream.log(f"{STAGE}/now", rr.TextDocument(_about(target, branches), media_type=rr.MediaType.MARKDOWN))
+    log_text(stream, f"{STAGE}/now", _about(target, branches))
     for k, branch in enumerate(branches.branch):
         points = skeleton(robot, meant(robot, branches.q_deg[k]))
         entity = f"{root}/branch_{branch}"

@@ -124,36 +124,36 @@ class ProgramsSummary(Summary):
 class Lines(Table):
     """The programs' text."""
 
-    program: Texts = column("name of the program", dtype=object)
-    line: Integers = column("number of the line, from 1", dtype="int64")
-    text: Texts = column("the line", dtype=object)
+    program: Texts = column("name of the program")
+    line: Integers = column("number of the line, from 1")
+    text: Texts = column("the line")
 
 
 @dataclass(frozen=True, eq=False)
 class Instructions(Table):
     """Motion instructions of the programs with their verdicts."""
 
-    program: Texts = column("name of the program", dtype=object)
-    line: Integers = column("number of the line, from 1", dtype="int64")
-    element: Texts = column("XML element, empty in text", dtype=object)
-    kind: Texts = column("joint, line, arc or spline; empty if never reached", dtype=object)
-    level: Texts = column("verdict: pass, note, caution or fail", dtype=object)
-    times: Integers = column("how often it was carried out", dtype="int64")
-    duration_s: Reals = column("longest estimated duration; NaN where unknown", "s")
-    clearance_mm: Reals = column("least clearance, negative by an overlap; NaN where not measured", "mm")
-    end_deg: Reals = per_joint("q{}_deg", "joint angle at its first end; NaN where unknown", "deg")
+    program: Texts = column("name of the program")
+    line: Integers = column("number of the line, from 1")
+    element: Texts = column("XML element, empty in text")
+    kind: Texts = column("joint, line, arc or spline; empty if never reached")
+    level: Texts = column("verdict: pass, note, caution or fail")
+    times: Integers = column("how often it was carried out")
+    duration_s: Reals = column("longest estimated duration; NaN where unknown")
+    clearance_mm: Reals = column("least clearance, negative by an overlap; NaN where not measured")
+    end_deg: Reals = per_joint("joint angle at its first end; NaN where unknown", name="q_deg")
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramMotion(Table):
     """The arm along the way with the most motions through each program."""
 
-    program: Texts = column("name of the program", dtype=object)
-    t_s: Reals = column("estimated time since the program's start, with a stop at each target", "s")
-    line: Integers = column("line of the instruction", dtype="int64")
-    level: Texts = column("verdict of the instruction", dtype=object)
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
+    program: Texts = column("name of the program")
+    t_s: Reals = column("estimated time since the program's start, with a stop at each target")
+    line: Integers = column("line of the instruction")
+    level: Texts = column("verdict of the instruction")
+    q_deg: Reals = per_joint("joint angle")
+    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame")
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,22 +18,24 @@ from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import log_arm, send_motion
+from er3a.pipeline.viewing.arm import log_arm, send_motion, view_of
 from er3a.pipeline.viewing.palette import JOINT_NAMES, JOINTS, VERDICTS, rgb
 from er3a.pipeline.viewing.recording import (
     ARM,
     TIMELINE,
+    curves_view,
     escaped,
     events_view,
+    log_event,
     log_note,
+    log_now,
     log_scene,
-    note_view,
     recording,
-    send_series,
+    send_run,
+    words_view,
 )
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.program_check.program_check_findings import Level
-from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
 STAGE = "programs"
@@ -42,16 +44,12 @@ SCENE = f"/{SCENE_OF}/scene/**"
 PAUSE = 1.0  # s between two programs
 AROUND = 4  # lines of the listing before and behind the one that is carried out
 SKELETON_EVERY = 100
-EYE_DIRECTION = np.array([0.6, -0.7, 0.35])
 COLOURS: dict[str, str] = {**VERDICTS, "note": VERDICTS["pass"]}
 LEVELS: dict[Level, rr.TextLogLevel] = {
     "note": rr.TextLogLevel.INFO,
     "caution": rr.TextLogLevel.WARN,
     "fail": rr.TextLogLevel.ERROR,
 }
-SHOWN_S = rr.TimeRange(
-    start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
-)
 
 
 def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
@@ -76,30 +74,12 @@ def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
 
 
 def _layout(robot: Robot, motion: ProgramMotion) -> rrb.Horizontal:
-    words = rrb.Vertical(
-        note_view(STAGE),
-        rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This line"),
-        events_view(STAGE, "Findings"),
-        row_shares=[4, 5, 4],
-        name="Words",
-    )
-    curves = rrb.TimeSeriesView(
-        origin=f"/{STAGE}/angle", name="Joint angle (deg)", axis_x=rrb.TimeAxis(view_range=SHOWN_S)
-    )
-    left = rrb.Vertical(_view(robot, motion), curves, row_shares=[3, 1], name="Arm")
+    words = words_view(STAGE, "This line", events_view(STAGE, "Findings"), row_shares=[4, 5, 4])
+    arms = [skeleton(robot, np.radians(q)) for q in motion.q_deg[::SKELETON_EVERY]]  # in sight all along the programs
+    points = [motion.xyz_mm / 1000, *(arms or [skeleton(robot, np.zeros(len(robot.lower)))])]
+    view = view_of(robot, "Arm and tool", [ARM, f"/{STAGE}/**", SCENE], points)
+    left = rrb.Vertical(view, curves_view(f"/{STAGE}/angle", "Joint angle (deg)"), row_shares=[3, 1], name="Arm")
     return rrb.Horizontal(left, words, column_shares=[3, 2], name="Programs")
-
-
-def _view(robot: Robot, motion: ProgramMotion) -> rrb.Spatial3DView:
-    """A view that holds the arm all along the programs."""
-    arms = [skeleton(robot, np.radians(q)) for q in motion.q_deg[::SKELETON_EVERY]]
-    points = np.concatenate([motion.xyz_mm / 1000, *(arms or [skeleton(robot, np.zeros(len(robot.lower)))])])
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    distance = 0.85 * max(float(np.linalg.norm(np.ptp(points, axis=0))), 2 * size_of(robot))
-    eye = rrb.EyeControls3D(
-        kind="Orbital", position=centre + distance * EYE_DIRECTION, look_target=centre, eye_up=[0, 0, 1]
-    )
-    return rrb.Spatial3DView(origin="/", contents=[ARM, f"/{STAGE}/**", SCENE], name="Arm and tool", eye_controls=eye)
 
 
 def _announce(stream: rr.RecordingStream, program: ProgramSummary, start: float) -> None:
@@ -107,10 +87,10 @@ def _announce(stream: rr.RecordingStream, program: ProgramSummary, start: float)
     stream.set_time(TIMELINE, duration=start)
     stream.log(f"{STAGE}/way", rr.LineStrips3D([]))
     text = f"## {program.name}\n**{outcome_word(program.outcome)}**: {escaped(program.title)}\n\n{cycle_text(program)}"
-    stream.log(f"{STAGE}/now", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+    log_now(stream, STAGE, start, text)
     level = {"pass": rr.TextLogLevel.INFO, "caution": rr.TextLogLevel.WARN, "fail": rr.TextLogLevel.ERROR}
     told = f"{program.name}: {outcome_word(program.outcome)}"
-    stream.log(f"{STAGE}/events", rr.TextLog(told, level=level[program.outcome]))
+    log_event(stream, STAGE, start, told, level[program.outcome])
 
 
 def _run(stream: rr.RecordingStream, robot: Robot, rows: ProgramMotion, start: float) -> None:
@@ -125,10 +105,8 @@ def _run(stream: rr.RecordingStream, robot: Robot, rows: ProgramMotion, start: f
             colours.append(rgb(COLOURS[rows.level[a]]))
     stream.set_time(TIMELINE, duration=start)
     stream.log(f"{STAGE}/way", rr.LineStrips3D(strips, colors=colours, radii=0.004))
-    broken = np.append(times, times[-1] + 1e-3)
-    gap = np.full((1, rows.q_deg.shape[1]), np.nan)
     names, shades = list(JOINT_NAMES[: rows.q_deg.shape[1]]), list(JOINTS[: rows.q_deg.shape[1]])
-    send_series(stream, f"{STAGE}/angle", broken, np.concatenate([rows.q_deg, gap]), names, shades)
+    send_run(stream, f"{STAGE}/angle", times, rows.q_deg, names, shades)
 
 
 def _lines(
@@ -143,12 +121,11 @@ def _lines(
     told: set[int] = set()
     for a, _ in _stretches(rows):
         line = int(rows.line[a])
-        stream.set_time(TIMELINE, duration=start + float(rows.t_s[a]))
-        document = _document(program, line, texts, found[line], rows.level[a])
-        stream.log(f"{STAGE}/now", rr.TextDocument(document, media_type=rr.MediaType.MARKDOWN))
+        now = start + float(rows.t_s[a])
+        log_now(stream, STAGE, now, _document(program, line, texts, found[line], rows.level[a]))
         for each in [] if line in told else found[line]:
             text = f"{program.name}:{line}: {say(each.finding)}"
-            stream.log(f"{STAGE}/events", rr.TextLog(text, level=LEVELS[each.level]))
+            log_event(stream, STAGE, now, text, LEVELS[each.level])
         told.add(line)
 
 

@@ -18,6 +18,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, factors_where_defined
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
 from er3a.numerics.arrays import Reals
+from er3a.numerics.units import from_si, stated
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
@@ -265,23 +266,17 @@ def _tried(result: StrategyResult, meets: PairOverlaps | None, clearance_mm: flo
 
 
 def _motion(cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
-    return StrategyMotion(
+    return stated(
+        StrategyMotion,
+        cost,
         done_ratio=cost.done,
-        max_deviation_mm=float(cost.distance.max() * 1000),
-        max_deviation_deg=float(np.degrees(cost.angle.max())),
-        duration_s=cost.motion.duration,
-        keeps_clear=cost.keeps_clear,
-        max_joint_speed_deg_s=_greatest_deg(cost.motion.velocity),
-        max_joint_speed_ratio=cost.max_joint_speed_ratio,
-        max_joint_acceleration_deg_s2=_greatest_deg(cost.motion.acceleration),
-        max_joint_acceleration_ratio=cost.max_joint_acceleration_ratio,
+        max_deviation_mm=from_si("mm", cost.distance.max()),
+        max_deviation_deg=from_si("deg", cost.angle.max()),
+        duration=cost.motion.duration,
+        max_joint_speed=np.abs(cost.motion.velocity).max(axis=0),
+        max_joint_acceleration=np.abs(cost.motion.acceleration).max(axis=0),
         clearance_mm=clearance_mm,
     )
-
-
-def _greatest_deg(values: Reals) -> tuple[float, ...]:
-    """Of each joint, from (N, 6) in rad."""
-    return tuple(float(value) for value in np.degrees(np.abs(values).max(axis=0)))
 
 
 def path_summary(
@@ -350,14 +345,11 @@ def _half_turns(motion: Motion) -> tuple[HalfTurn, ...]:
 
 def _singularity(event: SingularEvent) -> Singularity:
     shoulder = event.type == "shoulder"
-    return Singularity(
-        t_s=event.t,
-        until_s=event.until,
-        type=event.type,
-        crossing=event.crossing,
-        distance_deg=None if shoulder or event.axes else float(np.degrees(event.distance)),
-        distance_mm=event.distance * 1000 if shoulder else None,
-        axes=event.axes,
+    return stated(
+        Singularity,
+        event,
+        distance_deg=None if shoulder or event.axes else from_si("deg", event.distance),
+        distance_mm=from_si("mm", event.distance) if shoulder else None,
         smallest_singular_value=event.distance if event.axes else None,
     )
 

@@ -321,12 +321,12 @@ class TrajectorySummary(Summary):
 class MotionRows(Table):
     """Motions of the arm; joint columns are NaN where the path can't be reached."""
 
-    path: Texts = column("name of the path", dtype=object)
-    t_s: Reals = column("time since the motion's start", "s")
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    q_deg_s: Reals = per_joint("q{}_deg_s", "joint velocity", "deg/s")
-    q_deg_s2: Reals = per_joint("q{}_deg_s2", "joint acceleration", "deg/s^2")
-    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame", "mm")
+    path: Texts = column("name of the path")
+    t_s: Reals = column("time since the motion's start")
+    q_deg: Reals = per_joint("joint angle")
+    q_deg_s: Reals = per_joint("joint velocity")
+    q_deg_s2: Reals = per_joint("joint acceleration")
+    xyz_mm: Reals = vector("{}_mm", "tool point in the base frame")
     speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
     condition_number: Reals = column("condition number of the scaled Jacobian")
     smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
@@ -336,40 +336,40 @@ class MotionRows(Table):
 class Samples(MotionRows):
     """The paths' own points."""
 
-    s_m: Reals = column("way of the tool point", "m")
+    s_m: Reals = column("way of the tool point")
     manipulability: Reals = column("manipulability of the scaled Jacobian")
-    wrist_deg: Reals = column("signed distance from the aligned wrist", "deg")
-    elbow_deg: Reals = column("signed distance from the straight or folded elbow", "deg")
-    shoulder_mm: Reals = column("signed distance of the wrist centre from the shoulder singularity", "mm")
-    reachable: Flags = column("whether the arm reaches the pose", dtype=bool)
-    within_limits: Flags = column("whether all joints are within their limits", dtype=bool)
-    near_singular: Flags = column("whether the pose is nearer to a singular set than its threshold", dtype=bool)
+    wrist_deg: Reals = column("signed distance from the aligned wrist")
+    elbow_deg: Reals = column("signed distance from the straight or folded elbow")
+    shoulder_mm: Reals = column("signed distance of the wrist centre from the shoulder singularity")
+    reachable: Flags = column("whether the arm reaches the pose")
+    within_limits: Flags = column("whether all joints are within their limits")
+    near_singular: Flags = column("whether the pose is nearer to a singular set than its threshold")
 
 
 @dataclass(frozen=True, eq=False)
 class PathChecks(Samples):
     """The paths' own points, those checked between them, and the closest passes."""
 
-    sample: Flags = column("whether the point is one of the path's own", dtype=bool)
+    sample: Flags = column("whether the point is one of the path's own")
 
 
 @dataclass(frozen=True, eq=False)
 class Clearances(Table):
     """Times at which the clearance was measured in full; NaN where the path can't be reached."""
 
-    path: Texts = column("name of the path", dtype=object)
-    t_s: Reals = column("time since the path's start", "s")
-    clearance_mm: Reals = column("least distance, negative by the depth of an overlap", "mm")
-    between: Texts = column("the two bodies nearest to each other", dtype=object)
+    path: Texts = column("name of the path")
+    t_s: Reals = column("time since the path's start")
+    clearance_mm: Reals = column("least distance, negative by the depth of an overlap")
+    between: Texts = column("the two bodies nearest to each other")
 
 
 @dataclass(frozen=True, eq=False)
 class AvoidanceRows(MotionRows):
     """Motions of the strategies, and of each path at its fastest (``fastest``)."""
 
-    strategy: Texts = column("the strategy, or the path at its fastest", dtype=object)
-    deviation_mm: Reals = column("distance of the tool point from the path", "mm")
-    deviation_deg: Reals = column("angle of the tool to the path's", "deg")
+    strategy: Texts = column("the strategy, or the path at its fastest")
+    deviation_mm: Reals = column("distance of the tool point from the path")
+    deviation_deg: Reals = column("angle of the tool to the path's")
 
 
 @dataclass(frozen=True, eq=False)
@@ -377,10 +377,10 @@ class ProgramFiles(Table):
     """Programs of the safe paths for controllers; of others only where the study asks for that, and the motion that
     repairs them as a table in csv."""
 
-    path: Texts = column("name of the path", dtype=object)
-    language: Texts = column("krl, urscript, rpl, xpl or csv", dtype=object)
-    file: Texts = column("name of the file", dtype=object)
-    text: Texts = column("what the file holds", dtype=object)
+    path: Texts = column("name of the path")
+    language: Texts = column("krl, urscript, rpl, xpl or csv")
+    file: Texts = column("name of the file")
+    text: Texts = column("what the file holds")
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,18 +24,21 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectorySummary,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import LABEL, log_arm, send_motion
+from er3a.pipeline.viewing.arm import LABEL, log_arm, send_motion, view_of
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, MODEL, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import (
     ARM,
     TIMELINE,
+    curves_view,
     escaped,
     events_view,
+    log_event,
     log_note,
+    log_now,
     log_scene,
-    note_view,
     recording,
-    send_series,
+    send_run,
+    words_view,
 )
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.planning.path_verdicts import PathVerdict
@@ -50,7 +53,6 @@ SKELETON_EVERY = 100
 GHOST_ALPHA = 110
 LABELS_APART = 0.15  # of the arm's size
 GHOST_WIDTH = 0.006  # of the arm's size
-EYE_DIRECTION = np.array([0.6, -0.7, 0.35])
 CONDITION_SCALE = LogNorm(3, 300)
 CURVES = {
     "angle": "Joint angle (deg)",
@@ -58,9 +60,6 @@ CURVES = {
     "condition": "Log10 of the condition number",
     "smallest": "Smallest singular value",
 }
-SHOWN_S = rr.TimeRange(
-    start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
-)
 LEVELS: dict[PathVerdict, rr.TextLogLevel] = {
     "safe": rr.TextLogLevel.INFO,
     "near-singular": rr.TextLogLevel.WARN,
@@ -95,27 +94,15 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
 
 
 def _layout(robot: Robot, checks: PathChecks) -> rrb.Horizontal:
-    series = rrb.Vertical(
-        *(
-            rrb.TimeSeriesView(
-                origin=f"/{STAGE}/curves/{curve}",
-                name=title,
-                axis_x=rrb.TimeAxis(view_range=SHOWN_S),
-                plot_legend=rrb.PlotLegend(visible=curve == "angle"),
-            )
-            for curve, title in CURVES.items()
-        ),
-        row_shares=[4, 3, 3, 3],
-        name="Curves",
-    )
-    words = rrb.Vertical(
-        note_view(STAGE),
-        rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This path"),
-        events_view(STAGE, "Events"),
-        row_shares=[5, 2, 4],
-        name="Words",
-    )
-    return rrb.Horizontal(_view(robot, checks), series, words, column_shares=[2, 1, 1], name="Paths")
+    curves = [
+        curves_view(f"/{STAGE}/curves/{curve}", title, legend=curve == "angle") for curve, title in CURVES.items()
+    ]
+    series = rrb.Vertical(*curves, row_shares=[4, 3, 3, 3], name="Curves")
+    words = words_view(STAGE, "This path", events_view(STAGE, "Events"), row_shares=[5, 2, 4])
+    reached = checks.q_deg[checks.reachable][::SKELETON_EVERY]  # the view holds the arm all along the paths
+    points = [checks.xyz_mm / 1000, *(skeleton(robot, meant(robot, q)) for q in reached)]
+    view = view_of(robot, "Arm and path", [ARM, f"/{STAGE}/**"], points)
+    return rrb.Horizontal(view, series, words, column_shares=[2, 1, 1], name="Paths")
 
 
 def _timetable(summary: TrajectorySummary) -> list[tuple[PathSummary, float, bool]]:
@@ -130,18 +117,6 @@ def _timetable(summary: TrajectorySummary) -> list[tuple[PathSummary, float, boo
     return runs
 
 
-def _view(robot: Robot, checks: PathChecks) -> rrb.Spatial3DView:
-    """A view that holds the arm all along the paths."""
-    reached = checks.q_deg[checks.reachable][::SKELETON_EVERY]
-    points = np.concatenate([checks.xyz_mm / 1000, *(skeleton(robot, meant(robot, q)) for q in reached)])
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    distance = 0.85 * max(float(np.linalg.norm(np.ptp(points, axis=0))), 2 * size_of(robot))
-    eye = rrb.EyeControls3D(
-        kind="Orbital", position=centre + distance * EYE_DIRECTION, look_target=centre, eye_up=[0, 0, 1]
-    )
-    return rrb.Spatial3DView(origin="/", contents=[ARM, f"/{STAGE}/**"], name="Arm and path", eye_controls=eye)
-
-
 def _frames(rows: MotionRows) -> Flags:
     """Which rows to show: no more than FRAMES_PER_SECOND, ends and closest passes kept."""
     kept = np.concatenate([[True], np.diff(np.floor(rows.t_s * FRAMES_PER_SECOND)) > 0])
@@ -153,10 +128,9 @@ def _frames(rows: MotionRows) -> Flags:
 def _announce(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows: PathChecks, start: float) -> None:
     """What is known of a path: its line, its singular poses with ghosts of the arm, its verdict and events."""
     verdict = outcome_word(path.verdict)
-    stream.set_time(TIMELINE, duration=start)
     sentence = f"## {path.name}\n**{verdict}**: {path_text(path)}.\n\n{escaped(path.title)}."
-    stream.log(f"{STAGE}/now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
-    stream.log(f"{STAGE}/events", rr.TextLog(f"{path.name}: {verdict}", level=LEVELS[path.verdict]))
+    log_now(stream, STAGE, start, sentence)
+    log_event(stream, STAGE, start, f"{path.name}: {verdict}", LEVELS[path.verdict])
     shown = rows.take(_frames(rows))
     stream.log(f"{STAGE}/path", _line(shown.xyz_mm / 1000, shown.condition_number))
     _ghosts(stream, robot, path, rows)
@@ -164,11 +138,8 @@ def _announce(stream: rr.RecordingStream, robot: Robot, path: PathSummary, rows:
 
 
 def _announce_repaired(stream: rr.RecordingStream, path: PathSummary, start: float) -> None:
-    stream.set_time(TIMELINE, duration=start)
-    sentence = f"## {path.name}, repaired\n{advice(path)}."
-    stream.log(f"{STAGE}/now", rr.TextDocument(sentence, media_type=rr.MediaType.MARKDOWN))
-    text = f"{path.name}, repaired: {advice(path)}"
-    stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.INFO))
+    log_now(stream, STAGE, start, f"## {path.name}, repaired\n{advice(path)}.")
+    log_event(stream, STAGE, start, f"{path.name}, repaired: {advice(path)}", rr.TextLogLevel.INFO)
 
 
 def _run(stream: rr.RecordingStream, robot: Robot, rows: MotionRows, start: float, colour: str) -> None:
@@ -178,11 +149,9 @@ def _run(stream: rr.RecordingStream, robot: Robot, rows: MotionRows, start: floa
     if reached.any():
         send_motion(stream, robot, times[reached], meant(robot, rows.q_deg[reached]))
     _trail(stream, times, points, reached, colour)
-    broken = np.append(times, times[-1] + 1e-3)
 
     def send(entity: str, values: Reals, names: list[str], colours: list[str]) -> None:
-        gap = np.full((1, values.shape[1]), np.nan)
-        send_series(stream, f"{STAGE}/curves/{entity}", broken, np.concatenate([values, gap]), names, colours)
+        send_run(stream, f"{STAGE}/curves/{entity}", times, values, names, colours)
 
     joints = robot.joints
     send("angle", rows.q_deg, list(JOINT_NAMES[:joints]), list(JOINTS[:joints]))
@@ -243,10 +212,9 @@ def _trail(stream: rr.RecordingStream, times: Reals, points: Reals, reached: Fla
 
 def _events(stream: rr.RecordingStream, path: PathSummary, start: float) -> None:
     for event in path.singularities:
-        stream.set_time(TIMELINE, duration=start + event.t_s)
         how = "meets" if event.crossing else "passes near"
         text = f"{how} the {event_word(event)} singularity {_when(event.t_s, start)}"
-        stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.WARN))
+        log_event(stream, STAGE, start + event.t_s, text, rr.TextLogLevel.WARN)
     for stretches, word in (
         (path.unreachable, "not reachable"),
         (path.out_of_limits, "limit"),
@@ -255,9 +223,8 @@ def _events(stream: rr.RecordingStream, path: PathSummary, start: float) -> None
         (path.collisions, "collision"),
     ):
         for part in stretches:
-            stream.set_time(TIMELINE, duration=start + part.t0_s)
             text = f"{word} {_when(part.t0_s, start)}: {say(part.cause)}"
-            stream.log(f"{STAGE}/events", rr.TextLog(text, level=rr.TextLogLevel.ERROR))
+            log_event(stream, STAGE, start + part.t0_s, text, rr.TextLogLevel.ERROR)
 
 
 def _when(t: float, start: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from er3a.calibration.calibrate import Calibration, calibrate
 from er3a.calibration.outcomes import CalibrationError
-from er3a.diagnosis.diagnose import Diagnosis, Hypothesis, diagnosis_of, residuals
+from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of, residuals
 from er3a.diagnosis.ranking import Ranking, usable
 from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.identifiability.evidence import evidence_of
@@ -21,6 +21,7 @@ from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.units import stated
 from er3a.pipeline.stages.validation.checks import checks_of_set, round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.model import (
@@ -91,26 +92,10 @@ def calibrate_from_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[S
         except CalibrationError as error:
             found.append(SetCalibration(references.name, error.finding))
             continue
-        found.append(SetCalibration(references.name, _calibrated(calibration)))
+        found.append(SetCalibration(references.name, stated(Calibrated, calibration)))
         if calibration.fits:
             tables.append(_corrections(references.name, calibration))
     return tuple(found), Corrections.stacked(tables)
-
-
-def _calibrated(found: Calibration) -> Calibrated:
-    return Calibrated(
-        conclusion=found.conclusion,
-        level=found.level,
-        coordinates=found.coordinates,
-        poses=found.poses,
-        held=found.held,
-        close=found.close,
-        singular_values=tuple(found.singular_values.tolist()),
-        rms_before_mm=found.rms_before_mm,
-        rms_after_mm=found.rms_after_mm,
-        scatter=found.scatter,
-        more=found.more,
-    )
 
 
 def _corrections(reference_set: str, found: Calibration) -> Corrections:
@@ -138,29 +123,9 @@ def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis)
         from_table=tuple(title_of(name, references.documents) for name in own),
         references=diagnosis.references,
         hypotheses_tried=diagnosis.tried,
-        hypotheses=tuple(map(_ranked, diagnosis.hypotheses)),
-        corrected=table_record(diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
+        hypotheses=tuple(stated(RankedHypothesis, each) for each in diagnosis.hypotheses),
+        corrected=stated(CorrectedTable, diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
     )
-
-
-def _ranked(hypothesis: Hypothesis) -> RankedHypothesis:
-    return RankedHypothesis(
-        faults=hypothesis.faults,
-        residual_before=hypothesis.residual_before,
-        residual_after=hypothesis.residual_after,
-        unit=hypothesis.unit,
-        explains=hypothesis.explains,
-        half_widths=hypothesis.half_widths,
-        indistinguishable_from=hypothesis.indistinguishable_from,
-        to_decide=hypothesis.to_decide,
-        score=hypothesis.score,
-    )
-
-
-def table_record(robot: Robot) -> CorrectedTable:
-    """A robot's table as the results hold it."""
-    columns = [field.name for field in fields(CorrectedTable) if field.name != "convention"]
-    return CorrectedTable(robot.convention, **{name: tuple(getattr(robot, name).tolist()) for name in columns})
 
 
 def _residuals(reference_set: str, ranking: Ranking) -> Residuals:
@@ -389,14 +354,12 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEviden
         return None
     documents = Documents({name: each for own in sets for name, each in own.documents.by_name.items()})
     found = evidence_of(robot, references, documents)
-    return TableEvidence(
-        tolerance=found.tolerance,
-        entries=found.entries,
-        combinations=found.combinations,
+    return stated(
+        TableEvidence,
+        found,
         parts=parts_found(found),
         proposals=tuple(proposals_of(found).values()),
-        table_meets=found.table_meets,
-        other=OtherTableFound(table_record(robot_of(found.other.table, 0, robot)), found.other.code)
+        other=OtherTableFound(stated(CorrectedTable, robot_of(found.other.table, 0, robot)), found.other.code)
         if found.other
         else None,
     )
@@ -425,11 +388,8 @@ def _without_reference(robot: Robot, values: dict[Quantity, float], checks: list
 
 
 def _rounded(circles: CirclePoints) -> Circles:
-    return Circles(
-        offset_mm=tuple(circles.offset_mm.tolist()),
-        radius_mm=tuple(circles.radius_mm.round(SHOWN_DECIMALS).tolist()),
-        roundness_mm=tuple(circles.roundness_mm.round(SHOWN_DECIMALS).tolist()),
-    )
+    radius, roundness = circles.radius_mm.round(SHOWN_DECIMALS), circles.roundness_mm.round(SHOWN_DECIMALS)
+    return stated(Circles, circles, radius_mm=radius, roundness_mm=roundness)
 
 
 def _section_origin_mm(robot: Robot) -> tuple[float, float]:

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar, Literal, Self, get_args
 
-import numpy as np
-
 from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
 from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, NextMeasurement, TooSmallToTell
@@ -462,11 +460,11 @@ class SetDiagnosis:
 class Residuals(Table):
     """Residuals before and after the best hypothesis, worst first, for sets with something to explain."""
 
-    reference_set: Texts = column("name of the reference set", dtype=object)
-    source: Texts = column("source of the reference", dtype=object)
-    group: Texts = column("group of the reference", dtype=object)
+    reference_set: Texts = column("name of the reference set")
+    source: Texts = column("source of the reference")
+    group: Texts = column("group of the reference")
     subject: Findings = findings("what the reference is about; coordinates of one point together", ReferenceSubject)
-    unit: Texts = column("unit of the three numbers", dtype=object)
+    unit: Texts = column("unit of the three numbers")
     before: Reals = column("difference between model and reference")
     after: Reals = column("the same with the best hypothesis corrected")
     uncertainty: Reals = column("half-width of the interval that the source leaves open")
@@ -502,9 +500,9 @@ class SetCalibration:
 class Corrections(Table):
     """Estimated corrections to the table's entries, of the sets whose positions they meet."""
 
-    reference_set: Texts = column("name of the reference set", dtype=object)
-    entry: Texts = column("entry of the table, such as d4", dtype=object)
-    unit: Texts = column("unit of the numbers, mm or deg", dtype=object)
+    reference_set: Texts = column("name of the reference set")
+    entry: Texts = column("entry of the table, such as d4")
+    unit: Texts = column("unit of the numbers, mm or deg")
     nominal: Reals = column("value in the table")
     correction: Reals = column("to be added to it")
     standard_error: Reals = column("of the correction")
@@ -636,17 +634,17 @@ class Checks(Table):
     """The summary's checks as a table."""
 
     subject: Findings = findings("what is compared", CheckSubject)
-    group: Texts = column("group of the check", dtype=object)
-    reference_set: Texts = column("reference set, none for checks of the model against itself", dtype=object)
-    status: Texts = column("pass, fail, conflict or no_reference", dtype=object)
+    group: Texts = column("group of the check")
+    reference_set: Texts = column("reference set, none for checks of the model against itself")
+    status: Texts = column("pass, fail, conflict or no_reference")
     measured: Reals = column("the model's value", "see unit")
     expected: Reals = column("the reference's value", "see unit")
     difference: Reals = column("measured - expected", "see unit")
     tolerance: Reals = column("greatest difference that passes", "see unit")
-    unit: Texts = column("unit of the numbers", dtype=object)
-    source: Texts = column("source of the reference", dtype=object)
-    grade: Texts = column("grade of the source", dtype=object)
-    kind: Texts = column("what it rests on: independent, consistency or claim; none without a document", dtype=object)
+    unit: Texts = column("unit of the numbers")
+    source: Texts = column("source of the reference")
+    grade: Texts = column("grade of the source")
+    kind: Texts = column("what it rests on: independent, consistency or claim; none without a document")
     note: Findings = findings("why it is not judged, or how", Note)
 
     @classmethod
@@ -659,18 +657,18 @@ class Checks(Table):
 class Axes(Table):
     """Each stated axis line in the zero pose beside the model's, in the base frame."""
 
-    reference_set: Texts = column("reference set", dtype=object)
-    source: Texts = column("source of the line", dtype=object)
-    grade: Texts = column("grade of the source", dtype=object)
-    joint: Integers = column("number of the joint, from 1", dtype=np.int64)
+    reference_set: Texts = column("reference set")
+    source: Texts = column("source of the line")
+    grade: Texts = column("grade of the source")
+    joint: Integers = column("number of the joint, from 1")
     direction: Reals = vector("direction_{}", "stated direction")
-    point_mm: Reals = vector("{}_mm", "stated point of the axis", "mm")
+    point_mm: Reals = vector("{}_mm", "stated point of the axis")
     model_direction: Reals = vector("model_direction_{}", "the model's direction of positive rotation")
-    model_point_mm: Reals = vector("model_{}_mm", "point of the model's axis nearest to the stated one", "mm")
-    angle_deg: Reals = column("angle between the directions", "deg")
-    distance_mm: Reals = column("distance of the two points", "mm")
-    uncertainty_deg: Reals = column("the source's uncertainty of the direction", "deg")
-    uncertainty_mm: Reals = column("the source's uncertainty of the line's place", "mm")
+    model_point_mm: Reals = vector("model_{}_mm", "point of the model's axis nearest to the stated one")
+    angle_deg: Reals = column("angle between the directions")
+    distance_mm: Reals = column("distance of the two points")
+    uncertainty_deg: Reals = column("the source's uncertainty of the direction")
+    uncertainty_mm: Reals = column("the source's uncertainty of the line's place")
 
     @property
     def is_off(self) -> Flags:
@@ -683,28 +681,28 @@ class KeyPoses(Table):
     """Poses at which references look at the arm, the zero pose first, with the stated point and the model's (base
     frame)."""
 
-    reference_set: Texts = column("reference set", dtype=object)
-    source: Texts = column("source of the point", dtype=object)
-    grade: Texts = column("grade of the source", dtype=object)
-    group: Texts = column("group of the references", dtype=object)
+    reference_set: Texts = column("reference set")
+    source: Texts = column("source of the point")
+    grade: Texts = column("grade of the source")
+    group: Texts = column("group of the references")
     pose: Findings = findings("the pose", KeyPose)
-    point: Texts = column("flange or wrist_centre", dtype=object)
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
-    point_mm: Reals = vector("{}_mm", "stated point, with the model's coordinate where none is stated", "mm")
-    model_point_mm: Reals = vector("model_{}_mm", "the model's point", "mm")
-    deviation_mm: Reals = column("distance of the two points", "mm")
+    point: Texts = column("flange or wrist_centre")
+    q_deg: Reals = per_joint("joint angle")
+    point_mm: Reals = vector("{}_mm", "stated point, with the model's coordinate where none is stated")
+    model_point_mm: Reals = vector("model_{}_mm", "the model's point")
+    deviation_mm: Reals = column("distance of the two points")
 
 
 @dataclass(frozen=True, eq=False)
 class Section(Table):
     """The wrist centre in the side view (joint 1 at 0) over a grid of joints 2 and 3 within their limits."""
 
-    q2_deg: Reals = column("joint 2", "deg")
-    q3_deg: Reals = column("joint 3", "deg")
-    x_mm: Reals = column("distance from axis 1 along x", "mm")
-    z_mm: Reals = column("height over axis 2", "mm")
-    on_q2_line: Flags = column("on a line of constant q2 where the region can end", dtype=bool)
-    on_q3_line: Flags = column("on a line of constant q3 where the region can end", dtype=bool)
+    q2_deg: Reals = column("joint 2")
+    q3_deg: Reals = column("joint 3")
+    x_mm: Reals = column("distance from axis 1 along x")
+    z_mm: Reals = column("height over axis 2")
+    on_q2_line: Flags = column("on a line of constant q2 where the region can end")
+    on_q3_line: Flags = column("on a line of constant q3 where the region can end")
 
 
 @dataclass(frozen=True, eq=False)

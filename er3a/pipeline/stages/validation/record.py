@@ -18,7 +18,16 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
 from er3a.pipeline.viewing.arm import log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, note_view, recording, send_series
+from er3a.pipeline.viewing.recording import (
+    ARM,
+    TIMELINE,
+    escaped,
+    log_note,
+    log_now,
+    recording,
+    send_series,
+    words_view,
+)
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
@@ -49,13 +58,8 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
     starts = STATION_S * np.arange(len(stations))
     corrected, fault = corrected_robot(robot, results.summary.diagnoses)
     curve_view = rrb.TimeSeriesView(origin=f"/{STAGE}/curves/deviation", name="Largest deviation (mm)")
-    words = rrb.Vertical(
-        note_view(STAGE),
-        rrb.TextDocumentView(origin=f"/{STAGE}/now", name="This pose"),
-        *([curve_view] if len(poses) else []),
-        row_shares=[4, 3, 3] if len(poses) else [4, 3],
-        name="Words and curve",
-    )
+    more, shares = ([curve_view], [4, 3, 3]) if len(poses) else ([], [4, 3])
+    words = words_view(STAGE, "This pose", *more, row_shares=shares, name="Words and curve")
     layout = rrb.Horizontal(_view(robot, poses, axes), words, column_shares=[2, 1], name="Key poses")
     with recording(output, name, STAGE, layout) as stream:
         note = NOTE.format(title=escaped(robot.title), text=say(results.summary.verdict.finding))
@@ -108,14 +112,13 @@ def _motion(robot: Robot, stations: list[KeyPoses], starts: np.ndarray) -> tuple
 
 
 def _log_station(stream: rr.RecordingStream, start: float, rows: KeyPoses, radius: float) -> None:
-    stream.set_time(TIMELINE, duration=start)
     angles = ", ".join(f"{angle:g}" for angle in rows.q_deg[0].round(3))
     lines = [f"### {' / '.join(escaped(say(pose)) for pose in dict.fromkeys(rows.pose))}", f"joints ({angles}) deg", ""]
     for point, deviation, source, grade in zip(rows.point, rows.deviation_mm, rows.source, rows.grade):
         if np.isfinite(deviation):
             point = point.replace("_", " ")
             lines.append(f"- {point}: off by **{deviation:.2f} mm**, {escaped(source)} ({grade})")
-    stream.log(f"{STAGE}/now", rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN))
+    log_now(stream, STAGE, start, "\n".join(lines))
     stated = rows.take(np.flatnonzero(np.isfinite(rows.point_mm).all(axis=1)))
     points, model = stated.point_mm / 1000, stated.model_point_mm / 1000
     colours = np.array(_colours(stated.grade))

@@ -22,6 +22,7 @@ from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.units import from_si, stated
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
@@ -46,7 +47,6 @@ from er3a.pipeline.stages.vision.model import (
     PoseEstimate,
     SampleRows,
     TableResult,
-    Three,
     TouchContradicts,
     TouchedPoint,
     TouchResult,
@@ -216,24 +216,6 @@ def _closes(before: GraspLeg, behind: GraspLeg) -> bool:
     return before.part == "approach" and behind.part == "retreat"
 
 
-def in_mm(position: Reals) -> Three:
-    """Three lengths (m) in mm."""
-    x, y, z = (1000 * np.asarray(position)).tolist()
-    return x, y, z
-
-
-def in_degrees(angles: Reals) -> Three:
-    """Three angles (rad) in degrees."""
-    x, y, z = np.degrees(angles).tolist()
-    return x, y, z
-
-
-def quaternion(T: Reals) -> tuple[float, float, float, float]:
-    """Unit quaternion of a transform (4, 4), real part first."""
-    w, x, y, z = quaternion_of(T).tolist()
-    return w, x, y, z
-
-
 def calibration_result(
     head: HandEyeFile,
     found: HandEye,
@@ -243,58 +225,54 @@ def calibration_result(
 ) -> CalibrationResult:
     """All that the summary says of a calibration."""
     spread, turned = spread_of(found)
-    moved = found.without_suspects
-    return CalibrationResult(
+    moved, tilted = (None, None) if found.without_suspects is None else found.without_suspects
+    return stated(
+        CalibrationResult,
+        found,
         title=head.title,
         source=head.source,
         setup=found.samples.setup,
         samples=len(found.samples),
-        used=int(found.used.sum()),
+        used=found.used.sum(),
         stated=found.samples.camera_covariance is not None,
         hand_eye=_estimate(found.X, found.half_width[:6]),
         board=_estimate(found.Y, found.half_width[6:]),
-        scatter=found.scatter,
-        camera_mm=float(1000 * found.deviations[0]),
-        camera_deg=float(np.degrees(found.deviations[1])),
-        spread_mm=1000 * spread,
-        spread_deg=float(np.degrees(turned)),
-        greatest_turn_deg=float(np.degrees(found.greatest_turn)),
-        axes_apart_deg=float(np.degrees(found.axes_apart)),
-        suspects=found.suspects,
-        warnings=found.warnings,
-        moved_mm=None if moved is None else float(1000 * moved[0]),
-        moved_deg=None if moved is None else float(np.degrees(moved[1])),
+        camera_mm=from_si("mm", found.deviations[0]),
+        camera_deg=from_si("deg", found.deviations[1]),
+        spread_mm=from_si("mm", spread),
+        spread_deg=from_si("deg", turned),
+        moved_mm=from_si("mm", moved),
+        moved_deg=from_si("deg", tilted),
         methods=tuple(map(_method, found.methods)),
-        directions=found.directions,
         touch=_touch(found),
-        next_view=_next(view) if view else None,
-        time_offset=OffsetResult(offset.offset, offset.half_width, float(np.degrees(offset.rms))) if offset else None,
+        next_view=stated(ViewToAdd, view) if view else None,
+        time_offset=stated(OffsetResult, offset) if offset else None,
         table=_table_result(table) if isinstance(table, TableCorrections) else table,
     )
 
 
 def _table_result(found: TableCorrections) -> TableResult:
     rows = zip(found.estimates, found.entry_half_width.tolist())
-    return TableResult(
-        level=found.level,
+    return stated(
+        TableResult,
+        found,
         entries=tuple(
             EntryCorrection(each.name, each.unit, each.nominal, each.correction, half) for each, half in rows
         ),
-        held=found.held,
-        close=found.close,
-        scatter=found.scatter,
-        scatter_before=found.scatter_before,
-        probability=found.probability,
-        moved_mm=float(1000 * found.moved[0]),
-        moved_deg=float(np.degrees(found.moved[1])),
+        moved_mm=from_si("mm", found.moved[0]),
+        moved_deg=from_si("deg", found.moved[1]),
         hand_eye=_estimate(found.X, found.half_width[:6]),
     )
 
 
 def _estimate(T: Reals, half_width: Reals) -> PoseEstimate:
-    return PoseEstimate(
-        in_mm(T[:3, 3]), in_degrees(rpy_of(T)), quaternion(T), in_mm(half_width[:3]), in_degrees(half_width[3:])
-    )
+    position, turn = from_si("mm", half_width[:3]), from_si("deg", half_width[3:])
+    return stated(PoseEstimate, **_pose(T), half_width_mm=position, half_width_deg=turn)
+
+
+def _pose(T: Reals) -> dict[str, Reals]:
+    """A transform (4, 4) as the fields of a result: position, roll-pitch-yaw, quaternion with its real part first."""
+    return {"xyz": T[:3, 3], "rpy": rpy_of(T), "quaternion_wxyz": quaternion_of(T)}
 
 
 def _method(answer: MethodAnswer) -> MethodResult:
@@ -306,19 +284,8 @@ def _touch(found: HandEye) -> TouchResult | None:
     if found.touch is None:
         return None
     rows = zip(found.touch.difference, found.touch.half_width)
-    points = tuple(TouchedPoint(in_mm(difference), in_mm(half)) for difference, half in rows)
+    points = tuple(stated(TouchedPoint, difference=difference, half_width=half) for difference, half in rows)
     return TouchResult(points, found.touch.probability)
-
-
-def _next(view: NextView) -> ViewToAdd:
-    return ViewToAdd(
-        q_deg=tuple(np.degrees(view.q).tolist()),
-        clearance_mm=None if view.clearance is None else 1000 * view.clearance,
-        error_before_mm=1000 * view.error_before,
-        error_after_mm=1000 * view.error_after,
-        tried=view.tried,
-        in_view=view.in_view,
-    )
 
 
 def sample_rows(found: HandEye, joints: int) -> SampleRows:
@@ -537,39 +504,27 @@ def _object(entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError 
             ]
         )
     )
-    return ObjectResult(
+    return stated(
+        ObjectResult,
+        plan,
         name=entry.name,
         note=entry.note,
-        xyz_mm=in_mm(T[:3, 3]),
-        rpy_deg=in_degrees(rpy_of(T)),
-        quaternion_wxyz=quaternion(T),
+        **_pose(T),
         outcome="grasped" if plan.chosen else "not graspable",
         expect=entry.expect,
         error_mm=None if parts is None else ErrorParts(*(1000 * parts[:, 0]).tolist()),
         error_deg=None if parts is None else ErrorParts(*np.degrees(parts[:, 1]).tolist()),
         grasp=_grasp(plan.chosen) if plan.chosen else None,
-        refusal=plan.refusal,
-        poses=plan.poses,
-        solutions=plan.solutions,
-        followed=plan.followed,
     )
 
 
 def _grasp(chosen: ChosenGrasp) -> GraspResult:
-    return GraspResult(
-        grasp=chosen.grasp,
-        turn_deg=float(np.degrees(chosen.turn)),
-        tool_xyz_mm=in_mm(chosen.T_base_tool[:3, 3]),
-        tool_rpy_deg=in_degrees(rpy_of(chosen.T_base_tool)),
-        q_before_deg=tuple(np.degrees(chosen.q_before).tolist()),
-        q_deg=tuple(np.degrees(chosen.q).tolist()),
-        q_after_deg=tuple(np.degrees(chosen.q_after).tolist()),
-        clearance_mm=None if chosen.clearance is None else 1000 * chosen.clearance,
-        nearest=chosen.nearest,
-        limit_margin_deg=float(np.degrees(chosen.limit_margin)),
-        singular_value=chosen.singular_value,
-        probability=chosen.probability,
-        deviation=chosen.deviation,
+    pose = _pose(chosen.T_base_tool)
+    return stated(
+        GraspResult,
+        chosen,
+        tool_xyz=pose["xyz"],
+        tool_rpy=pose["rpy"],
         corners=sum(leg.part == "move" for leg in chosen.legs) - 1,
         duration_s=sum(leg.duration for leg in chosen.legs),
     )

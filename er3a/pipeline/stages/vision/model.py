@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import Held, LevelName
 from er3a.collision.pairs import Pair
@@ -337,29 +335,29 @@ class VisionSummary(Summary):
 class SampleRows(Table):
     """One row for each sample of the calibration."""
 
-    sample: Texts = column("name of the sample", dtype=object)
-    used: Flags = column("whether the calibration rests on it", dtype=bool)
-    residual_mm: Reals = vector("residual_{}_mm", "board's position seen less predicted, by the camera's axes", "mm")
+    sample: Texts = column("name of the sample")
+    used: Flags = column("whether the calibration rests on it")
+    residual_mm: Reals = vector("residual_{}_mm", "board's position seen less predicted, by the camera's axes")
     residual_deg: Reals = vector(
-        "residual_{}_deg", "turn from the board predicted to the one seen, by the camera's axes", "deg", parts=ROTATIONS
+        "residual_{}_deg", "turn from the board predicted to the one seen, by the camera's axes", parts=ROTATIONS
     )
-    mismatch_deg: Reals = column("median difference of how far hand and board turn to the other samples", "deg")
-    flange_mm: Reals = vector("flange_{}_mm", "flange in the base's frame", "mm")
-    seen_mm: Reals = vector("seen_{}_mm", "board in the base's frame, by the camera", "mm")
-    predicted_mm: Reals = vector("predicted_{}_mm", "board in the base's frame, by the arm", "mm")
-    q_deg: Reals = per_joint("q{}_deg", "joint angle; NaN where poses were recorded", "deg")
+    mismatch_deg: Reals = column("median difference of how far hand and board turn to the other samples")
+    flange_mm: Reals = vector("flange_{}_mm", "flange in the base's frame")
+    seen_mm: Reals = vector("seen_{}_mm", "board in the base's frame, by the camera")
+    predicted_mm: Reals = vector("predicted_{}_mm", "board in the base's frame, by the arm")
+    q_deg: Reals = per_joint("joint angle; NaN where poses were recorded")
 
 
 @dataclass(frozen=True, eq=False)
 class CornerRows(Table):
     """Corners of the board in the images; none where poses were recorded."""
 
-    sample: Texts = column("name of the sample", dtype=object)
-    image: Texts = column("name of the image's file", dtype=object)
-    used: Flags = column("whether the calibration rests on it", dtype=bool)
-    seen_px: Reals = vector("seen_{}_px", "corner as detected, to the right and down", "px", parts="xy")
-    by_board_px: Reals = vector("by_board_{}_px", "where the board's pose in this image puts it", "px", parts="xy")
-    by_arm_px: Reals = vector("by_arm_{}_px", "where the arm and the calibration put it", "px", parts="xy")
+    sample: Texts = column("name of the sample")
+    image: Texts = column("name of the image's file")
+    used: Flags = column("whether the calibration rests on it")
+    seen_px: Reals = vector("seen_{}_px", "corner as detected, to the right and down", parts="xy")
+    by_board_px: Reals = vector("by_board_{}_px", "where the board's pose in this image puts it", parts="xy")
+    by_arm_px: Reals = vector("by_arm_{}_px", "where the arm and the calibration put it", parts="xy")
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,35 +367,35 @@ class ErrorMapRows(Table):
     What 95 % of errors stay below; NaN where the arm doesn't reach.
     """
 
-    x_mm: Reals = column("position in the base's frame", "mm")
-    y_mm: Reals = column("position in the base's frame", "mm")
-    in_view: Flags = column("whether the camera sees it", dtype=bool)
-    reached: Flags = column("whether the arm reaches it with that grasp, within its limits", dtype=bool)
-    calibration_mm: Reals = column("distance, from the calibration alone", "mm")
-    arm_mm: Reals = column("distance, from the arm's repeatability and table alone", "mm")
-    together_mm: Reals = column("distance, from camera's noise, calibration, repeatability and table", "mm")
-    together_deg: Reals = column("turn, from all of them", "deg")
+    x_mm: Reals = column("position in the base's frame")
+    y_mm: Reals = column("position in the base's frame")
+    in_view: Flags = column("whether the camera sees it")
+    reached: Flags = column("whether the arm reaches it with that grasp, within its limits")
+    calibration_mm: Reals = column("distance, from the calibration alone")
+    arm_mm: Reals = column("distance, from the arm's repeatability and table alone")
+    together_mm: Reals = column("distance, from camera's noise, calibration, repeatability and table")
+    together_deg: Reals = column("turn, from all of them")
 
 
 @dataclass(frozen=True, eq=False)
 class WayRows(Table):
     """Joint angles along the way to each object grasped, and away from it."""
 
-    target: Texts = column("name of the object", dtype=object)
-    part: Texts = column("move, approach or retreat", dtype=object)
-    step: Integers = column("number of the point in its part", dtype=np.int64)
-    t_s: Reals = column("time from the start, without the gripper's", "s")
-    q_deg: Reals = per_joint("q{}_deg", "joint angle", "deg")
+    target: Texts = column("name of the object")
+    part: Texts = column("move, approach or retreat")
+    step: Integers = column("number of the point in its part")
+    t_s: Reals = column("time from the start, without the gripper's")
+    q_deg: Reals = per_joint("joint angle")
 
 
 @dataclass(frozen=True, eq=False)
 class GraspPrograms(Table):
     """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
 
-    target: Texts = column("name of the object", dtype=object)
-    language: Texts = column("krl, urscript, rpl, xpl or csv", dtype=object)
-    file: Texts = column("name of the file", dtype=object)
-    text: Texts = column("what the file holds", dtype=object)
+    target: Texts = column("name of the object")
+    language: Texts = column("krl, urscript, rpl, xpl or csv")
+    file: Texts = column("name of the file")
+    text: Texts = column("what the file holds")
 
 
 @dataclass(frozen=True, eq=False)

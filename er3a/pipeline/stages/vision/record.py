@@ -19,7 +19,7 @@ from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, Sample
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import arm_view, log_arm, send_motion
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import ARM, TIMELINE, escaped, log_note, log_scene, note_view, recording
+from er3a.pipeline.viewing.recording import ARM, AXES, escaped, log_note, log_now, log_scene, recording, words_view
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 from er3a.vision.calibration_set import posed
@@ -27,7 +27,6 @@ from er3a.vision.calibration_set import posed
 STAGE = "vision"
 MAGNIFIED = 50.0
 SIGHT = 0.35  # of the farthest distance, how far the drawn pyramid reaches
-AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
 STEP_S = 0.1
 NOTE = f"""# Camera, samples and grasps
 
@@ -49,9 +48,8 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot = study.robot(name)
     task = load_vision(str(study.entry(name).vision))
-    words = rrb.Vertical(note_view(STAGE), rrb.TextDocumentView(origin=f"/{STAGE}/now", name="Now"), name="Words")
     view = arm_view(robot, "Camera and grasps", [ARM, f"/{STAGE}/**"], reach=_sight(robot, summary))
-    layout = rrb.Horizontal(view, words, column_shares=[2, 1], name="Vision")
+    layout = rrb.Horizontal(view, words_view(STAGE, "Now"), column_shares=[2, 1], name="Vision")
     with recording(output, name, STAGE, layout) as stream:
         log_note(stream, STAGE, NOTE)
         log_scene(stream, study, name, STAGE)
@@ -133,28 +131,21 @@ def _play(stream: rr.RecordingStream, robot: Robot, results: VisionResults, home
     """Samples half a second each, then the way to each object and back."""
     times: list[float] = [0.0]
     poses: list[Reals] = [home]
-    stream.set_time(TIMELINE, duration=0.0)
-    stream.log(f"{STAGE}/now", _text("The arm waits."))
+    log_now(stream, STAGE, 0.0, "The arm waits.")
     rows = results.samples
     for k in np.flatnonzero(np.isfinite(rows.q_deg).all(axis=1)) if len(rows) else ():
         times.append(times[-1] + 5 * STEP_S)
         poses.append(np.radians(rows.q_deg[k]))
-        stream.set_time(TIMELINE, duration=times[-1])
         used = "used" if rows.used[k] else "**left out**"
         residual = np.linalg.norm(rows.residual_mm[k])
-        stream.log(f"{STAGE}/now", _text(f"Sample {escaped(rows.sample[k])}, {used}: residual {residual:.3g} mm"))
+        log_now(stream, STAGE, times[-1], f"Sample {escaped(rows.sample[k])}, {used}: residual {residual:.3g} mm")
     for each in results.summary.objects:
         ways = results.ways.take(results.ways.target == each.name)
         times.append(times[-1] + 5 * STEP_S)
         poses.append(poses[-1] if not len(ways) else home)
-        stream.set_time(TIMELINE, duration=times[-1])
         told = f"{each.grasp.grasp}, success {100 * each.grasp.probability:.1f} %" if each.grasp else say(each.refusal)
-        stream.log(f"{STAGE}/now", _text(f"# {escaped(each.name)}\n\n{told}"))
+        log_now(stream, STAGE, times[-1], f"# {escaped(each.name)}\n\n{told}")
         for q in ways.q_deg:
             times.append(times[-1] + STEP_S)
             poses.append(np.radians(q))
     send_motion(stream, robot, np.array(times), np.array(poses))
-
-
-def _text(markdown: str) -> rr.TextDocument:
-    return rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN)

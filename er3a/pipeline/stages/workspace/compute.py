@@ -12,6 +12,7 @@ from er3a.files.reference_sets import check_reference_file, reference_folder
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.units import stated
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
@@ -254,11 +255,11 @@ def _summary(
         ),
         hull=HullSummary(hull.volume, hull.area, settings.hull_directions, len(hull.vertices)),
         reach_m=reach,
-        grid=GridSummary(triple(grid.origin), grid.cell, grid.shape),
+        grid=stated(GridSummary, grid),
         axis=AxisSummary(triple(grid.axis_point), triple(grid.axis), triple(shoulder_of(robot, grid))),
         section_cell_m=grid.section_cell,
         cells=counts,
-        voids=tuple(_void_summary(void) for void in voids),
+        voids=tuple(stated(VoidSummary, void, volume_m3=Bounds(void.lower, void.upper)) for void in voids),
         pocket_block_m=pocket_block(proven),
         capability=tool.capability,
         placement=tool.placement,
@@ -294,17 +295,4 @@ def _figures(
         Figure("hull_volume", hull.volume, "m³"),
         Figure("least_reach", reach.nearest_to_axis * 1000, "mm"),
         Figure("samples", samples, ""),
-    )
-
-
-def _void_summary(void: Void) -> VoidSummary:
-    return VoidSummary(
-        void.kind,
-        void.status,
-        Bounds(void.lower, void.upper),
-        triple(void.centroid),
-        triple(void.extent),
-        void.cause,
-        void.relaxed,
-        void.holds_shoulder,
     )

@@ -144,16 +144,8 @@ def capability(middles: Reals, found: Capability, tried: ClearPoses, bars: bool)
 
 def places(found: Places) -> BoxPlaces:
     """Positions of the box."""
-    return BoxPlaces(
-        centre_m=found.centre,
-        turned=found.turned,
-        slot=found.slot.astype(np.int8),
-        manipulability_m3=found.least.astype(np.float32),
-        limit_margin_deg=np.degrees(np.where(np.isinf(found.limit_margin), np.nan, found.limit_margin)).astype(
-            np.float32
-        ),
-        proven=found.proven,
-    )
+    margin = np.where(np.isinf(found.limit_margin), np.nan, found.limit_margin)
+    return BoxPlaces.of(found, manipulability_m3=found.least, limit_margin=margin)
 
 
 def _repeated(text: str, count: int) -> Texts:

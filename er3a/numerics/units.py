@@ -1,0 +1,116 @@
+"""The unit of a quantity stands at the end of its name.
+
+Files, tables and summaries say ``clearance_mm`` and ``q_deg``; the library has the same quantities in SI, as
+``clearance`` and ``q``. This one rule leads from either to the other.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from typing import Any, TypeVar
+
+import numpy as np
+
+TEXTS = {
+    "mm": "mm",
+    "mm_s": "mm/s",
+    "mm_s2": "mm/s^2",
+    "deg": "deg",
+    "deg_s": "deg/s",
+    "deg_s2": "deg/s^2",
+    "deg_s3": "deg/s^3",
+    "m": "m",
+    "m2": "m^2",
+    "m3": "m^3",
+    "s": "s",
+    "kg": "kg",
+    "kg_m2": "kg m^2",
+    "n": "N",
+    "n_m": "N m",
+    "w": "W",
+    "j": "J",
+    "px": "px",
+}
+"""How tables write each ending."""
+_NAME = re.compile(rf"(.+?)_({'|'.join(sorted(TEXTS, key=len, reverse=True))})")
+
+KindT = TypeVar("KindT")
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """A quantity's name without its unit, and the ending that is the unit; "" where it has none."""
+    found = _NAME.fullmatch(name)
+    return (found[1], found[2]) if found else (name, "")
+
+
+def unit_text(name: str) -> str:
+    """The unit that a name ends in, as tables write it; "" where it has none."""
+    return TEXTS.get(split_unit(name)[1], "")
+
+
+def from_si(unit: str, value: Any) -> Any:
+    """A number or an array in SI as one in the unit of an ending; None stays None."""
+    if value is None or not unit.startswith(("mm", "deg")):
+        return value
+    return np.degrees(value) if unit.startswith("deg") else 1000 * np.asarray(value)
+
+
+def to_si(unit: str, value: Any) -> Any:
+    """The inverse of :func:`from_si`."""
+    if value is None or not unit.startswith(("mm", "deg")):
+        return value
+    return np.radians(value) if unit.startswith("deg") else np.asarray(value) / 1000
+
+
+def stated(kind: type[KindT], found: object = None, /, **given: Any) -> KindT:
+    """A dataclass of results, filled with what the library found.
+
+    A field takes what is given under its own name; else what is given, or found, under its name without the unit,
+    converted from SI; else what is found under its own name. Arrays become tuples, and NumPy's numbers Python's.
+
+    Raises
+    ------
+    AttributeError
+        for a field that nothing fills
+    TypeError
+        for something given that fills no field
+    """
+    return kind(**{name: plain(value) for name, value in filled(kind, found, given).items()})
+
+
+def filled(kind: Any, found: object, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a dataclass by field, as :func:`stated` says, before they become plain."""
+    values = {}
+    names = {each.name for each in fields(kind)}
+    if unused := given.keys() - names - {split_unit(name)[0] for name in names}:
+        raise TypeError(f"{kind.__name__} has no field for {', '.join(sorted(unused))}")
+    for each in fields(kind):
+        stem, unit = split_unit(each.name)
+        if each.name in given:
+            values[each.name] = given[each.name]
+        elif stem in given:
+            values[each.name] = from_si(unit, given[stem])
+        elif unit and hasattr(found, stem):
+            values[each.name] = from_si(unit, getattr(found, stem))
+        elif hasattr(found, each.name) or each.default is MISSING:
+            values[each.name] = getattr(found, each.name)
+    return values
+
+
+def in_si(kind: type[KindT], entry: object, /, **given: Any) -> KindT:
+    """A dataclass of the library, filled with what a file says in its own units: the way back from :func:`stated`.
+
+    What is given stands in place of what the entry says. Fields that neither fills keep their defaults.
+    """
+    said = {split_unit(name): value for name, value in vars(entry).items()}
+    found = {stem: plain(to_si(unit, value)) for (stem, unit), value in said.items()} | given
+    return kind(**{each.name: found[each.name] for each in fields(kind) if each.name in found})  # type: ignore[arg-type]
+
+
+def plain(value: Any) -> Any:
+    """An array or a list as nested tuples, a number of NumPy's as one of Python's, and anything else as it is."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    return tuple(map(plain, value)) if isinstance(value, list) else value
