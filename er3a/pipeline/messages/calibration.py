@@ -6,17 +6,12 @@ from collections.abc import Sequence
 
 from er3a.calibration.calibrate import Calibration
 from er3a.calibration.outcomes import (
-    CorrectionsFound,
     Misfit,
     MorePositions,
-    MovesNothing,
-    NoCorrectionFits,
-    NoCorrectionFound,
-    NoPositions,
     NotToldApart,
 )
 from er3a.pipeline.messages.language import N_, as_text
-from er3a.pipeline.messages.say import counted, joined, say, sentence, word
+from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 
 LEVELS = {
     "lengths": N_("lengths"),
@@ -26,108 +21,70 @@ LEVELS = {
 MUCH_SCATTER = 2.0
 
 
+TEXTS = texts(
+    {
+        "moves_nothing": "{entry} has no effect on the measured points",
+        "no_positions": "there are no positions of single points to calibrate from",
+        "no_correction_fits": (
+            "no corrections make the table fit: after {steps} steps the positions are still {rest_mm:.3g} mm off. The "
+            "table has a gross fault or belongs to another arm; er3a.diagnose finds single faults"
+        ),
+        "corrections_found": "The positions indicate corrections of {entries:, }: their 95 % intervals exclude 0.",
+        "no_correction_found": Plural(
+            "intervals",
+            "The positions indicate no correction: the 95 % interval contains 0.",
+            "The positions indicate no correction: all {count} 95 % intervals contain 0.",
+        ),
+        "not_told_apart#parallel": "{entries} can't be identified separately: axes {first} and {second} are parallel",
+        "not_told_apart": "{entries} can't be identified separately",
+        "more_positions#known": Plural(
+            "poses",
+            "{coordinates} coordinates at {count} pose determine {determined} of the {determinable} entries "
+            "({level}) that positions of these points can determine",
+            "{coordinates} coordinates at {count} poses determine {determined} of the {determinable} entries "
+            "({level}) that positions of these points can determine",
+        ),
+        "more_positions#needed": Plural(
+            "least", "at least {count} more position is needed", "at least {count} more positions are needed"
+        ),
+        "more_positions#request": "{known}; {needed}. Spread them over all joints, for example {examples}.",
+        "more_positions#for_entries": "{needed} for {entries:, }",
+        "misfit": (
+            "Correcting {level} does not make this table fit the positions: {rms_after_mm:.3g} mm of "
+            "{rms_before_mm:.3g} mm (root mean square) remain. Calibration can't repair it."
+        ),
+        "list": "{others} and {last}",
+    }
+)
+
+
 def level(name: str) -> str:
     """Which entries were estimated, in words."""
     return word("level", LEVELS, name)
 
 
 @say.register
-def _(found: MovesNothing) -> str:
-    return sentence(found.code, "{entry} has no effect on the measured points", entry=found.entry)
-
-
-@say.register
 def _(found: NotToldApart) -> str:
     entries = _listed(found.entries)
     if found.parallel_joints is None:
-        return sentence(found.code, "{entries} can't be identified separately", entries=entries)
+        return say_as(found, entries=entries)
     first, second = found.parallel_joints
-    return sentence(
-        found.code,
-        "{entries} can't be identified separately: axes {first} and {second} are parallel",
-        entries=entries,
-        first=first,
-        second=second,
-    )
-
-
-@say.register
-def _(found: NoPositions) -> str:
-    return sentence(found.code, "there are no positions of single points to calibrate from")
+    return say_as(found, "parallel", entries=entries, first=first, second=second)
 
 
 @say.register
 def _(found: MorePositions) -> str:
-    known = counted(
-        found.code,
-        "{coordinates} coordinates at {count} pose determine {here} of the {best} entries ({level}) that positions of "
-        "these points can determine",
-        "{coordinates} coordinates at {count} poses determine {here} of the {best} entries ({level}) that positions of "
-        "these points can determine",
-        found.poses,
-        coordinates=found.coordinates,
-        here=found.determined,
-        best=found.determinable,
-        level=level(found.level),
-    )
-    needed = counted(
-        found.code,
-        "at least {count} more position is needed",
-        "at least {count} more positions are needed",
-        found.least,
-    )
+    known = say_as(found, "known", level=level(found.level))
+    needed = say_as(found, "needed")
     if found.entries:
-        needed = sentence(found.code, "{needed} for {entries}", needed=needed, entries=joined(found.entries, ", "))
+        needed = say_as(found, "for_entries", needed=needed)
     poses = ["(" + ", ".join(as_text(angle, "g") for angle in pose) + ") deg" for pose in found.examples_deg]
-    return sentence(
-        found.code,
-        "{known}; {needed}. Spread them over all joints, for example {examples}.",
-        known=known,
-        needed=needed,
-        examples=_listed(poses),
-    )
-
-
-@say.register
-def _(found: NoCorrectionFits) -> str:
-    return sentence(
-        found.code,
-        "no corrections make the table fit: after {steps} steps the positions are still {rest:.3g} mm off. The "
-        "table has a gross fault or belongs to another arm; er3a.diagnose finds single faults",
-        steps=found.steps,
-        rest=found.rest_mm,
-    )
+    return say_as(found, "request", known=known, needed=needed, examples=_listed(poses))
 
 
 @say.register
 def _(found: Misfit) -> str:
-    return sentence(
-        found.code,
-        "Correcting {level} does not make this table fit the positions: {after:.3g} mm of {before:.3g} mm (root"
-        " mean square) remain. Calibration can't repair it.",
-        level=level(found.level),
-        after=found.rms_after_mm,
-        before=found.rms_before_mm,
-    )
-
-
-@say.register
-def _(found: CorrectionsFound) -> str:
-    return sentence(
-        found.code,
-        "The positions indicate corrections of {entries}: their 95 % intervals exclude 0.",
-        entries=joined(found.entries, ", "),
-    )
-
-
-@say.register
-def _(found: NoCorrectionFound) -> str:
-    return counted(
-        found.code,
-        "The positions indicate no correction: the 95 % interval contains 0.",
-        "The positions indicate no correction: all {count} 95 % intervals contain 0.",
-        found.intervals,
-    )
+    return say_as(found, level=level(found.level))
 
 
 def lines_of(found: Calibration) -> str:
@@ -180,4 +137,4 @@ def calibration_record(found: Calibration) -> dict[str, object]:
 
 def _listed(words: Sequence[str]) -> str:
     """Words in a row, with "and" before the last."""
-    return sentence("list", "{others} and {last}", others=joined(words[:-1], ", "), last=words[-1])
+    return sentence("list", others=joined(words[:-1], ", "), last=words[-1])

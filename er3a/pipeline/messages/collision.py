@@ -36,9 +36,9 @@ def state_word(state: PairState) -> str:
 def body_word(name: str) -> str:
     """A body of the arm, or what is carried, by its name."""
     if name == link_label(BASE):
-        return sentence("link", "base")
+        return sentence("link#base")
     number = name.removeprefix("link_")
-    return sentence("link", "link {number}", number=number) if number != name else name
+    return sentence("link#number", number=number) if number != name else name
 
 
 def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str) -> str:

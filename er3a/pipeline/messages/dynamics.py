@@ -5,18 +5,10 @@ from __future__ import annotations
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import (
-    AboutOrigin,
-    CentreOutside,
     ImpossibleInertia,
-    InertiaWithoutMass,
-    MissingLink,
-    PointMass,
-    SumOffWeight,
-    UnlikelyDensity,
-    UnlikelyInertia,
 )
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import say, sentence, word
+from er3a.pipeline.messages.say import by, say, say_as, texts, word
 from er3a.robots.masses import NoBody
 
 FIGURES = {
@@ -37,85 +29,39 @@ WHY: dict[NoBody, str] = {
 }
 
 
+TEXTS = texts(
+    {
+        "missing_link": by(
+            "singular",
+            false="link {link}: no mass is given; it counts as massless",
+            true=(
+                "link {link}: no mass, inertia or rotor is given; its joint's torque counts as 0, and accelerations "
+                "under given torques (forward dynamics) have no value"
+            ),
+        ),
+        "point_mass": "link {link}: mass without inertia",
+        "inertia_without_mass": "link {link}: inertia without mass; it is used as given",
+        "centre_outside": (
+            "link {link}: the centre of mass is {outside_mm:.0f} mm outside the link's shape; check its frame and unit"
+        ),
+        "unlikely_density": (
+            "link {link}: {mass_kg:.4g} kg in the link's shape make {density_kg_m3:.3g} kg/m³; check g against kg"
+        ),
+        "unlikely_inertia": (
+            "link {link}: the radius of gyration is {gyration_mm:.3g} mm, that of the link's shape {shape_mm:.3g} mm; "
+            "check the unit of the inertia (kg m²)"
+        ),
+        "about_origin": (
+            "link {link}: the inertia looks as if it were about the frame's origin, not the centre of mass: "
+            "{given_kg_m2:.3g} kg m² given, {about_centre_kg_m2:.3g} if so, {shape_kg_m2:.3g} by the link's shape"
+        ),
+        "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
+        "impossible_inertia": "link {link}: no body can have this inertia ({why})",
+    }
+)
+
+
 @say.register
 def _(found: ImpossibleInertia) -> str:
     why = word("dynamics.why", WHY, found.why)
-    return sentence(found.code, "link {link}: no body can have this inertia ({why})", link=found.link, why=why)
-
-
-@say.register
-def _(found: MissingLink) -> str:
-    if found.singular:
-        return sentence(
-            found.code,
-            "link {link}: no mass, inertia or rotor is given; its joint's torque counts as 0, and accelerations under "
-            "given torques (forward dynamics) have no value",
-            link=found.link,
-        )
-    return sentence(found.code, "link {link}: no mass is given; it counts as massless", link=found.link)
-
-
-@say.register
-def _(found: PointMass) -> str:
-    return sentence(found.code, "link {link}: mass without inertia", link=found.link)
-
-
-@say.register
-def _(found: InertiaWithoutMass) -> str:
-    return sentence(found.code, "link {link}: inertia without mass; it is used as given", link=found.link)
-
-
-@say.register
-def _(found: CentreOutside) -> str:
-    return sentence(
-        found.code,
-        "link {link}: the centre of mass is {far:.0f} mm outside the link's shape; check its frame and unit",
-        link=found.link,
-        far=found.outside_mm,
-    )
-
-
-@say.register
-def _(found: UnlikelyDensity) -> str:
-    return sentence(
-        found.code,
-        "link {link}: {mass:.4g} kg in the link's shape make {density:.3g} kg/m³; check g against kg",
-        link=found.link,
-        mass=found.mass_kg,
-        density=found.density_kg_m3,
-    )
-
-
-@say.register
-def _(found: UnlikelyInertia) -> str:
-    return sentence(
-        found.code,
-        "link {link}: the radius of gyration is {own:.3g} mm, that of the link's shape {shape:.3g} mm; check the "
-        "unit of the inertia (kg m²)",
-        link=found.link,
-        own=found.gyration_mm,
-        shape=found.shape_mm,
-    )
-
-
-@say.register
-def _(found: AboutOrigin) -> str:
-    return sentence(
-        found.code,
-        "link {link}: the inertia looks as if it were about the frame's origin, not the centre of mass: "
-        "{given:.3g} kg m² given, {rest:.3g} if so, {shape:.3g} by the link's shape",
-        link=found.link,
-        given=found.given_kg_m2,
-        rest=found.about_centre_kg_m2,
-        shape=found.shape_kg_m2,
-    )
-
-
-@say.register
-def _(found: SumOffWeight) -> str:
-    return sentence(
-        found.code,
-        "the links' masses add to {sum:.4g} kg, and the manufacturer states {weight:.4g} kg",
-        sum=found.sum_kg,
-        weight=found.weight_kg,
-    )
+    return say_as(found, why=why)

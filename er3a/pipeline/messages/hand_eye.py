@@ -7,28 +7,17 @@ import numpy as np
 import er3a.pipeline.messages.calibration  # noqa: F401
 from er3a.geometry.transforms import rpy_of
 from er3a.pipeline.messages.language import N_, as_text
-from er3a.pipeline.messages.say import say, sentence, word
-from er3a.vision.boards import AmbiguousTilt
+from er3a.pipeline.messages.say import by, say, say_as, sentence, texts, word
 from er3a.vision.calibration_set import TimeOffset, quaternion_of
 from er3a.vision.hand_eye import HandEye, spread_of
 from er3a.vision.table_corrections import NoCorrections, TableCorrections
 from er3a.vision.vision_findings import (
-    AllSamplesEqual,
     AngleOrder,
-    BoardScale,
     DirectionTried,
-    FarFromFit,
-    LittleMotion,
-    MoreScatter,
-    NoMajority,
-    NoRotation,
-    NothingFits,
     OtherDirection,
     ParallelTurns,
     QuaternionOrder,
-    RepeatedPose,
     RotationMismatch,
-    TooFewSamples,
     TransposedRotations,
 )
 
@@ -68,200 +57,122 @@ METHODS = {
 }
 
 
+TEXTS = texts(
+    {
+        "far_from_fit": (
+            "{sample}: {off_mm:.3g} mm and {off_deg:.2g} deg from what the other samples predict (probability "
+            "{probability:.1g})"
+        ),
+        "repeated_pose": (
+            "{sample}: the arm has the same pose as in {first}, and the two board poses differ by {apart_mm:.2g} mm "
+            "and {apart_deg:.2g} deg; a sample at another pose would add more"
+        ),
+        "ambiguous_tilt": (
+            "{sample}: the flat board is seen almost head-on, or too small: the mirrored tilt fits with only "
+            "{ratio:.2g} times the error. Take the image from nearer, or tilt the board by 30 deg"
+        ),
+        "no_majority": (
+            "flange and board rotate by different angles in {pairs} of {of} pairs of samples ({median_deg:.3g} deg in "
+            "the median): the robot's table, the order of the samples, or the orientations of one stream are wrong"
+        ),
+        "board_scale": (
+            "the samples fit a board {factor:.4g} ± {half_width:.1g} times as large: check the stated size of its "
+            "squares, the units, or the camera's focal length"
+        ),
+        "little_motion": (
+            "the samples rotate by at most {greatest_turn_deg:.3g} deg, about axes within {axes_apart_deg:.2g} deg of "
+            "one direction: add poses rotated by 30 deg or more about a second axis"
+        ),
+        "more_scatter": (
+            "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
+            "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated"
+        ),
+        "too_few_samples": "{samples} samples; {needed} are needed, and ten or more advised",
+        "all_samples_equal": by(
+            "stream",
+            target="the board is seen in the same pose in all samples: check what was recorded",
+            flange="the flange has the same pose in all samples: move the arm between them",
+        ),
+        "no_rotation": (
+            "the flange rotates by at most {greatest_turn_deg:.2g} deg, so the camera's position is undetermined: "
+            "rotate it by 30 deg or more"
+        ),
+        "nothing_fits": "no poses of camera and board fit the samples: the two streams don't belong together",
+        "rotation_mismatch": (
+            "{sample}: flange and board rotate by different angles relative to the other samples, {off_deg:.1f} deg "
+            "in the median; {kind}"
+        ),
+        "quaternion_order": (
+            "the quaternions of the {stream} have their real part at the other end: read that way the residuals are "
+            "{rms_other_deg:.2g} deg, as given {rms_given_deg:.3g} deg"
+        ),
+        "angle_order": (
+            "the angles of the {stream} fit if read as R = {product}: the residuals are then {rms_other_deg:.2g} deg, "
+            "as given {rms_given_deg:.3g} deg; convert them to R = Rz(yaw) Ry(pitch) Rx(roll)"
+        ),
+        "transposed_rotations": (
+            "the rotations of the {stream} are transposed, its positions are right: read that way the residuals are "
+            "{rms_other_deg:.2g} deg, as given {rms_given_deg:.3g} deg; write matrices row by row"
+        ),
+        "other_direction#one": (
+            "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other "
+            "one, or the flange poses are those of the base in the flange's frame (T_flange_base), or the board poses "
+            "are those of the camera in the board's frame"
+        ),
+        "other_direction#both": "the samples exclude this direction; invert both streams",
+        "parallel_axes": (
+            "all motions rotate about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread_deg:.2g} deg, so the "
+            "translation along it is undetermined: add poses rotated about another axis by 30 deg or more"
+        ),
+        "direction_tried": "{direction}: {status}",
+        "vision.corrections#consistent": (
+            "The samples do not contradict the table: corrections lower the residuals from {before:.3g} to "
+            "{after:.3g} standard deviations, by chance with a probability of {p:.2g}"
+        ),
+        "vision.corrections#contradicted": (
+            "The samples contradict the table: corrections lower the residuals from {before:.3g} to {after:.3g} "
+            "standard deviations, by chance with a probability of {p:.1g}"
+        ),
+    }
+)
+
+
 @say.register
 def _(found: RotationMismatch) -> str:
-    return sentence(
-        found.code,
-        "{own_name}: flange and board rotate by different angles relative to the other samples, {off:.1f} deg "
-        "in the median; {kind}",
-        own_name=found.sample,
-        off=found.off_deg,
-        kind=word("vision.mending", MENDING, found.kind),
-    )
-
-
-@say.register
-def _(found: FarFromFit) -> str:
-    return sentence(
-        found.code,
-        "{own_name}: {mm:.3g} mm and {deg:.2g} deg from what the other samples predict (probability {p:.1g})",
-        own_name=found.sample,
-        mm=found.off_mm,
-        deg=found.off_deg,
-        p=found.probability,
-    )
-
-
-@say.register
-def _(found: RepeatedPose) -> str:
-    return sentence(
-        found.code,
-        "{own_name}: the arm has the same pose as in {first}, and the two board poses differ by {mm:.2g} mm and"
-        " {deg:.2g} deg; a sample at another pose would add more",
-        own_name=found.sample,
-        first=found.first,
-        mm=found.apart_mm,
-        deg=found.apart_deg,
-    )
-
-
-@say.register
-def _(found: AmbiguousTilt) -> str:
-    return sentence(
-        found.code,
-        "{own_name}: the flat board is seen almost head-on, or too small: the mirrored tilt fits with only "
-        "{ratio:.2g} times the error. Take the image from nearer, or tilt the board by 30 deg",
-        own_name=found.sample,
-        ratio=found.ratio,
-    )
-
-
-@say.register
-def _(found: NoMajority) -> str:
-    return sentence(
-        found.code,
-        "flange and board rotate by different angles in {pairs} of {of} pairs of samples ({median:.3g} deg in "
-        "the median): the robot's table, the order of the samples, or the orientations of one stream are wrong",
-        pairs=found.pairs,
-        of=found.of,
-        median=found.median_deg,
-    )
+    return say_as(found, kind=word("vision.mending", MENDING, found.kind))
 
 
 @say.register
 def _(found: QuaternionOrder) -> str:
-    return sentence(
-        found.code,
-        "the quaternions of the {stream} have their real part at the other end: read that way the residuals are"
-        " {after:.2g} deg, as given {before:.3g} deg",
-        stream=word("vision.stream", STREAMS, found.stream),
-        after=found.rms_other_deg,
-        before=found.rms_given_deg,
-    )
+    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
 
 
 @say.register
 def _(found: AngleOrder) -> str:
-    return sentence(
-        found.code,
-        "the angles of the {stream} fit if read as R = {product}: the residuals are then {after:.2g} deg, as "
-        "given {before:.3g} deg; convert them to R = Rz(yaw) Ry(pitch) Rx(roll)",
-        stream=word("vision.stream", STREAMS, found.stream),
-        product=found.product,
-        after=found.rms_other_deg,
-        before=found.rms_given_deg,
-    )
+    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
 
 
 @say.register
 def _(found: TransposedRotations) -> str:
-    return sentence(
-        found.code,
-        "the rotations of the {stream} are transposed, its positions are right: read that way the residuals are"
-        " {after:.2g} deg, as given {before:.3g} deg; write matrices row by row",
-        stream=word("vision.stream", STREAMS, found.stream),
-        after=found.rms_other_deg,
-        before=found.rms_given_deg,
-    )
+    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
 
 
 @say.register
 def _(found: OtherDirection) -> str:
     if found.flange_inverted == found.target_inverted:
-        return sentence(found.code, "the samples exclude this direction; invert both streams")
-    return sentence(
-        found.code,
-        "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other "
-        "one, or the flange poses are those of the base in the flange's frame (T_flange_base), or the board "
-        "poses are those of the camera in the board's frame",
-    )
-
-
-@say.register
-def _(found: BoardScale) -> str:
-    return sentence(
-        found.code,
-        "the samples fit a board {factor:.4g} ± {half:.1g} times as large: check the stated size of its squares, the "
-        "units, or the camera's focal length",
-        factor=found.factor,
-        half=found.half_width,
-    )
-
-
-@say.register
-def _(found: LittleMotion) -> str:
-    return sentence(
-        found.code,
-        "the samples rotate by at most {turn:.3g} deg, about axes within {apart:.2g} deg of one direction: add "
-        "poses rotated by 30 deg or more about a second axis",
-        turn=found.greatest_turn_deg,
-        apart=found.axes_apart_deg,
-    )
-
-
-@say.register
-def _(found: MoreScatter) -> str:
-    return sentence(
-        found.code,
-        "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
-        "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated",
-        scatter=found.scatter,
-        largest=found.largest,
-    )
-
-
-@say.register
-def _(found: TooFewSamples) -> str:
-    return sentence(
-        found.code,
-        "{count} samples; {needed} are needed, and ten or more advised",
-        count=found.samples,
-        needed=found.needed,
-    )
-
-
-@say.register
-def _(found: AllSamplesEqual) -> str:
-    if found.stream == "flange":
-        return sentence(found.code, "the flange has the same pose in all samples: move the arm between them")
-    return sentence(found.code, "the board is seen in the same pose in all samples: check what was recorded")
+        return say_as(found, "both")
+    return say_as(found, "one")
 
 
 @say.register
 def _(found: ParallelTurns) -> str:
-    return sentence(
-        found.code,
-        "all motions rotate about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread:.2g} deg, so the "
-        "translation along it is undetermined: add poses rotated about another axis by 30 deg or more",
-        x=found.axis[0],
-        y=found.axis[1],
-        z=found.axis[2],
-        spread=found.spread_deg,
-    )
-
-
-@say.register
-def _(found: NoRotation) -> str:
-    return sentence(
-        found.code,
-        "the flange rotates by at most {turn:.2g} deg, so the camera's position is undetermined: rotate it by "
-        "30 deg or more",
-        turn=found.greatest_turn_deg,
-    )
-
-
-@say.register
-def _(found: NothingFits) -> str:
-    return sentence(found.code, "no poses of camera and board fit the samples: the two streams don't belong together")
+    return say_as(found, x=found.axis[0], y=found.axis[1], z=found.axis[2])
 
 
 @say.register
 def _(found: DirectionTried) -> str:
-    return sentence(
-        found.code,
-        "{direction}: {status}",
-        direction=direction_word(found),
-        status=word("vision.direction_status", STATUS_WORDS, found.status),
+    return say_as(
+        found, direction=direction_word(found), status=word("vision.direction_status", STATUS_WORDS, found.status)
     )
 
 
@@ -280,22 +191,8 @@ def _(found: NoCorrections) -> str:
 def correction_verdict(probability: float, before: float, after: float, limit: float = 0.01) -> str:
     """Whether the samples speak against the table as it is."""
     if probability < limit:
-        return sentence(
-            "vision.corrections",
-            "The samples contradict the table: corrections lower the residuals from {before:.3g} to {after:.3g}"
-            " standard deviations, by chance with a probability of {p:.1g}",
-            before=before,
-            after=after,
-            p=probability,
-        )
-    return sentence(
-        "vision.corrections",
-        "The samples do not contradict the table: corrections lower the residuals from {before:.3g} to "
-        "{after:.3g} standard deviations, by chance with a probability of {p:.2g}",
-        before=before,
-        after=after,
-        p=probability,
-    )
+        return sentence("vision.corrections#contradicted", before=before, after=after, p=probability)
+    return sentence("vision.corrections#consistent", before=before, after=after, p=probability)
 
 
 def correction_lines(found: TableCorrections | NoCorrections) -> list[str]:

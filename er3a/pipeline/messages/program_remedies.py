@@ -9,7 +9,7 @@ from typing import Any
 
 from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import sentence, word
+from er3a.pipeline.messages.say import sentence, texts, word
 from er3a.planning.intervals import TooFast
 from er3a.program_check.program_check_findings import (
     CheckFinding,
@@ -92,6 +92,14 @@ STOPPED: dict[EndKind, str] = {
 }
 
 
+TEXTS = texts(
+    {
+        "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
+        "remedy.slower": "Lower the speed of this line to {percent:g} % of its own or less.",
+    }
+)
+
+
 @singledispatch
 def remedy(finding: Any) -> str:
     """What to do about a finding, as a sentence in the language in use; empty where nothing is to be done."""
@@ -115,7 +123,7 @@ def _(found: TooFast | FasterThanAssumed) -> str:
 
 @remedy.register
 def _(found: ZoneTooLarge) -> str:
-    return sentence("remedy.zone_too_large", "Make the zone {half:.1f} mm at most.", half=found.motion_mm / 2)
+    return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
 
 
 def _allowed(found: TooFast | FasterThanAssumed) -> float:
@@ -125,9 +133,7 @@ def _allowed(found: TooFast | FasterThanAssumed) -> float:
 
 def _slower(share: float) -> str:
     percent = math.floor(1000 * share) / 10
-    return sentence(
-        "remedy.slower", "Lower the speed of this line to {percent:g} % of its own or less.", percent=percent
-    )
+    return sentence("remedy.slower", percent=percent)
 
 
 def remedies(findings: Iterable[CheckFinding]) -> list[str]:

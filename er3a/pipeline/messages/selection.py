@@ -6,20 +6,14 @@ import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.kinematics.solutions import SideUnsolved, Unsolved
 from er3a.pipeline.messages.kinematics import SIDES, branch_word
 from er3a.pipeline.messages.language import N_, as_text
-from er3a.pipeline.messages.say import joined, listed, say, sentence, word
+from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
 from er3a.selection.nearest import (
-    AllCollide,
     AllOutsideLimits,
-    GreatestMove,
-    JointTurned,
     LowerBranchNumber,
     MovesLess,
     MovesLessTogether,
     NoSolution,
-    OnlyAdmissible,
     OtherBranch,
-    OtherFreeJoint,
-    OtherTurns,
 )
 from er3a.selection.select import RULES, BestByRules, Measure, Placed
 
@@ -42,52 +36,47 @@ RULE_TITLES = {
 }
 
 
-@say.register
-def _(found: GreatestMove) -> str:
-    return sentence(
-        found.code, "greatest joint move {angle:.1f} deg (J{joint})", angle=found.angle_deg, joint=found.joint
-    )
-
-
-@say.register
-def _(found: OnlyAdmissible) -> str:
-    return sentence(found.code, "{move}; the only admissible solution", move=say(found.move))
+TEXTS = texts(
+    {
+        "greatest_move": "greatest joint move {angle_deg:.1f} deg (J{joint})",
+        "only_admissible": "{move}; the only admissible solution",
+        "joint_turned": "J{joint} turned by {turn_deg:+d} deg",
+        "other_turns": "the same branch, {joints:, }",
+        "other_free_joint": "the same branch, its free joint at another angle",
+        "all_collide": "all {count} solutions within the limits collide: {overlap}",
+        "moves_less": "{move}, {less_deg:.3g} deg less than {other}",
+        "moves_less_together": "{move}, as with {other}; all joints taken together move {less_deg:.3g} deg less",
+        "lower_branch_number": "{move}; {other} is just as near, and the lower branch number decides",
+        "next_best": "the next best ({branch})",
+        "no_solution": "out of reach: {fault}",
+        "all_outside_limits#several": (
+            "all {count} solutions leave the limits; the nearest to them is {branch}: {reason}"
+        ),
+        "all_outside_limits#one": "the only solution leaves them: {branch}: {reason}",
+        "placed": "place {place}: {measures}",
+        "best_by_rules#ranked": "{measures}; the next best has {next_best}",
+        "best_by_rules#only": "{measures}; the only admissible solution",
+    }
+)
 
 
 @say.register
 def _(found: MovesLess) -> str:
-    return sentence(
-        found.code,
-        "{move}, {angle:.3g} deg less than {other}",
-        move=say(found.move),
-        angle=found.less_deg,
-        other=_next_best(found),
-    )
+    return say_as(found, other=_next_best(found))
 
 
 @say.register
 def _(found: MovesLessTogether) -> str:
-    return sentence(
-        found.code,
-        "{move}, as with {other}; all joints taken together move {angle:.3g} deg less",
-        move=say(found.move),
-        other=_next_best(found),
-        angle=found.less_deg,
-    )
+    return say_as(found, other=_next_best(found))
 
 
 @say.register
 def _(found: LowerBranchNumber) -> str:
-    return sentence(
-        found.code,
-        "{move}; {other} is just as near, and the lower branch number decides",
-        move=say(found.move),
-        other=_next_best(found),
-    )
+    return say_as(found, other=_next_best(found))
 
 
 def _next_best(found: MovesLess | MovesLessTogether | LowerBranchNumber) -> str:
-    return sentence("next_best", "the next best ({branch})", branch=say(found.next_best))
+    return sentence("next_best", branch=say(found.next_best))
 
 
 @say.register
@@ -96,27 +85,12 @@ def _(found: OtherBranch) -> str:
 
 
 @say.register
-def _(found: JointTurned) -> str:
-    return sentence(found.code, "J{joint} turned by {turn:+d} deg", joint=found.joint, turn=found.turn_deg)
-
-
-@say.register
-def _(found: OtherTurns) -> str:
-    return sentence(found.code, "the same branch, {turned}", turned=joined(listed(found.joints), ", "))
-
-
-@say.register
-def _(found: OtherFreeJoint) -> str:
-    return sentence(found.code, "the same branch, its free joint at another angle")
-
-
-@say.register
 def _(found: NoSolution) -> str:
     if len(found.unsolved) == 1:
         return say(found.unsolved[0])
     faults = list(dict.fromkeys(say(part.why) for part in found.unsolved))
     fault = faults[0] if len(faults) == 1 else joined(map(_of_side, found.unsolved))
-    return sentence(found.code, "out of reach: {fault}", fault=fault)
+    return say_as(found, fault=fault)
 
 
 def _of_side(found: Unsolved) -> str:
@@ -128,24 +102,8 @@ def _of_side(found: Unsolved) -> str:
 def _(found: AllOutsideLimits) -> str:
     label, reason = branch_word(found.label, found.branch), say(found.exceeded)
     if found.count == 1:
-        return sentence(found.code, "the only solution leaves them: {branch}: {reason}", branch=label, reason=reason)
-    return sentence(
-        found.code,
-        "all {count} solutions leave the limits; the nearest to them is {branch}: {reason}",
-        count=found.count,
-        branch=label,
-        reason=reason,
-    )
-
-
-@say.register
-def _(found: AllCollide) -> str:
-    return sentence(
-        found.code,
-        "all {count} solutions within the limits collide: {reason}",
-        count=found.count,
-        reason=say(found.overlap),
-    )
+        return say_as(found, "one", branch=label, reason=reason)
+    return say_as(found, "several", branch=label, reason=reason)
 
 
 @say.register
@@ -156,13 +114,13 @@ def _(found: Measure) -> str:
 @say.register
 def _(found: Placed) -> str:
     measures = joined(listed(found.measures), ", ")
-    return sentence(found.code, "place {place}: {measures}", place=found.place, measures=measures)
+    return say_as(found, measures=measures)
 
 
 @say.register
 def _(found: BestByRules) -> str:
     measures = joined(listed(found.measures), ", ")
     if not found.next_best:
-        return sentence(found.code, "{measures}; the only admissible solution", measures=measures)
+        return say_as(found, "only", measures=measures)
     next_best = joined(listed(found.next_best), ", ")
-    return sentence(found.code, "{measures}; the next best has {next_best}", measures=measures, next_best=next_best)
+    return say_as(found, "ranked", measures=measures, next_best=next_best)

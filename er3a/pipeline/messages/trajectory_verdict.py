@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.pairs  # noqa: F401
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
-from er3a.pipeline.messages.say import counted, joined, say, sentence
+from er3a.pipeline.messages.say import Plural, joined, say, sentence, texts
 from er3a.pipeline.stages.trajectory.model import PathCounts
 from er3a.planning.intervals import PathVerdict
+
+TEXTS = texts(
+    {
+        "trajectory.paths": Plural("count", "{safe} of {count} path is safe", "{safe} of {count} paths are safe"),
+        "trajectory.not_followed": "{count} not followed to the end ({names})",
+        "trajectory.fault": "{count} {word} ({names})",
+    }
+)
 
 
 @say.register
@@ -25,16 +33,10 @@ def _(found: PathCounts) -> str:
     faults = []
     for verdict, names in unsafe.items():
         parts = {"count": len(names), "word": outcome_word(verdict), "names": ", ".join(names)}
-        faults.append(sentence("trajectory.fault", "{count} {word} ({names})", **parts) if names else "")
-    safe = counted(
-        "trajectory.paths",
-        "{safe} of {count} path is safe",
-        "{safe} of {count} paths are safe",
-        found.paths + len(found.demonstrations),
-        safe=found.safe,
-    )
+        faults.append(sentence("trajectory.fault", **parts) if names else "")
+    safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
-        faults.append(sentence("trajectory.not_followed", "{count} not followed to the end ({names})", **parts))
+        faults.append(sentence("trajectory.not_followed", **parts))
     told = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
-    return sentence("trajectory.verdict", "{finding}.", finding=joined(told))
+    return sentence("finding", finding=joined(told))

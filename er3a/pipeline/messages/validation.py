@@ -6,16 +6,9 @@ import er3a.pipeline.messages.kinematics
 import er3a.pipeline.messages.validation_verdict  # noqa: F401
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS
-from er3a.pipeline.messages.say import say, sentence, word
+from er3a.pipeline.messages.say import say, texts, word
 from er3a.pipeline.stages.validation.model import (
-    InNoSet,
     NamedPose,
-    NearSingularLeftOut,
-    NoClosedForm,
-    NotInRobotFile,
-    NumbersMissing,
-    SetHasNoData,
-    SourceGivesNone,
     WholeGroup,
 )
 
@@ -50,6 +43,22 @@ CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
 
 
+TEXTS = texts(
+    {
+        "not_in_robot_file": "the robot's file gives no value",
+        "source_gives_none": "the source gives none",
+        "set_has_no_data": "{reference_set} has no data",
+        "in_no_set": "no reference set gives it",
+        "numbers_missing": "numbers are missing",
+        "no_closed_form": "no closed-form inverse, because {missing}",
+        "near_singular_left_out": (
+            "{judged} of {poses} random poses; the others lie within {wrist_deg:g} deg (wrist, elbow) or "
+            "{shoulder_mm:g} mm (shoulder) of a singularity, where joints follow from a pose less exactly"
+        ),
+    }
+)
+
+
 @say.register
 def _(found: NamedPose) -> str:
     return found.name
@@ -58,46 +67,3 @@ def _(found: NamedPose) -> str:
 @say.register
 def _(found: WholeGroup) -> str:
     return word(found.code, MISSING_WORDS, found.group)
-
-
-@say.register
-def _(found: NotInRobotFile) -> str:
-    return sentence(found.code, "the robot's file gives no value")
-
-
-@say.register
-def _(found: SourceGivesNone) -> str:
-    return sentence(found.code, "the source gives none")
-
-
-@say.register
-def _(found: SetHasNoData) -> str:
-    return sentence(found.code, "{own_set} has no data", own_set=found.reference_set)
-
-
-@say.register
-def _(found: InNoSet) -> str:
-    return sentence(found.code, "no reference set gives it")
-
-
-@say.register
-def _(found: NumbersMissing) -> str:
-    return sentence(found.code, "numbers are missing")
-
-
-@say.register
-def _(found: NoClosedForm) -> str:
-    return sentence(found.code, "no closed-form inverse, because {missing}", missing=say(found.missing))
-
-
-@say.register
-def _(found: NearSingularLeftOut) -> str:
-    return sentence(
-        found.code,
-        "{judged} of {poses} random poses; the others lie within {wrist:g} deg (wrist, elbow) or {shoulder:g} mm "
-        "(shoulder) of a singularity, where joints follow from a pose less exactly",
-        judged=found.judged,
-        poses=found.poses,
-        wrist=found.wrist_deg,
-        shoulder=found.shoulder_mm,
-    )

@@ -9,10 +9,9 @@ from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.messages.evidence import PART_WORDS
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.references import quoted
-from er3a.pipeline.messages.say import counted, joined, say, sentence, word
+from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
-    Claims,
     Confirmed,
     Contradicted,
     Contradiction,
@@ -41,6 +40,73 @@ SELF_CHECKS = {
 GRADES = {"official": N_("official"), "measured": N_("measured"), "cad": N_("CAD"), "export": N_("exported")}
 
 
+TEXTS = texts(
+    {
+        "labels_missed": Plural(
+            "count", "{count} label is missed, by up to {worst} mm.", "{count} labels are missed, by up to {worst} mm."
+        ),
+        "graded": "{own_source} ({grade})",
+        "claims": Plural(
+            "failed",
+            "Of the {claims} claims in {reference_set}, {count} doesn't hold.",
+            "Of the {claims} claims in {reference_set}, {count} don't hold.",
+        ),
+        "counted_checks#independent": "{passed} of {total} independent checks pass",
+        "counted_checks#consistency": "{same_passed} of {same_total} consistency checks pass, and none is independent",
+        "counted_checks#both": (
+            "{passed} of {total} independent and {same_passed} of {same_total} consistency checks pass"
+        ),
+        "validation.left_open#up_to": (
+            "Open and weak entries could put the tool off by up to {mm:.0f} mm and {deg:.0f} deg."
+        ),
+        "validation.left_open#at_least": (
+            "Open and weak entries could put the tool off by {mm:.0f} mm and {deg:.0f} deg, or by more."
+        ),
+        "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
+        "validation.left_open#uncontradicted": "Nothing independent contradicts the table ({checks}), but:",
+        "validation.missed#contradicted": (
+            "The model contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}; "
+            "{checks}."
+        ),
+        "validation.missed#described": (
+            "Against the {grades} data in {own_set} the {quantity} is {measured}, not {expected}; {checks}."
+        ),
+        "validation.missed#another_arm": (
+            "This is not the arm that the {grades} data in {own_set} describe: the {quantity} is {measured}, not "
+            "{expected}; {checks}."
+        ),
+        "chain#or": "{value} or {values}",
+        "chain#and": "{value} and {values}",
+        "validation.confirmed": (
+            "Independent documents settle every entry that moves the tool: {checks} ({grades} data)."
+        ),
+        "validation.left_open#parts": "{parts}.",
+        "validation.left_open#tolerance": (
+            "Settled: what is left open moves the tool by less than {mm} mm and {deg} deg."
+        ),
+        "validation.left_open#measurement": "Most useful measurement: {next_measurement}.",
+        "validation.left_open#unbounded": (
+            "{count} entries that move the tool rest on their own source alone: if it is wrong, the error has no bound."
+        ),
+        "validation.left_open#conflicting": "{count} undecided, as documents contradict each other",
+        "part_found#settled": "{part}: {settled} of {entries} entries settled",
+        "part_found#excluded": "excluded: {names}",
+        "part_found#open": "open: {names}",
+        "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
+        "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
+        "validation.another_arm": "They exclude {names}.",
+        "contradiction#more": (
+            "The references contradict each other about the {subject} ({stated}) and {more} more, which is not "
+            "counted against the model."
+        ),
+        "contradiction#one": (
+            "The references contradict each other about the {subject} ({stated}), which is not counted against the "
+            "model."
+        ),
+    }
+)
+
+
 @say.register
 def _(found: SelfCheck) -> str:
     return word(found.code, SELF_CHECKS, found.quantity)
@@ -48,12 +114,7 @@ def _(found: SelfCheck) -> str:
 
 @say.register
 def _(found: Confirmed) -> str:
-    text = sentence(
-        found.code,
-        "Independent documents settle every entry that moves the tool: {checks} ({grades} data).",
-        checks=counted_checks(found.counts),
-        grades=_grades(found.grades),
-    )
+    text = say_as(found, checks=counted_checks(found.counts), grades=_grades(found.grades))
     return joined([text, *_contradiction(found.contradiction), *_of_claims(found)], " ")
 
 
@@ -61,14 +122,13 @@ def counted_checks(counts: CheckCounts) -> str:
     """How many checks pass, by what they rest on: the one scheme of counts of all pages."""
     own, same = counts.independent, counts.consistency
     if not same.total:
-        text = N_("{passed} of {total} independent checks pass")
+        form = "independent"
     elif not own.total:
-        text = N_("{same_passed} of {same_total} consistency checks pass, and none is independent")
+        form = "consistency"
     else:
-        text = N_("{passed} of {total} independent and {same_passed} of {same_total} consistency checks pass")
+        form = "both"
     return sentence(
-        "counted_checks",
-        text,
+        f"counted_checks#{form}",
         passed=own.passed,
         total=own.total,
         same_passed=same.passed,
@@ -83,71 +143,42 @@ def _of_claims(found: JudgedTable) -> list[str]:
 @say.register
 def _(found: LeftOpen) -> str:
     parts = [say(part) for part in found.parts if part.status != "settled"]
-    told = [_what_speaks(found.counts), sentence(found.code, "{parts}.", parts=joined(parts)) if parts else ""]
+    told = [_what_speaks(found.counts), say_as(found, "parts", parts=joined(parts)) if parts else ""]
     if found.tolerance and any(part.settled for part in found.parts):
         told.append(
-            sentence(
-                found.code,
-                "Settled: what is left open moves the tool by less than {mm} mm and {deg} deg.",
-                mm=as_text(found.tolerance.mm, "g"),
-                deg=as_text(found.tolerance.deg, "g"),
-            )
+            say_as(found, "tolerance", mm=as_text(found.tolerance.mm, "g"), deg=as_text(found.tolerance.deg, "g"))
         )
     told += _how_far_off(found)
     if found.next_measurement:
-        told.append(
-            sentence(found.code, "Most useful measurement: {measurement}.", measurement=say(found.next_measurement))
-        )
+        told.append(say_as(found, "measurement"))
     return joined([*told, *_contradiction(found.contradiction), *_of_claims(found)], " ")
 
 
 def _how_far_off(found: LeftOpen) -> list[str]:
     told = []
     if found.off.moves:
-        up_to = N_("Open and weak entries could put the tool off by up to {mm:.0f} mm and {deg:.0f} deg.")
-        at_least = N_("Open and weak entries could put the tool off by {mm:.0f} mm and {deg:.0f} deg, or by more.")
-        text = at_least if found.at_least else up_to
-        told.append(sentence(found.code, text, mm=found.off.mm, deg=found.off.deg))
+        form = "at_least" if found.at_least else "up_to"
+        told.append(sentence(f"validation.left_open#{form}", mm=found.off.mm, deg=found.off.deg))
     if found.unbounded:
-        told.append(
-            sentence(
-                found.code,
-                "{count} entries that move the tool rest on their own source alone: if it is wrong, the error "
-                "has no bound.",
-                count=found.unbounded,
-            )
-        )
+        told.append(sentence("validation.left_open#unbounded", count=found.unbounded))
     return told
 
 
 def _what_speaks(counts: CheckCounts) -> str:
-    if not counts.independent.total:
-        text = N_("No independent document covers this table ({checks}).")
-    else:
-        text = N_("Nothing independent contradicts the table ({checks}), but:")
     checks = counted_checks(counts)
     if counts.independent.conflicting:
-        undecided = sentence(
-            "validation.left_open",
-            "{count} undecided, as documents contradict each other",
-            count=counts.independent.conflicting,
-        )
+        undecided = sentence("validation.left_open#conflicting", count=counts.independent.conflicting)
         checks = joined([checks, undecided], ", ")
-    return sentence("validation.left_open", text, checks=checks)
+    form = "uncontradicted" if counts.independent.total else "uncovered"
+    return sentence(f"validation.left_open#{form}", checks=checks)
 
 
 @say.register
 def _(found: PartFound) -> str:
     part, settled = word("part", PART_WORDS, found.part), found.settled
-    told = sentence(
-        found.code,
-        "{part}: {settled} of {entries} entries settled",
-        part=part,
-        settled=settled,
-        entries=found.entries,
-    )
-    excluded = sentence(found.code, "excluded: {names}", names=shortened(found.contradicted))
-    left = sentence(found.code, "open: {names}", names=shortened(found.open))
+    told = say_as(found, "settled", part=part, settled=settled)
+    excluded = say_as(found, "excluded", names=shortened(found.contradicted))
+    left = say_as(found, "open", names=shortened(found.open))
     parts = [told, excluded if found.contradicted else "", left if found.open else ""]
     return joined(parts, ", ")
 
@@ -167,39 +198,29 @@ def _contradiction(found: Contradiction | None) -> list[str]:
 
 @say.register
 def _(found: NothingToCompare) -> str:
-    text = sentence(found.code, "There is no official, CAD or exported data to compare this model with.")
+    text = say_as(found)
     return joined([text, *_of_claims(found)], " ")
 
 
 @say.register
 def _(found: ModelUnsound) -> str:
     value = _value(found.measured, found.unit)
-    return sentence(
-        found.code, "The model fails its internal checks: {check} {value}.", check=say(found.check), value=value
-    )
+    return say_as(found, value=value)
 
 
 @say.register
 def _(found: Contradicted) -> str:
-    text = N_(
-        "The model contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}; {checks}."
+    return joined(
+        [_missed(found, "contradicted"), say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " "
     )
-    return joined([_missed(found, text), say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " ")
 
 
 @say.register
 def _(found: AnotherArm) -> str:
-    if found.described:
-        text = N_("Against the {grades} data in {own_set} the {quantity} is {measured}, not {expected}; {checks}.")
-    else:
-        text = N_(
-            "This is not the arm that the {grades} data in {own_set} describe: the {quantity} is {measured}, not "
-            "{expected}; {checks}."
-        )
-    excluded = sentence(found.code, "They exclude {names}.", names=shortened(found.contradicted))
+    excluded = say_as(found, names=shortened(found.contradicted))
     told = [
         say(found.described) if found.described else "",
-        _missed(found, text),
+        _missed(found, "described" if found.described else "another_arm"),
         excluded if found.contradicted else "",
         *_of_claims(found),
     ]
@@ -207,43 +228,17 @@ def _(found: AnotherArm) -> str:
 
 
 @say.register
-def _(found: Claims) -> str:
-    return counted(
-        found.code,
-        "Of the {claims} claims in {own_set}, {count} doesn't hold.",
-        "Of the {claims} claims in {own_set}, {count} don't hold.",
-        found.failed,
-        claims=found.claims,
-        own_set=found.reference_set,
-    )
-
-
-@say.register
 def _(found: Contradiction) -> str:
     values = [_value(value, found.unit) for value in found.stated]
-    stated = _chained(N_("{value} or {values}"), values)
+    stated = _chained("or", values)
     if not found.more:
-        return sentence(
-            found.code,
-            "The references contradict each other about the {quantity} ({stated}), which is not counted against the "
-            "model.",
-            quantity=say(found.subject),
-            stated=stated,
-        )
-    return sentence(
-        found.code,
-        "The references contradict each other about the {quantity} ({stated}) and {more} more, which is not counted "
-        "against the model.",
-        quantity=say(found.subject),
-        stated=stated,
-        more=found.more,
-    )
+        return say_as(found, "one", stated=stated)
+    return say_as(found, "more", stated=stated)
 
 
-def _missed(found: Contradicted | AnotherArm, template: str) -> str:
+def _missed(found: Contradicted | AnotherArm, form: str) -> str:
     return sentence(
-        found.code,
-        template,
+        f"validation.missed#{form}",
         grades=_grades(found.grades),
         own_set=found.reference_set,
         checks=counted_checks(found.counts),
@@ -254,14 +249,14 @@ def _missed(found: Contradicted | AnotherArm, template: str) -> str:
 
 
 def _grades(grades: Sequence[Grade]) -> str:
-    return _chained(N_("{value} and {values}"), [word("data", GRADES, grade) for grade in grades])
+    return _chained("and", [word("data", GRADES, grade) for grade in grades])
 
 
-def _chained(pair: str, words: Sequence[str]) -> str:
-    """Words as one text, by a template for a ``{value}`` and the ``{values}`` after it."""
+def _chained(link: str, words: Sequence[str]) -> str:
+    """Words as one text, with "and" or "or" between each two."""
     if len(words) == 1:
         return words[0]
-    return sentence("chain", pair, value=words[0], values=_chained(pair, words[1:]))
+    return sentence(f"chain#{link}", value=words[0], values=_chained(link, words[1:]))
 
 
 def _value(value: float, unit: str) -> str:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from er3a.pipeline.messages import workspace_verdict as _verdict  # noqa: F401
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import say, sentence
-from er3a.pipeline.stages.workspace.model import CapabilityMissing, PlacementTooLong, ToolPointsElsewhere
-from er3a.workspace.tool_inverse import InverseUnknown, JointOneShared, OrientationsUnknown
+from er3a.pipeline.messages.say import Plural, say, say_as, texts
+from er3a.pipeline.stages.workspace.model import CapabilityMissing, ToolPointsElsewhere
 
 FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
@@ -27,51 +26,46 @@ SWEEPS = {"joint_2": N_("joint 2"), "joint_3": N_("joint 3"), "wrist": N_("wrist
 POINTS = {"tool_point": N_("tool point"), "wrist_centre": N_("wrist centre"), "flange": N_("flange")}
 
 
+TEXTS = texts(
+    {
+        "workspace.pockets": Plural("count", "{count} open pocket", "{count} open pockets"),
+        "workspace.voids": Plural("count", "{count} enclosed void", "{count} enclosed voids"),
+        "workspace.rule": Plural(
+            "count",
+            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: "
+            "{count} enclosed void lies away from the shoulder. Relaxing one limit at a time names joint 2 or 3 "
+            "in {named} of {count} cases.",
+            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: "
+            "{count} enclosed voids lie away from the shoulder. Relaxing one limit at a time names joint 2 or 3 "
+            "in {named} of {count} cases.",
+        ),
+        "inverse_unknown": "no method here finds all inverse solutions of this arm",
+        "joint_one_shared": (
+            "joint 1 is coupled with other joints or limited together with them, so that what holds at one azimuth "
+            "does not follow from another"
+        ),
+        "orientations_unknown": (
+            "with its {joints} joints the arm takes only few orientations at each point, and which these are is not "
+            "known for its kind"
+        ),
+        "workspace.placement_too_long": (
+            "Not computed: a pose takes milliseconds with this arm, and within seconds only points wider apart than "
+            "the box could be asked. A larger box or a narrower cone may do."
+        ),
+        "workspace.tool_points_elsewhere": (
+            "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
+            "cone."
+        ),
+    }
+)
+
+
 @say.register
 def _(found: CapabilityMissing) -> str:
     return say(found.lacks)
 
 
 @say.register
-def _(found: InverseUnknown) -> str:
-    return sentence(found.code, "no method here finds all inverse solutions of this arm")
-
-
-@say.register
-def _(found: JointOneShared) -> str:
-    return sentence(
-        found.code,
-        "joint 1 is coupled with other joints or limited together with them, so that what holds at one azimuth does "
-        "not follow from another",
-    )
-
-
-@say.register
-def _(found: OrientationsUnknown) -> str:
-    return sentence(
-        found.code,
-        "with its {joints} joints the arm takes only few orientations at each point, and which these are is not known "
-        "for its kind",
-        joints=found.joints,
-    )
-
-
-@say.register
 def _(found: ToolPointsElsewhere) -> str:
     x, y, z = found.direction
-    return sentence(
-        found.code,
-        "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the cone.",
-        x=x,
-        y=y,
-        z=z,
-    )
-
-
-@say.register
-def _(found: PlacementTooLong) -> str:
-    return sentence(
-        found.code,
-        "Not computed: a pose takes milliseconds with this arm, and within seconds only points wider apart than the "
-        "box could be asked. A larger box or a narrower cone may do.",
-    )
+    return say_as(found, x=x, y=y, z=z)

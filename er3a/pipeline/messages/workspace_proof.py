@@ -4,46 +4,59 @@ from __future__ import annotations
 
 from er3a.pipeline.messages import kinematics as _kinematics  # noqa: F401 (says what an arm lacks)
 from er3a.pipeline.messages.language import as_text
-from er3a.pipeline.messages.say import joined, say, sentence
+from er3a.pipeline.messages.say import joined, say, say_as, sentence, texts
 from er3a.workspace.causes import (
     Disappears,
     Geometry,
-    OnlySampled,
     Relaxed,
     SeveralLimits,
     VoidCause,
 )
-from er3a.workspace.proven import BoundsFarApart, GeneralMethod, SphericalWrist, ToolNearWrist
+
+TEXTS = texts(
+    {
+        "void_only_sampled": "unknown: known from samples only",
+        "spherical_wrist": "spherical wrist",
+        "general_method": "general method, because {lacks}",
+        "tool_near_wrist": "its tool point is only {distance_mm:.3g} mm from the wrist centre",
+        "bounds_far_apart": "the method for spherical wrists leaves {percent:.3g} % between its bounds",
+        "void_disappears#one": "disappears if {extended}",
+        "void_disappears#two": "disappears if {first} or if {second}",
+        "void_of_several_limits#only": "made by several limits together",
+        "void_of_several_limits#together": "only several limits together make it",
+        "void_of_geometry": "geometry: {percent:.0f} % of it stays without any joint limit",
+        "void_shrinks": "shrinks by {percent:.0f} % if {extended}",
+        "limit_extended#lower_deg": "joint {joint}'s lower limit is extended to {limit} deg",
+        "limit_extended#lower_mm": "joint {joint}'s lower limit is extended to {limit} mm",
+        "limit_extended#upper_deg": "joint {joint}'s upper limit is extended to {limit} deg",
+        "limit_extended#upper_mm": "joint {joint}'s upper limit is extended to {limit} mm",
+        "limit_extended#sum_lower_deg": "the lower limit of {sum} is extended to {limit} deg",
+        "limit_extended#sum_lower_mm": "the lower limit of {sum} is extended to {limit} mm",
+        "limit_extended#sum_upper_deg": "the upper limit of {sum} is extended to {limit} deg",
+        "limit_extended#sum_upper_mm": "the upper limit of {sum} is extended to {limit} mm",
+    }
+)
 
 
 @say.register
 def _(found: Disappears) -> str:
     first, *others = (_extended(limit) for limit in found.limits)
     if others:
-        return sentence(found.code, "disappears if {first} or if {second}", first=first, second=others[0])
-    return sentence(found.code, "disappears if {extended}", extended=first)
+        return say_as(found, "two", first=first, second=others[0])
+    return say_as(found, "one", extended=first)
 
 
 @say.register
 def _(found: SeveralLimits) -> str:
     if found.most is None:
-        return sentence(found.code, "made by several limits together")
-    return joined([_shrinks(found.most), sentence(found.code, "only several limits together make it")])
+        return say_as(found, "only")
+    return joined([_shrinks(found.most), say_as(found, "together")])
 
 
 @say.register
 def _(found: Geometry) -> str:
-    left = sentence(
-        found.code,
-        "geometry: {percent:.0f} % of it stays without any joint limit",
-        percent=100 * found.remaining_ratio,
-    )
+    left = say_as(found, percent=100 * found.remaining_ratio)
     return joined([left, _shrinks(found.most) if found.most else ""])
-
-
-@say.register
-def _(found: OnlySampled) -> str:
-    return sentence(found.code, "unknown: known from samples only")
 
 
 def is_predicate(cause: VoidCause) -> bool:
@@ -52,12 +65,7 @@ def is_predicate(cause: VoidCause) -> bool:
 
 
 def _shrinks(limit: Relaxed) -> str:
-    return sentence(
-        "void_shrinks",
-        "shrinks by {percent:.0f} % if {extended}",
-        percent=100 * limit.filled,
-        extended=_extended(limit),
-    )
+    return sentence("void_shrinks", percent=100 * limit.filled, extended=_extended(limit))
 
 
 def _extended(limit: Relaxed) -> str:
@@ -71,42 +79,18 @@ def _extended(limit: Relaxed) -> str:
 def _joint_extended(limit: Relaxed, shown: dict[str, int | str]) -> str:
     if limit.unit == "mm":
         if limit.side == "upper":
-            return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} mm", **shown)
-        return sentence("limit_extended", "joint {joint}'s lower limit is extended to {limit} mm", **shown)
+            return sentence("limit_extended#upper_mm", **shown)
+        return sentence("limit_extended#lower_mm", **shown)
     if limit.side == "upper":
-        return sentence("limit_extended", "joint {joint}'s upper limit is extended to {limit} deg", **shown)
-    return sentence("limit_extended", "joint {joint}'s lower limit is extended to {limit} deg", **shown)
+        return sentence("limit_extended#upper_deg", **shown)
+    return sentence("limit_extended#lower_deg", **shown)
 
 
 def _sum_extended(limit: Relaxed, shown: dict[str, int | str]) -> str:
     if limit.unit == "mm":
         if limit.side == "upper":
-            return sentence("limit_extended", "the upper limit of {sum} is extended to {limit} mm", **shown)
-        return sentence("limit_extended", "the lower limit of {sum} is extended to {limit} mm", **shown)
+            return sentence("limit_extended#sum_upper_mm", **shown)
+        return sentence("limit_extended#sum_lower_mm", **shown)
     if limit.side == "upper":
-        return sentence("limit_extended", "the upper limit of {sum} is extended to {limit} deg", **shown)
-    return sentence("limit_extended", "the lower limit of {sum} is extended to {limit} deg", **shown)
-
-
-@say.register
-def _(found: SphericalWrist) -> str:
-    return sentence(found.code, "spherical wrist")
-
-
-@say.register
-def _(found: GeneralMethod) -> str:
-    return sentence(found.code, "general method, because {lacks}", lacks=say(found.lacks))
-
-
-@say.register
-def _(found: ToolNearWrist) -> str:
-    return sentence(
-        found.code, "its tool point is only {distance:.3g} mm from the wrist centre", distance=found.distance_mm
-    )
-
-
-@say.register
-def _(found: BoundsFarApart) -> str:
-    return sentence(
-        found.code, "the method for spherical wrists leaves {percent:.3g} % between its bounds", percent=found.percent
-    )
+        return sentence("limit_extended#sum_upper_deg", **shown)
+    return sentence("limit_extended#sum_lower_deg", **shown)

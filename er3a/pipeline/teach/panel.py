@@ -22,7 +22,7 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
-from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_verdict
+from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_status
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.teach.scripts import import_map
@@ -261,7 +261,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     robot = study.robot(name)
     validated = results / name / "validation"
-    told_first = caveat(read_verdict(validated)[0] if (validated / SUMMARY).exists() else "not_computed")
+    told_first = caveat(read_status(validated) if (validated / SUMMARY).exists() else "not_computed")
     settings = study.section(TrajectorySettings)
     near = {
         "wrist": np.radians(settings.near_wrist_deg),

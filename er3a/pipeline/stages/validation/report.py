@@ -14,7 +14,7 @@ from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_tra
 from er3a.pipeline.messages.decision import decision
 from er3a.pipeline.messages.evidence import CHECK_KINDS
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import counted, joined, say, sentence, word
+from er3a.pipeline.messages.say import joined, say, sentence, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
 from er3a.pipeline.messages.validation_verdict import counted_checks
 from er3a.pipeline.results import Stored
@@ -116,7 +116,7 @@ def check_row(check: Judged) -> list[str]:
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
     if isinstance(check, ReferenceCheck):
         grade = word("grade", GRADE_NAMES, check.grade)
-        source = sentence("graded", "{own_source} ({grade})", own_source=check.source, grade=grade)
+        source = sentence("graded", own_source=check.source, grade=grade)
     else:
         source = tr("the model itself")
     return [say(check.subject), *values, f"{check.tolerance:g}", check.unit, source]
@@ -465,13 +465,7 @@ def _drawing_picture(section: Section, labels: KeyPoses, summary: ValidationSumm
             worst=worst,
         )
         if not missed
-        else counted(
-            "labels_missed",
-            "{count} label is missed, by up to {worst} mm.",
-            "{count} labels are missed, by up to {worst} mm.",
-            len(missed),
-            worst=worst,
-        )
+        else sentence("labels_missed", count=len(missed), worst=worst)
     )
     alt = tr("Region that the wrist centre sweeps with joints 2 and 3, and the drawing's labels, numbered.")
     return Picture(workspace_drawing(section, labels, summary.section_origin_mm), alt, caption)
