@@ -193,9 +193,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     """
     record = _record(folder)
     rests_on: dict[str, Status] = {
-        name: read_status(folder.parent / name)
-        for name in stage.rests_on
-        if is_computed(folder.parent / name)
+        name: read_status(folder.parent / name) for name in stage.rests_on if is_computed(folder.parent / name)
     }
     if record["verdict"]["status"] == "not_computed":
         absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))

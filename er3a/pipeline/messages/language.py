@@ -1,7 +1,7 @@
 """Texts in the reader's language, through gettext catalogues.
 
 What a page says itself is written in English where it stands and goes through :func:`tr`; what was found is a finding,
-of which :mod:`er3a.pipeline.messages.say` makes a text. Catalogues hold the former by its English text and the latter by
+of which :mod:`er3a.pipeline.messages.say` makes a text. Catalogues hold the former by the English text, the latter by
 its key.
 """
 

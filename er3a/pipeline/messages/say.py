@@ -88,6 +88,12 @@ TEXTS = texts(
 )
 
 
+def english(key: str) -> tuple[str, ...]:
+    """The English forms of a text by its key."""
+    text = _texts[key]
+    return (text.one, text.many) if isinstance(text, Plural) else (text,)
+
+
 @singledispatch
 def say(finding: Any) -> str:
     """A finding as a text in the language in use, by its code; functions for types are registered with it."""

@@ -1,16 +1,18 @@
-"""What the trajectory page and recording say of paths, beside the verdict."""
+"""The verdict of the trajectory stage, and what its page and recording say of paths."""
 
 from __future__ import annotations
 
-import er3a.pipeline.messages.pairs  # noqa: F401
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.kinematics.singularity import EventType
+from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
-from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
     Jump,
+    PathCounts,
     PathKind,
     PathSummary,
     Singularity,
@@ -18,7 +20,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.planning.avoidance.avoidance_findings import StrategyName
-from er3a.planning.intervals import JerkTooGreat, RateCause
+from er3a.planning.intervals import JerkTooGreat, PathVerdict, RateCause
 
 FIGURES = {
     "safe": N_("Safe paths"),
@@ -59,6 +61,9 @@ PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
 TEXTS = texts(
     {
+        "trajectory.paths": Plural("count", "{safe} of {count} path is safe", "{safe} of {count} paths are safe"),
+        "trajectory.not_followed": "{count} not followed to the end ({names})",
+        "trajectory.fault": "{count} {word} ({names})",
         "dependent_axes": "axes {axes} dependent",
         "smallest_singular_value": "smallest singular value {value:.3g}",
         "path.safe": "far from singular poses, within limits and reach",
@@ -107,6 +112,31 @@ TEXTS = texts(
         "advice.time#more": "it takes {longer:.2f} s more than programmed",
     }
 )
+
+
+@say.register
+def _(found: PathCounts) -> str:
+    unsafe: dict[PathVerdict, tuple[str, ...]] = {
+        "unreachable": found.unreachable,
+        "none found": found.none_found,
+        "leaves limits": found.leaves_limits,
+        "collides": found.collides,
+        "too fast": found.too_fast,
+        "singular": found.singular,
+        "too fast for the assumed limits": found.too_fast_if_assumed,
+        "undecided": found.undecided,
+        "near-singular": found.near_singular,
+    }
+    faults = []
+    for verdict, names in unsafe.items():
+        parts = {"count": len(names), "word": outcome_word(verdict), "names": ", ".join(names)}
+        faults.append(sentence("trajectory.fault", **parts) if names else "")
+    safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
+    if found.not_followed:
+        parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
+        faults.append(sentence("trajectory.not_followed", **parts))
+    told = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
+    return sentence("finding", finding=joined(told))
 
 
 def kind_word(kind: PathKind) -> str:

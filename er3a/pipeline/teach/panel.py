@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-import er3a.pipeline.messages.pairs  # noqa: F401
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.scene import Scene
@@ -17,9 +17,9 @@ from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import characteristic_length
 from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
 from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_status

@@ -23,9 +23,8 @@ from er3a.errors import ResultError
 from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.foundations import Caveat, caveat
-from er3a.pipeline.messages.glossary import glossary
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.pages import Caveat, caveat, glossary
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import AbsentResults, Provenance, Stored, read_status
 from er3a.pipeline.stages.registry import STAGES

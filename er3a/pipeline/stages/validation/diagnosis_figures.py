@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
-from er3a.pipeline.messages.calibration import level
-from er3a.pipeline.messages.diagnosis import both
+from er3a.pipeline.messages.diagnosis import both, level
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.stages.validation.model import (

@@ -11,12 +11,11 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
-from er3a.pipeline.messages.decision import decision
-from er3a.pipeline.messages.evidence import CHECK_KINDS
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.pages import decision
+from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
-from er3a.pipeline.messages.validation_verdict import counted_checks
+from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.diagnosis_figures import (
     corrected_robot,
