@@ -172,16 +172,16 @@ def _(found: NoLimits) -> str:
 def _(found: Compared) -> str:
     tightest = use_text(found.tightest)
     if isinstance(found, AllWithin):
-        told = sentence("dynamics.fits", use=tightest)
+        verdict = sentence("dynamics.fits", use=tightest)
     elif isinstance(found, Marginal):
-        told = sentence("dynamics.marginal", use=tightest)
+        verdict = sentence("dynamics.marginal", use=tightest)
     else:
-        told = sentence("dynamics.overload", count=found.compared, beyond=found.beyond, use=tightest)
+        verdict = sentence("dynamics.overload", count=found.compared, beyond=found.beyond, use=tightest)
     open_ = ""
     if found.unlimited:
         what = joined(map(need_word, found.unlimited), ", ")
         open_ = sentence("dynamics.unlimited", what=what)
-    return joined([told, open_, *_reservations(found)], " ")
+    return joined([verdict, open_, *_reservations(found)], " ")
 
 
 def _reservations(found: Compared | NoLimits) -> list[str]:

@@ -147,8 +147,8 @@ def _(found: SomeUnsolved) -> str:
 
 
 def _and_demonstrations(text: str, shown: tuple[Demonstration, ...]) -> str:
-    told = demonstrated(shown)
-    return joined([text, sentence("finding", finding=told) if told else ""], " ")
+    expected = demonstrated(shown)
+    return joined([text, sentence("finding", finding=expected) if expected else ""], " ")
 
 
 def _where(collisions: bool) -> str:

@@ -69,7 +69,7 @@ GLOSSARY = {
 
 def of_study() -> str:
     """The report's first page."""
-    told = (
+    sentences = (
         tr("Evidence on kinematic models of robots: can each table be trusted, and what can the arm do?"),
         tr(
             "Start with the index: verdicts and key figures of every robot and stage. Each robot has a page for"
@@ -81,7 +81,7 @@ def of_study() -> str:
             "its inputs and the command that reproduces it."
         ),
     )
-    return "\n\n".join(told)
+    return "\n\n".join(sentences)
 
 
 def of_stage(robot: str, question: str) -> str:

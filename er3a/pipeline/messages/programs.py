@@ -293,8 +293,8 @@ def _(found: ProgramCounts) -> str:
         others.append(sentence("programs.fault", **parts) if names else "")
     missed = ", ".join(found.not_examined)
     open_parts = sentence("programs.not_examined", names=missed) if missed else ""
-    told = [passed if found.programs else "", joined(others, ", "), open_parts, demonstrated(found.demonstrations)]
-    return sentence("finding", finding=joined(told))
+    sentences = [passed if found.programs else "", joined(others, ", "), open_parts, demonstrated(found.demonstrations)]
+    return sentence("finding", finding=joined(sentences))
 
 
 def level_word(level: Level) -> str:
@@ -452,9 +452,11 @@ def _slower(share: float) -> str:
 
 def remedies(findings: Iterable[CheckFinding]) -> list[str]:
     """What to do about findings at one line, each thing once; of speeds the lowest."""
-    told = list(findings)
-    slowest = min((each for each in told if isinstance(each, TooFast | FasterThanAssumed)), key=_allowed, default=None)
-    kept = [each for each in told if not isinstance(each, TooFast | FasterThanAssumed) or each is slowest]
+    checked = list(findings)
+    slowest = min(
+        (each for each in checked if isinstance(each, TooFast | FasterThanAssumed)), key=_allowed, default=None
+    )
+    kept = [each for each in checked if not isinstance(each, TooFast | FasterThanAssumed) or each is slowest]
     return list(dict.fromkeys(text for each in kept if (text := remedy(each))))
 
 

@@ -135,8 +135,8 @@ def _(found: PathCounts) -> str:
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
         faults.append(sentence("trajectory.not_followed", **parts))
-    told = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
-    return sentence("finding", finding=joined(told))
+    sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
+    return sentence("finding", finding=joined(sentences))
 
 
 def kind_word(kind: PathKind) -> str:
@@ -271,10 +271,10 @@ def _(found: BodiesOverlap) -> str:
 
 def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-arg]
     """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
-    told = say(part.cause)
+    cause = say(part.cause)
     if part in path.undecided and path.verdict != "undecided":
-        return sentence("path.either_way", open=told)
-    return told
+        return sentence("path.either_way", open=cause)
+    return cause
 
 
 def advice(path: PathSummary) -> str | None:

@@ -183,25 +183,25 @@ def _of_claims(found: JudgedTable) -> list[str]:
 @say.register
 def _(found: LeftOpen) -> str:
     parts = [say(part) for part in found.parts if part.status != "settled"]
-    told = [_what_speaks(found.counts), say_as(found, "parts", parts=joined(parts)) if parts else ""]
+    sentences = [_what_speaks(found.counts), say_as(found, "parts", parts=joined(parts)) if parts else ""]
     if found.tolerance and any(part.settled for part in found.parts):
-        told.append(
+        sentences.append(
             say_as(found, "tolerance", mm=as_text(found.tolerance.mm, "g"), deg=as_text(found.tolerance.deg, "g"))
         )
-    told += _how_far_off(found)
+    sentences += _how_far_off(found)
     if found.next_measurement:
-        told.append(say_as(found, "measurement"))
-    return joined([*told, *_contradiction(found.contradiction), *_of_claims(found)], " ")
+        sentences.append(say_as(found, "measurement"))
+    return joined([*sentences, *_contradiction(found.contradiction), *_of_claims(found)], " ")
 
 
 def _how_far_off(found: LeftOpen) -> list[str]:
-    told = []
+    sentences = []
     if found.off.moves:
         form = "at_least" if found.at_least else "up_to"
-        told.append(sentence(f"validation.left_open#{form}", mm=found.off.mm, deg=found.off.deg))
+        sentences.append(sentence(f"validation.left_open#{form}", mm=found.off.mm, deg=found.off.deg))
     if found.unbounded:
-        told.append(sentence("validation.left_open#unbounded", count=found.unbounded))
-    return told
+        sentences.append(sentence("validation.left_open#unbounded", count=found.unbounded))
+    return sentences
 
 
 def _what_speaks(counts: CheckCounts) -> str:
@@ -216,10 +216,10 @@ def _what_speaks(counts: CheckCounts) -> str:
 @say.register
 def _(found: PartFound) -> str:
     part, settled = word("part", PART_WORDS, found.part), found.settled
-    told = say_as(found, "settled", part=part, settled=settled)
+    counts = say_as(found, "settled", part=part, settled=settled)
     excluded = say_as(found, "excluded", names=shortened(found.contradicted))
     left = say_as(found, "open", names=shortened(found.open))
-    parts = [told, excluded if found.contradicted else "", left if found.open else ""]
+    parts = [counts, excluded if found.contradicted else "", left if found.open else ""]
     return joined(parts, ", ")
 
 
@@ -258,13 +258,13 @@ def _(found: Contradicted) -> str:
 @say.register
 def _(found: AnotherArm) -> str:
     excluded = say_as(found, names=shortened(found.contradicted))
-    told = [
+    sentences = [
         say(found.described) if found.described else "",
         _missed(found, "described" if found.described else "another_arm"),
         excluded if found.contradicted else "",
         *_of_claims(found),
     ]
-    return joined(told, " ")
+    return joined(sentences, " ")
 
 
 @say.register

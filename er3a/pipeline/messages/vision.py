@@ -229,7 +229,7 @@ def _(found: GraspCounts) -> str:
     error = say_as(found, "error") if found.point_mm is not None else ""
     unsure = say_as(found, "uncertain") if found.unsure else ""
     left = say_as(found, "left_out") if found.left_out else ""
-    told = [
+    sentences = [
         grasped if found.objects else "",
         error,
         *listed(found.missed),
@@ -237,7 +237,7 @@ def _(found: GraspCounts) -> str:
         left,
         demonstrated(found.demonstrations),
     ]
-    return sentence("finding", finding=joined(told))
+    return sentence("finding", finding=joined(sentences))
 
 
 @say.register
