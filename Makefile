@@ -55,7 +55,7 @@ words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeli
 	$(BIN)/pybabel -q extract -F $(LOCALE)/babel.cfg --no-default-keywords -k tr -k N_ -k _ -k gettext -k ngettext:1,2 \
 		-k pgettext:1c,2 -k npgettext:1c,2,3 --add-location=file --sort-by-file --omit-header --no-wrap \
 		-o $(LOCALE)/er3a.pot .
-	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) -l zh --no-fuzzy-matching --no-wrap \
+	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) -l zh --no-wrap \
 		--ignore-obsolete --ignore-pot-creation-date
 	rm $(LOCALE)/er3a.pot
 

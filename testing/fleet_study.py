@@ -120,7 +120,7 @@ def small_study(robot_file: Path, folder: Path) -> tuple[dict[str, str], list[st
             verdict = json.loads((results / "summary.json").read_text(encoding="utf-8"))["verdict"]
             verdicts[stage.name] = verdict["status"]
             if verdict["status"] == "not_computed" and verdict["code"] == NotComputed.code:
-                broken.append(f"{stage.name}: {verdict['text'][:100]}")
+                broken.append(f"{stage.name}: {verdict['params']['reason'][:100]}")
             if "report" in stage.views:
                 try:
                     with house_style():

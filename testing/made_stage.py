@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.messages.say import say, sentence
+from er3a.pipeline.messages.say import texts
 from er3a.pipeline.results import Figure, Results, Summary, Verdict, write_results
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
@@ -36,14 +36,7 @@ class Solid:
     code: Literal["made.solid"] = "made.solid"
 
 
-@say.register
-def _(found: Hollow) -> str:
-    return sentence(found.code, "A hollow (空洞) of {volume:.2f} m³.", volume=found.volume_m3)
-
-
-@say.register
-def _(found: Solid) -> str:
-    return sentence(found.code, "All is solid.")
+TEXTS = texts({"made.hollow": "A hollow (空洞) of {volume_m3:.2f} m³.", "made.solid": "All is solid."})
 
 
 @dataclass(frozen=True)
@@ -101,5 +94,5 @@ SUMMARY = MadeSummary(
 
 def write(folder: Path, study: Study, summary: MadeSummary = SUMMARY, rows: Rows = ROWS) -> Path:
     """Write results of the stage into a folder, and return the path of their summary."""
-    write_results(folder, study, ROBOT, STAGE, MadeResults(summary, rows), say)
+    write_results(folder, study, ROBOT, STAGE, MadeResults(summary, rows))
     return folder / "summary.json"

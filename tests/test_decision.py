@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from er3a.pipeline.messages.decision import decision
+from er3a.pipeline.messages.pages import decision
 from er3a.pipeline.viewing.page import LED, led
 
 

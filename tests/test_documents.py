@@ -27,7 +27,7 @@ from er3a.files.program_file import ProgramsFile
 from er3a.files.robot_file import RobotFile
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.glossary import GLOSSARY
+from er3a.pipeline.messages.pages import GLOSSARY
 from er3a.pipeline.study import Study
 from testing.documents import PAGES, ROOT, blocks, commands, name_of, prose
 from testing.evidence import CAMPAIGNS

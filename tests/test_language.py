@@ -7,16 +7,16 @@ import gettext
 import pytest
 
 from er3a.pipeline.messages import language
+from er3a.pipeline.messages import say as say_module
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import counted, joined, sentence, word
+from er3a.pipeline.messages.say import Plural, joined, sentence, texts, word
 
 GERMAN = {
-    "the {joint} is {angle:.1f} deg off": "{angle} deg daneben: {joint}",
+    "off": "{angle} deg daneben: {joint}",
     "elbow": "Ellbogen",
-    "{first}; {rest}": "{first} | {rest}",
+    "joined#; ": "{first} | {rest}",
     "{count} faults": "{count} Fehler",
-    "{count} fault of {size:.2f} mm": "{count} Fehler von {size} mm",
-    "{count} faults of {size:.2f} mm": "{count} Fehler von {size} mm",
+    "f": "{count} Fehler von {size} mm",
 }
 
 
@@ -27,19 +27,35 @@ class German(gettext.NullTranslations):
     def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
         return GERMAN[msgid1 if n == 1 else msgid2]
 
+    def pgettext(self, context: str, message: str) -> str:
+        return self.gettext(message)
+
+    def npgettext(self, context: str, msgid1: str, msgid2: str, n: int) -> str:
+        return self.ngettext(msgid1, msgid2, n)
+
 
 @pytest.fixture
 def german(monkeypatch):
     monkeypatch.setattr(language, "_catalogue", German())
 
 
-def test_a_translation_is_filled_in_with_the_formats_of_the_english_text(german):
-    off = sentence("off", "the {joint} is {angle:.1f} deg off", joint=word("joint", {"j3": "elbow"}, "j3"), angle=2.04)
+@pytest.fixture
+def made(monkeypatch):
+    monkeypatch.setattr(say_module, "_texts", dict(say_module._texts))
+    texts(
+        {
+            "off": "the {joint} is {angle:.1f} deg off",
+            "f": Plural("count", "{count} fault of {size:.2f} mm", "{count} faults of {size:.2f} mm"),
+        }
+    )
+
+
+def test_a_translation_is_filled_in_with_the_formats_of_the_english_text(german, made):
+    off = sentence("off", joint=word("joint", {"j3": "elbow"}, "j3"), angle=2.04)
     assert off == "2.0 deg daneben: Ellbogen"
     assert joined([off, "", "x"]) == "2.0 deg daneben: Ellbogen | x"
     for count in (1, 2):
-        text = counted("f", "{count} fault of {size:.2f} mm", "{count} faults of {size:.2f} mm", count, size=0.5)
-        assert text == f"{count} Fehler von 0.50 mm"
+        assert sentence("f", count=count, size=0.5) == f"{count} Fehler von 0.50 mm"
 
 
 def test_parts_are_no_words(german):

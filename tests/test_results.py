@@ -58,7 +58,6 @@ def test_shape_of_a_summary(tmp_path, study):
         "status": "fail",
         "code": "made.hollow",
         "params": {"volume_m3": 0.25},
-        "text": "A hollow (空洞) of 0.25 m³.",
     }
     assert summary["figures"][1] == {"name": "reach", "value": None, "unit": "mm", "uncertainty": None, "of": None}
     assert summary["provenance"] == {
@@ -77,7 +76,7 @@ def test_shape_of_a_summary(tmp_path, study):
                 ("data/scenes/table_and_post.yaml", {}),
             )
         ],
-        "code": code_digest(f"{STAGE.package}.compute", STAGE.verdict_messages),
+        "code": code_digest(f"{STAGE.package}.compute"),
         "config": study.settings("er3_600", "capability") | study.settings("er3_600", "workspace"),
         "seed": study.seed,
     }
@@ -98,7 +97,7 @@ def test_results_come_back_as_written(tmp_path, study):
 
 def test_a_stage_that_was_not_computed_has_a_reason_and_empty_tables(tmp_path, study):
     absent = AbsentResults(Summary(Verdict("not_computed", NotComputed("no wrist")), ()))
-    write_results(tmp_path, study, "er3_600", STAGE, absent, lambda found: f"Not computed: {found.reason}")
+    write_results(tmp_path, study, "er3_600", STAGE, absent)
     stored = read_stage(tmp_path, STAGE)
     assert isinstance(stored.results, AbsentResults)
     assert stored.results.summary.verdict == Verdict("not_computed", NotComputed("no wrist"))
@@ -118,7 +117,7 @@ def test_equal_inputs_give_equal_bytes(tmp_path, study):
     assert write(tmp_path / "b", study).read_bytes() == first
     assert str(ROOT).encode() not in first
     assert first.decode().endswith("}\n")
-    assert "空洞".encode() in first
+    assert "m³".encode() in first
     assert (tmp_path / "a/rows.parquet").read_bytes() == (tmp_path / "b/rows.parquet").read_bytes()
 
 

@@ -46,17 +46,17 @@ def summary_schema(stage: Stage) -> dict[str, Any]:
 
 
 def _verdict_schema(stored: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """A verdict as it stands in the file: status, code, params and text."""
+    """A verdict as it stands in the file: status, code and params."""
     finding = stored["properties"]["finding"]
     references = [part["$ref"] for part in finding.get("anyOf", [finding])]
     cases = []
     for reference in references:
         found = definitions[reference.rpartition("/")[2]]
         cases.append({"properties": {"code": found["properties"]["code"], "params": {"$ref": reference}}})
-    properties = {"status": stored["properties"]["status"], "text": {"type": "string"}}
+    properties = {"status": stored["properties"]["status"]}
     return {
         "type": "object",
-        "required": ["status", "code", "params", "text"],
+        "required": ["status", "code", "params"],
         "properties": properties,
         "oneOf": cases,
     }

@@ -118,7 +118,7 @@ def _load_libraries() -> None:
     from er3a.pipeline.stages.registry import STAGES
 
     for stage in STAGES.values():
-        import_module(stage.verdict_messages)
+        import_module(stage.messages)
         for verb in ("compute", "report"):
             with suppress(ImportError):  # the job that needs it says so
                 stage.module(verb)

@@ -23,8 +23,7 @@ from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
 from er3a.pipeline.messages.language import as_text
-from er3a.pipeline.messages.program_check import say
-from er3a.pipeline.messages.program_remedies import remedy
+from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.results import plain
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured
 from er3a.pipeline.stages.trajectory.motion import listed_motions

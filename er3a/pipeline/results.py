@@ -12,14 +12,14 @@ A stage's ``model.py`` declares a summary and its results::
         points: Points  # a Table, written as points.parquet
 
 ``compute`` returns the results, views take what :func:`read_results` reads. The summary's verdict is a finding with a
-status; in the file it is ``{status, code, params, text}``, the text in English for whoever reads the file alone.
+status; in the file it is ``{status, code, params}``. Its sentence is made where it is shown.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -38,7 +38,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import table_types
 
-FORMAT_VERSION = 5
+FORMAT_VERSION = 6
 SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
 
@@ -160,22 +160,15 @@ class AbsentResults(Results[Summary]):
     """In place of the results of a stage that was not computed; its verdict is a finding that tells why."""
 
 
-def write_results(
-    folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any], sentence: Callable[[Finding], str]
-) -> None:
-    """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed.
-
-    Parameters
-    ----------
-    sentence : a finding's text in English
-    """
+def write_results(folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any]) -> None:
+    """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed."""
     kind = AbsentResults if isinstance(results, AbsentResults) else type(results)
     for name, table in table_types(stage.module("model").RESULTS).items():
         rows = table.empty() if kind is AbsentResults else getattr(results, name)
         write_atomically(folder / f"{name}.parquet", rows.write)
     summary = results.summary
     own = {part.name: plain(getattr(summary, part.name)) for part in fields(summary)}
-    own["verdict"] = _verdict_record(summary.verdict, " ".join(map(sentence, summary.verdict.findings)))
+    own["verdict"] = _verdict_record(summary.verdict)
     origin = Provenance(
         inputs=input_records(study.inputs(robot, stage.name)),
         config=study.computed_from(robot, stage.name),
@@ -200,9 +193,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     """
     record = _record(folder)
     rests_on: dict[str, Status] = {
-        name: _record(folder.parent / name)["verdict"]["status"]
-        for name in stage.rests_on
-        if is_computed(folder.parent / name)
+        name: read_status(folder.parent / name) for name in stage.rests_on if is_computed(folder.parent / name)
     }
     if record["verdict"]["status"] == "not_computed":
         absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))
@@ -263,13 +254,26 @@ def _record(folder: Path) -> dict[str, Any]:
     return stored
 
 
-def read_verdict(folder: Path) -> tuple[Status, str, str]:
-    """Status, code and English text of a stage's verdict; :class:`ResultError` as :func:`read_stage`."""
-    verdict = _record(folder)["verdict"]
+def read_status(folder: Path) -> Status:
+    """The status of a stage's verdict; :class:`ResultError` as :func:`read_stage`."""
+    return _status(folder, _record(folder))
+
+
+def _status(folder: Path, record: dict[str, Any]) -> Status:
     try:
-        return verdict["status"], verdict["code"], verdict["text"]
+        status: Status = record["verdict"]["status"]
     except (KeyError, TypeError):
-        raise ResultError(folder / SUMMARY, "damaged (verdict without status, code or text)") from None
+        raise ResultError(folder / SUMMARY, "damaged (verdict without status)") from None
+    return status
+
+
+def read_verdict(folder: Path, stage: Stage) -> Verdict[Any]:
+    """A stage's verdict; :class:`ResultError` as :func:`read_stage`."""
+    record = _record(folder)
+    if _status(folder, record) == "not_computed":
+        return Verdict("not_computed", _reason_of_absence(record["verdict"], stage))
+    verdict: Verdict[Any] = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0].verdict
+    return verdict
 
 
 def check_results(folder: Path) -> None:
@@ -340,10 +344,10 @@ def plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _verdict_record(verdict: Verdict[Any], text: str) -> dict[str, Any]:
+def _verdict_record(verdict: Verdict[Any]) -> dict[str, Any]:
     params = plain(verdict.finding)
     left_out = {"unexamined": plain(verdict.unexamined)} if verdict.unexamined else {}
-    return {"status": verdict.status, "code": params.pop("code"), "params": params, "text": text, **left_out}
+    return {"status": verdict.status, "code": params.pop("code"), "params": params, **left_out}
 
 
 def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tuple[Any, Provenance]:

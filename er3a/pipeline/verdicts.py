@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
-from er3a.pipeline.results import NotComputed, Status, is_computed, read_verdict
+from er3a.pipeline.messages import language
+from er3a.pipeline.messages.say import say_all, sentence
+from er3a.pipeline.results import NotComputed, Status, is_computed, read_status, read_verdict
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 
 Level = Literal["caution", "fail"]
@@ -48,13 +52,17 @@ def read_verdicts(study: Study, results: Path) -> list[StageVerdict]:
     ResultError
         results are damaged or of another format version, or no stage has any
     """
-    found = [
-        StageVerdict(robot, stage, *read_verdict(results / robot / stage))
-        if is_computed(results / robot / stage)
-        else StageVerdict(robot, stage, NOT_EXAMINED, "stage.not_examined", "This stage has not been computed yet.")
-        for robot in study.names
-        for stage in study.stages(robot)
-    ]
+    with language.using("en"):
+        found = [_stage_verdict(results, robot, stage) for robot in study.names for stage in study.stages(robot)]
     if all(verdict.status == NOT_EXAMINED for verdict in found):
-        read_verdict(results / found[0].robot / found[0].stage)
+        read_status(results / found[0].robot / found[0].stage)
     return found
+
+
+def _stage_verdict(results: Path, robot: str, name: str) -> StageVerdict:
+    folder, stage = results / robot / name, STAGES[name]
+    if not is_computed(folder):
+        return StageVerdict(robot, name, NOT_EXAMINED, "stage.not_examined", sentence("stage.not_examined"))
+    import_module(stage.messages)
+    verdict = read_verdict(folder, stage)
+    return StageVerdict(robot, name, verdict.status, verdict.finding.code, say_all(verdict.findings))

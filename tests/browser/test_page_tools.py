@@ -14,7 +14,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
-from er3a.pipeline.messages.glossary import GLOSSARY
+from er3a.pipeline.messages.pages import GLOSSARY
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, render

@@ -23,8 +23,8 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.foundations import FOUNDATIONS
 from er3a.pipeline.messages.kinematics import BRANCHES
+from er3a.pipeline.messages.pages import FOUNDATIONS
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach import panel as teach_page

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import er3a.pipeline.messages.references  # noqa: F401
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.reactions import bases_of, count_checks
 from er3a.identifiability.statements import inconsistent_with_own_text, not_the_robot_described
-from er3a.pipeline.messages import evidence as _words  # noqa: F401
 from er3a.pipeline.messages.say import say
 from er3a.references.reference import Document, Documents
 

@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from er3a.pipeline.messages.program_remedies import REMEDIES, remedies, remedy
+from er3a.pipeline.messages.programs import REMEDIES, remedies, remedy
 from er3a.program_check.program_check_findings import (
     NOTES,
     AcceleratesMoreThanAssumed,

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import er3a.pipeline.messages.programs  # noqa: F401
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline import cli  # noqa: F401
 from er3a.pipeline.commands.options import app
-from er3a.pipeline.messages import program_check  # noqa: F401
 from er3a.pipeline.messages.say import say
 from er3a.planning.commands import JointSequenceCommand
 from er3a.program_check.check_program import CheckOptions, check_program

@@ -9,7 +9,7 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Solutions
-from er3a.pipeline.messages.selection import say
+from er3a.pipeline.messages.kinematics import say
 from er3a.robots.joint_limits import limit_margin
 from er3a.selection.nearest import GreatestMove, OnlyAdmissible, nearest
 

@@ -13,11 +13,12 @@ from er3a.collision.along import clearance
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.collision_verdict import say
-from er3a.pipeline.results import read_results
+from er3a.pipeline.messages.say import say, say_all
+from er3a.pipeline.results import read_results, read_verdict
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
 from er3a.pipeline.stages.collision.model import RESULTS
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach.panel import write_teach_page
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -147,10 +148,10 @@ def test_shapes_in_error_end_no_other_stage_and_are_never_a_pass(stage, tmp_path
     """Each stage that looks for collisions says which pairs it did not look at."""
     study = with_a_base_too_large(tmp_path)
     run.compute(stage, study, "arm", tmp_path / stage)
-    verdict = json.loads((tmp_path / stage / "summary.json").read_text(encoding="utf-8"))["verdict"]
-    assert verdict["status"] == "caution"
-    assert [pair["second"] for pair in verdict["unexamined"]] == [3, 4, 6]
-    assert verdict["text"].endswith(
+    verdict = read_verdict(tmp_path / stage, STAGES[stage])
+    assert verdict.status == "caution"
+    assert [pair.second for pair in verdict.unexamined] == [3, 4, 6]
+    assert say_all(verdict.findings[1:]) == (
         "Collisions not examined, because the shapes overlap in every joint vector tried (1024): "
         "base and link 3, base and link 4, base and link 6."
     )

@@ -16,7 +16,7 @@ import er3a
 from er3a.dynamics.plausibility import MissingLink
 from er3a.errors import InputError
 from er3a.files.mass_fields import WristLoadFields, check_masses
-from er3a.pipeline.messages import dynamics, dynamics_verdict
+from er3a.pipeline.messages import dynamics
 from er3a.pipeline.messages.say import listed, say
 from er3a.pipeline.results import Stored, read_results
 from er3a.pipeline.stages import run
@@ -264,9 +264,9 @@ def test_a_bad_payload_is_one_error(tmp_path, payload, problem):
 
 
 def test_every_word_of_a_comparison_is_there():
-    for quantity in dynamics_verdict.QUANTITIES:
+    for quantity in dynamics.QUANTITIES:
         use = Use(quantity, None if quantity == "payload" else 5, None, 1.0, 1.1, 2.0, "N m")
-        assert "50 %" in dynamics_verdict.use_text(use)
+        assert "50 %" in dynamics.use_text(use)
     assert set(dynamics.WHY) == {"not_finite", "negative_mass", "negative_moment", "triangle"}
 
 

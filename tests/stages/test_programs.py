@@ -98,7 +98,7 @@ def test_an_unexpected_fault_fails_the_stage(study, tmp_path):
 
 @pytest.mark.long
 def test_page_and_recording_are_written(study, stored, tmp_path):
-    import_module(STAGES["programs"].verdict_messages)
+    import_module(STAGES["programs"].messages)
     report(study, stored["er3a_c60"], tmp_path / "programs.html")
     record(study, stored["er3a_c60"], tmp_path / "programs.rrd")
     html = (tmp_path / "programs.html").read_text(encoding="utf-8")

@@ -334,7 +334,7 @@ def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, st
     one = study.model_copy(update={"robots": {"er3_600": study.robots["er3_600"]}})
     for stage in (each for each in one.stages("er3_600") if each != "trajectory"):
         absent = AbsentResults(Summary(Verdict("not_computed", NotComputed("made up")), ()))
-        write_results(tmp_path / "results/er3_600" / stage, one, "er3_600", STAGES[stage], absent, lambda found: "-")
+        write_results(tmp_path / "results/er3_600" / stage, one, "er3_600", STAGES[stage], absent)
     shutil.copytree(folders["er3_600"], tmp_path / "results/er3_600/trajectory")
     write_index(one, tmp_path / "results", tmp_path)
     index = (tmp_path / "index.html").read_text(encoding="utf-8")
@@ -359,9 +359,7 @@ def test_cells_of_the_index_say_first_what_validation_came_to(study, folders, st
 def test_the_teach_panel_says_first_what_validation_came_to(study, tmp_path, status, told):
     if status:
         found = AbsentResults(Summary(Verdict(status, NotComputed("made up")), ()))
-        write_results(
-            tmp_path / "results/er3_600/validation", study, "er3_600", STAGES["validation"], found, lambda found: "-"
-        )
+        write_results(tmp_path / "results/er3_600/validation", study, "er3_600", STAGES["validation"], found)
     write_teach_page(study, "er3_600", tmp_path / "results", tmp_path / "teach.html")
     page = (tmp_path / "teach.html").read_text(encoding="utf-8")
     body = page[page.index("<body") :]

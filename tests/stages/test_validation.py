@@ -215,7 +215,7 @@ def test_every_check_has_the_agreed_keys(folders, name):
 
 def test_what_is_read_is_written_as_the_same_bytes(study, folders, stored, tmp_path):
     read = stored["er3a_c60_article"].results
-    write_results(tmp_path, study, "er3a_c60_article", STAGES["validation"], read, say)
+    write_results(tmp_path, study, "er3a_c60_article", STAGES["validation"], read)
     assert {path.name for path in tmp_path.iterdir()} == WRITTEN
     for path in tmp_path.iterdir():
         assert path.read_bytes() == (folders["er3a_c60_article"] / path.name).read_bytes()
@@ -479,7 +479,7 @@ def test_the_verdict_names_the_table_to_use_instead_if_the_study_has_one_that_ho
     other = tmp_path / "er3a_c60" / "validation"
     other.mkdir(parents=True)
     for status in ("caution", "fail"):
-        verdict = {"status": status, "code": "", "text": ""}
+        verdict = {"status": status, "code": ""}
         made = {"robot": "er3a_c60", "stage": "validation", "verdict": verdict, "figures": [], "provenance": {}}
         (other / "summary.json").write_text(json.dumps({"format_version": FORMAT_VERSION, **made}))
         write_checksums(other)

@@ -101,7 +101,7 @@ def test_the_border_that_is_compared_has_no_chords(found):
 def test_no_page_speaks_of_a_drawing_that_there_is_not(found, name, drawn, tmp_path):
     study = make_study({name: ROBOTS / f"{name}.yaml"})
     results = found if name == "er3_600" else compute(study, name)
-    write_results(tmp_path / "results", study, name, STAGES["workspace"], results, say)
+    write_results(tmp_path / "results", study, name, STAGES["workspace"], results)
     report(study, read_stage(tmp_path / "results", STAGES["workspace"]), tmp_path / "page.html")
     page = html.unescape((tmp_path / "page.html").read_text(encoding="utf-8"))
     assert ("Against the manufacturer's drawing" in page) == drawn
@@ -109,7 +109,7 @@ def test_no_page_speaks_of_a_drawing_that_there_is_not(found, name, drawn, tmp_p
 
 
 def test_what_is_read_is_what_was_computed(found, tmp_path):
-    write_results(tmp_path, make_study(), "er3_600", STAGES["workspace"], found, say)
+    write_results(tmp_path, make_study(), "er3_600", STAGES["workspace"], found)
     text = (tmp_path / "summary.json").read_text(encoding="utf-8")
     summary = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} in summary.json"))
     assert {"volume_m3", "hull", "samples", "voids", "verdict", "figures", "provenance"} <= set(summary)
@@ -160,11 +160,11 @@ def test_full_turn_of_joint_1_gives_a_symmetric_cloud():
 def test_locked_joints_run_through_all_three_verbs(tmp_path, locked, code):
     study = make_study({"locked": locked_file(tmp_path, locked)}, samples=5000)
     run.compute("workspace", study, "locked", tmp_path / "results")
-    verdict = json.loads((tmp_path / "results/summary.json").read_text(encoding="utf-8"))["verdict"]
-    assert code in (None, verdict["code"])
+    verdict = read_stage(tmp_path / "results", STAGES["workspace"]).results.summary.verdict
+    assert code in (None, verdict.finding.code)
     for verb, output in (("report", "workspace.html"), ("record", "workspace.rrd")):
         run.show(verb, "workspace", study, "locked", tmp_path / "results", tmp_path / output)
-    assert verdict["text"] in html.unescape((tmp_path / "workspace.html").read_text(encoding="utf-8"))
+    assert say(verdict.finding) in html.unescape((tmp_path / "workspace.html").read_text(encoding="utf-8"))
     assert (tmp_path / "workspace.rrd").stat().st_size > 10_000
 
 

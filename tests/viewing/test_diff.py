@@ -68,9 +68,7 @@ def test_verdict_unit_and_missing_figure_are_named(folders):
     assert (solved.old, solved.new, solved.difference) == ("2 of 3", "–", "gone")
 
 
-def test_another_wording_of_the_verdict_is_none_that_results_hold(folders):
-    edit(folders[1], lambda summary: summary["verdict"].update(text="Solid, all of it."))
-    assert changes(*folders) == []
+def test_another_finding_of_equal_status_is_named_by_its_text(folders):
     edit(folders[1], lambda summary: summary["verdict"].update(code="made.hollow", params={"volume_m3": 0.5}))
     (change,) = changes(*folders)
     assert (change.what, change.old, change.new) == ("verdict's text", "All is solid.", "A hollow (空洞) of 0.50 m³.")

@@ -21,7 +21,8 @@ from babel.messages.pofile import read_po
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.hand_eye import METHODS
+from er3a.pipeline.messages.say import english
+from er3a.pipeline.messages.vision import METHODS
 
 KEPT = re.compile(r"(\{[^}]*\}|%\(\w+\)s|<[^>]*>|&\w+;)")
 WIDE = {ord(letter): ord(letter) + 0xFEE0 for letter in "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"}
@@ -50,19 +51,26 @@ class Wide(gettext.NullTranslations):
         """The message in wide letters if the catalogue has it; fields and tags as they are."""
         if message not in self._texts:
             return message
-        return "".join(part if KEPT.fullmatch(part) else part.translate(WIDE) for part in KEPT.split(message))
+        return _wide(message)
 
     def pgettext(self, context: str, message: str) -> str:
-        """As :meth:`gettext`."""
-        return self.gettext(message)
+        """As :meth:`gettext`; the English of a key."""
+        return self.npgettext(context, message, message, 1)
 
     def npgettext(self, context: str, msgid1: str, msgid2: str, n: int) -> str:
-        """As :meth:`ngettext`."""
-        return self.ngettext(msgid1, msgid2, n)
+        """As :meth:`ngettext`; the English of a key, in its form for n."""
+        if context != language.KEYED or msgid1 not in self._texts:
+            return self.ngettext(msgid1, msgid2, n)
+        forms = english(msgid1)
+        return _wide(forms[0] if n == 1 else forms[-1])
 
     def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
         """As :meth:`gettext`, of the form for n."""
         return self.gettext(msgid1 if n == 1 else msgid2)
+
+
+def _wide(text: str) -> str:
+    return "".join(part if KEPT.fullmatch(part) else part.translate(WIDE) for part in KEPT.split(text))
 
 
 def catalogue_texts() -> set[str]:

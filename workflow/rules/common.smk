@@ -8,7 +8,7 @@ from snakemake.dag import PeriodicityDetector
 from er3a.pipeline.code_digest import code_digest
 from er3a.errors import Er3aError
 from er3a.files.shipped import view_command
-from er3a.pipeline.messages import captions, language
+from er3a.pipeline.messages import language, pages
 from er3a.pipeline.messages.language import catalogue_file, tr
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.study import load_study
@@ -37,7 +37,7 @@ CATALOGUE = [] if LANGUAGE == "en" else os.path.relpath(catalogue_file(LANGUAGE)
 
 
 # Snakemake's own report: its text, and what it calls pages and robots. The text of its first page has no params.
-config["description"] = captions.of_study()
+config["description"] = pages.of_study()
 
 
 def titled(robot):

@@ -29,7 +29,7 @@ rule report:
             "reports/{robot}/{stage}.html",
             caption="../report/stage.rst",
             category="{robot}",
-            labels=lambda wildcards: {tr(captions.PAGE): tr(STAGES[wildcards.stage].title)},
+            labels=lambda wildcards: {tr(pages.PAGE): tr(STAGES[wildcards.stage].title)},
         ),
     log:
         "logs/{robot}/{stage}.report.log",
@@ -38,7 +38,7 @@ rule report:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
-        caption=lambda wildcards: captions.of_stage(titled(wildcards.robot), STAGES[wildcards.stage].question),
+        caption=lambda wildcards: pages.of_stage(titled(wildcards.robot), STAGES[wildcards.stage].question),
         code=lambda wildcards: code_of(wildcards.stage, "report"),
     message:
         "{wildcards.robot}: report {wildcards.stage}"
@@ -56,7 +56,7 @@ rule teach:
             "reports/{robot}/teach.html",
             caption="../report/teach.rst",
             category="{robot}",
-            labels={tr(captions.PAGE): tr(captions.TEACH_PANEL)},
+            labels={tr(pages.PAGE): tr(pages.TEACH_PANEL)},
         ),
     log:
         "logs/{robot}/teach.log",
@@ -64,7 +64,7 @@ rule teach:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
-        caption=lambda wildcards: captions.of_teach_panel(titled(wildcards.robot)),
+        caption=lambda wildcards: pages.of_teach_panel(titled(wildcards.robot)),
         settings=settings("trajectory"),
         code=code_digest("er3a.pipeline.teach.panel"),
     message:
@@ -81,14 +81,14 @@ rule index:
         report(
             "reports/index.html",
             caption="../report/index.rst",
-            category=tr(captions.ALL_ROBOTS),
-            labels={tr(captions.PAGE): tr(captions.INDEX)},
+            category=tr(pages.ALL_ROBOTS),
+            labels={tr(pages.PAGE): tr(pages.INDEX)},
         ),
         report(
             "reports/compare.html",
             caption="../report/compare.rst",
-            category=tr(captions.ALL_ROBOTS),
-            labels={tr(captions.PAGE): tr(captions.COMPARISON)},
+            category=tr(pages.ALL_ROBOTS),
+            labels={tr(pages.PAGE): tr(pages.COMPARISON)},
         ),
         "reports/junit.xml",
     log:
@@ -97,7 +97,7 @@ rule index:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
-        captions=[captions.of_index(), captions.of_comparison()],
+        captions=[pages.of_index(), pages.of_comparison()],
         expected={name: STUDY.entry(name).expect for name in STUDY.robots},
         code=code_digest("er3a.pipeline.viewing.index", *all_messages()),
     message:

@@ -137,7 +137,7 @@ def write(
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
     from er3a.pipeline.messages.expectations import outcome_word
-    from er3a.pipeline.messages.program_check import say
+    from er3a.pipeline.messages.programs import say
     from er3a.pipeline.program_reports import programs_of
     from er3a.pipeline.progress import shown_work
 

@@ -111,7 +111,7 @@ def calibrate(
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
-    from er3a.pipeline.messages.calibration import calibration_record, lines_of
+    from er3a.pipeline.messages.diagnosis import calibration_record, lines_of
     from er3a.pipeline.messages.say import say
 
     source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
@@ -138,8 +138,8 @@ def hand_eye(
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
-    from er3a.pipeline.messages.hand_eye import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.pipeline.messages.say import say
+    from er3a.pipeline.messages.vision import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
     from er3a.vision.table_corrections import correct_table

@@ -1,12 +1,14 @@
-"""What the collision page and recording say beside the verdict."""
+"""Collisions: pairs of bodies, the verdict of the stage, and what its page and recording say."""
 
 from __future__ import annotations
 
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import BASE, TRIED, link_label
+from er3a.collision.pairs import BASE, TRIED, CarriedAndLink, LinkAndSolid, LinkPair, PairsUnexamined, link_label
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import sentence, word
+from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
 
+NAMED = 3
 FIGURES = {
     "free_of_collisions": N_("Collision-free joint space"),
     "free_of_itself": N_("Free of self-collision"),
@@ -28,6 +30,103 @@ STATES: dict[PairState, str] = {
 }
 
 
+TEXTS = texts(
+    {
+        "carried_and_solid": "{carried} and {solid}",
+        "pair_overlaps": "{pair} overlap by {depth_mm:.1f} mm",
+        "link_pair": "{first} and {second}",
+        "link_and_solid": "{link} and {solid}",
+        "carried_and_link": "{link} and {carried}",
+        "pairs_unexamined": (
+            "Collisions not examined, because the shapes overlap in every joint vector tried ({count}): {pairs}."
+        ),
+        "link#base": "base",
+        "link#number": "link {number}",
+        "collision.never_free": "No joint vector within the limits is collision-free (proven): {pairs} always overlap.",
+        "collision.shapes_overlap": (
+            "The shapes of {pairs} overlap in every joint vector tried ({count}), which no joint between them "
+            "explains: an error of the shapes, not of the arm. Correct their size, unit or placement in the robot's "
+            "file, or allow the pair there with a reason. Of the rest of the shapes, {percent:.1f} % of the joint "
+            "space is collision-free."
+        ),
+        "collision.base_in_solid": (
+            "The base is inside {own_name} at every joint vector: correct the scene or the position of the base."
+        ),
+        "collision.home_collides": (
+            "In the home pose {pair} overlap by {depth_mm:.1f} mm, so what can be reached from there is unknown; "
+            "{percent:.1f} % of the joint space is collision-free."
+        ),
+        "collision.free_space#free": (
+            "{percent:.1f} % of the joint space is collision-free. Of {places} cells reached, {clear} are proven "
+            "reachable without collision, {joined} of these by a proven motion from home; at most {lost:.1f} % of the "
+            "cells are lost to collisions."
+        ),
+        "collision.free_space#doubt": (
+            "Pairs of links that may or may not collide, and are therefore checked: {undecided}."
+        ),
+        "collision.free_space#none": "No collision-free configuration was found.",
+    }
+)
+
+
+@say.register
+def _(found: LinkPair) -> str:
+    return say_as(found, first=_link(found.first), second=_link(found.second))
+
+
+@say.register
+def _(found: LinkAndSolid) -> str:
+    return say_as(found, link=_link(found.link))
+
+
+@say.register
+def _(found: CarriedAndLink) -> str:
+    return say_as(found, link=_link(found.link))
+
+
+@say.register
+def _(found: PairsUnexamined) -> str:
+    named = listed(found.pairs[:NAMED])
+    if len(found.pairs) > NAMED:
+        named.append(sentence("more", count=len(found.pairs) - NAMED))
+    return say_as(found, count=TRIED, pairs=joined(named, ", "))
+
+
+def _link(number: int) -> str:
+    return sentence("link#base") if number == BASE else sentence("link#number", number=number)
+
+
+@say.register
+def _(found: NeverFree) -> str:
+    return say_as(found, pairs=joined(listed(found.pairs[:NAMED]), ", "))
+
+
+@say.register
+def _(found: ShapesOverlap) -> str:
+    return say_as(found, count=TRIED, pairs=joined(listed(found.pairs[:NAMED]), ", "), percent=100 * found.free_ratio)
+
+
+@say.register
+def _(found: BaseInSolid) -> str:
+    return say_as(found, own_name=", ".join(found.solids[:NAMED]))
+
+
+@say.register
+def _(found: HomeCollides) -> str:
+    return say_as(found, percent=100 * found.free_ratio)
+
+
+@say.register
+def _(found: FreeSpace) -> str:
+    if not found.clear:
+        return say_as(found, "none")
+    free = say_as(found, "free", percent=100 * found.free_ratio, lost=100 * (1 - found.clear / found.places))
+    if not found.undecided:
+        return free
+    doubt = say_as(found, "doubt")
+    return joined([free, doubt], " ")
+
+
 def state_word(state: PairState) -> str:
     """What holds of a pair, in short."""
     return word("collision.state", STATES, state)
@@ -36,9 +135,9 @@ def state_word(state: PairState) -> str:
 def body_word(name: str) -> str:
     """A body of the arm, or what is carried, by its name."""
     if name == link_label(BASE):
-        return sentence("link", "base")
+        return sentence("link#base")
     number = name.removeprefix("link_")
-    return sentence("link", "link {number}", number=number) if number != name else name
+    return sentence("link#number", number=number) if number != name else name
 
 
 def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str) -> str:

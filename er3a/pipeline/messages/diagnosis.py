@@ -1,20 +1,21 @@
-"""Sentences about faults of a table, what a diagnosis concludes, and what to measure next."""
+"""Faults of a table, what a diagnosis concludes, what to measure next, and calibrations."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from er3a.calibration.calibrate import Calibration
+from er3a.calibration.outcomes import (
+    Misfit,
+    MorePositions,
+    NotToldApart,
+)
 from er3a.diagnosis.conclusions import (
     FlangePositionDecides,
-    LimitDecides,
     MainFault,
     MostLikelyFault,
-    NoFaultStandsOut,
     NoFewFaultsExplain,
-    NothingDecides,
     NothingToExplain,
-    NothingToRestOn,
-    OrientationDecides,
     Resolution,
     TooSmallToTell,
 )
@@ -23,8 +24,6 @@ from er3a.diagnosis.faults import (
     ReversedDirection,
     ShiftedRows,
     SwappedEntries,
-    SwappedLimits,
-    SwappedRows,
     WrongAlpha,
     WrongAlphaSign,
     WrongConvention,
@@ -36,7 +35,7 @@ from er3a.diagnosis.faults import (
     WrongUnit,
 )
 from er3a.pipeline.messages.language import N_, as_text
-from er3a.pipeline.messages.say import counted, joined, say, sentence, word
+from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 
 ENTRIES = {
     "a": N_("column a"),
@@ -73,16 +72,118 @@ LIMIT_FAULTS = {
     "lower_sign": N_("lower limit has the wrong sign"),
     "upper_sign": N_("upper limit has the wrong sign"),
 }
-ONE_LIMIT = {
-    "lower": N_("lower limit is {given:g} deg, {fits} deg fits"),
-    "upper": N_("upper limit is {given:g} deg, {fits} deg fits"),
-}
-LIMITS = {
-    "lower": N_("the lower limit of joint {joint} would distinguish them"),
-    "upper": N_("the upper limit of joint {joint} would distinguish them"),
-}
 LEAST_SHOWN, LEAST_FITTED = 0.005, 5e-5
 MOST_LISTED = 24
+LEVELS = {
+    "lengths": N_("lengths"),
+    "lengths_and_offsets": N_("lengths and joint offsets"),
+    "all_entries": N_("all entries"),
+}
+MUCH_SCATTER = 2.0
+
+
+TEXTS = texts(
+    {
+        "corrected": "corrected: {faults}",
+        "alike": "{faults} (or {more} more that these references can't tell from it)",
+        "close": "{first} and {second} ({correlation})",
+        "swapped_rows": "rows {first} and {second} are swapped",
+        "swapped_limits": "limits of joints {first} and {second} are swapped",
+        "nothing_decides": "nothing can: they describe the same arm",
+        "orientation_decides": "the flange's position does not, but its orientation does, or a point off axis 6",
+        "no_reference": "There are no data for a diagnosis.",
+        "no_fault_stands_out": Plural(
+            "missed",
+            "{count} of {references} references is missed, by up to {half_widths:.3g} times its uncertainty, but "
+            "none of the {tried} faults and pairs of faults that were tried fits better than the table as it is.",
+            "{count} of {references} references are missed, by up to {half_widths:.3g} times their uncertainty, "
+            "but none of the {tried} faults and pairs of faults that were tried fits better than the table as it "
+            "is.",
+        ),
+        "wrong_limit#lower": "lower limit is {given:g} deg, {fits} deg fits",
+        "wrong_limit#upper": "upper limit is {given:g} deg, {fits} deg fits",
+        "limit_decides": by(
+            "side",
+            lower="the lower limit of joint {joint} would distinguish them",
+            upper="the upper limit of joint {joint} would distinguish them",
+        ),
+        "faults": "{fault} and {second_fault}",
+        "wrong_alpha_sign": "alpha has the wrong sign ({given_deg:g} deg given, {fits_deg:g} deg fits)",
+        "wrong_alpha#missing": "alpha {fits} deg missing",
+        "wrong_alpha#given": "alpha is {given_deg:g} deg, {fits} deg fits",
+        "swapped_entries#columns": "columns a and d are swapped",
+        "swapped_entries#joint": "a and d are swapped",
+        "wrong_offset#missing": "offset {fits} deg missing",
+        "wrong_offset#given": "offset is {given_deg:g} deg, {fits} deg fits",
+        "reversed_direction": "direction reversed",
+        "place#every_joint": "every joint",
+        "wrong_length#missing": "{column} missing, {fits} mm fits",
+        "wrong_length#given": "{column} is {given_mm:.6g} mm, {fits} mm fits",
+        "wrong_scale": "wrong scale: a factor of {factor:.6g} fits",
+        "flange_position_decides#share": (
+            "the flange's position at joints ({pose}) deg would distinguish {share:.0%} of the pairs, by up to {most}"
+        ),
+        "flange_position_decides#all": (
+            "the flange's position at joints ({pose}) deg would distinguish all, by up to {most}"
+        ),
+        "met": Plural(
+            "references",
+            "Nothing to explain: the one reference about poses, axes and limits is met.",
+            "Nothing to explain: all {count} references about poses, axes and limits are met.",
+        ),
+        "resolution#length": "A single wrong length is detected from {length_mm:.2g} mm on.",
+        "resolution#angle": "A single wrong angle is detected from {angle_deg:.2g} deg on.",
+        "resolution#half_turns": "An error of 180 deg in {entries} would not be detected.",
+        "resolution#unseen": "No error in {entries} would be detected.",
+        "named": "Most likely fault: {hypothesis}.",
+        "too_small_to_tell": (
+            "The disagreement ({residual} {unit}) is too small to tell which of {count} faults causes it: "
+            "{candidates}. From about {told} {unit} on these references distinguish them, where they can at all."
+        ),
+        "mostly": "The best hypothesis tried: {hypothesis}, which still exceeds the references' uncertainty.",
+        "unexplained": (
+            "None of the {tried} hypotheses tried, of one fault or two, explains the data: the best still leaves "
+            "{after} {unit} of {before} {unit}, and none leaves less than {least} {unit}. This is another arm, or "
+            "more than two numbers are wrong, or one is wrong in a way that was not tried, or a reference is wrong."
+        ),
+        "residual_falls": "{faults}; residual falls from {before} {unit} to {after} {unit}",
+        "one_of": "one of {count} that these references can't distinguish ({candidates})",
+        "candidates": Plural("count", "{count} more", "{count} more"),
+        "place#joint": "joint {joint}",
+        "fault_at": "{place}: {fault}",
+        "moves_nothing": "{entry} has no effect on the measured points",
+        "no_positions": "there are no positions of single points to calibrate from",
+        "no_correction_fits": (
+            "no corrections make the table fit: after {steps} steps the positions are still {rest_mm:.3g} mm off. The "
+            "table has a gross fault or belongs to another arm; er3a.diagnose finds single faults"
+        ),
+        "corrections_found": "The positions indicate corrections of {entries:, }: their 95 % intervals exclude 0.",
+        "no_correction_found": Plural(
+            "intervals",
+            "The positions indicate no correction: the 95 % interval contains 0.",
+            "The positions indicate no correction: all {count} 95 % intervals contain 0.",
+        ),
+        "not_told_apart#parallel": "{entries} can't be identified separately: axes {first} and {second} are parallel",
+        "not_told_apart": "{entries} can't be identified separately",
+        "more_positions#known": Plural(
+            "poses",
+            "{coordinates} coordinates at {count} pose determine {determined} of the {determinable} entries "
+            "({level}) that positions of these points can determine",
+            "{coordinates} coordinates at {count} poses determine {determined} of the {determinable} entries "
+            "({level}) that positions of these points can determine",
+        ),
+        "more_positions#needed": Plural(
+            "least", "at least {count} more position is needed", "at least {count} more positions are needed"
+        ),
+        "more_positions#request": "{known}; {needed}. Spread them over all joints, for example {examples}.",
+        "more_positions#for_entries": "{needed} for {entries:, }",
+        "misfit": (
+            "Correcting {level} does not make this table fit the positions: {rms_after_mm:.3g} mm of "
+            "{rms_before_mm:.3g} mm (root mean square) remain. Calibration can't repair it."
+        ),
+        "list": "{others} and {last}",
+    }
+)
 
 
 def both(faults: Faults) -> str:
@@ -90,7 +191,7 @@ def both(faults: Faults) -> str:
     if len(faults) == 1:
         return say(faults[0])
     first, second = map(say, faults)
-    return sentence("faults", "{fault} and {second_fault}", fault=first, second_fault=second)
+    return sentence("faults", fault=first, second_fault=second)
 
 
 def shown(value: float) -> str:
@@ -118,43 +219,24 @@ def _(found: WrongUnit) -> str:
 
 @say.register
 def _(found: WrongAlphaSign) -> str:
-    fault = sentence(
-        found.code,
-        "alpha has the wrong sign ({given:g} deg given, {fits:g} deg fits)",
-        given=found.given_deg,
-        fits=found.fits_deg,
-    )
+    fault = say_as(found)
     return _at_joint(found.joint, fault)
 
 
 @say.register
 def _(found: WrongAlpha) -> str:
     if found.given_deg == 0:
-        fault = sentence(found.code, "alpha {fits} deg missing", fits=fitted(found))
+        fault = say_as(found, "missing", fits=fitted(found))
     else:
-        fault = sentence(
-            found.code, "alpha is {given:g} deg, {fits} deg fits", given=found.given_deg, fits=fitted(found)
-        )
+        fault = say_as(found, "given", fits=fitted(found))
     return _at_joint(found.joint, fault)
 
 
 @say.register
 def _(found: SwappedEntries) -> str:
     if found.joint is None:
-        return sentence(found.code, "columns a and d are swapped")
-    return _at_joint(found.joint, sentence(found.code, "a and d are swapped"))
-
-
-@say.register
-def _(found: SwappedRows) -> str:
-    return sentence(found.code, "rows {first} and {second} are swapped", first=found.first, second=found.second)
-
-
-@say.register
-def _(found: SwappedLimits) -> str:
-    return sentence(
-        found.code, "limits of joints {first} and {second} are swapped", first=found.first, second=found.second
-    )
+        return say_as(found, "columns")
+    return _at_joint(found.joint, say_as(found, "joint"))
 
 
 @say.register
@@ -165,17 +247,15 @@ def _(found: ShiftedRows) -> str:
 @say.register
 def _(found: WrongOffset) -> str:
     if found.given_deg == 0:
-        fault = sentence(found.code, "offset {fits} deg missing", fits=fitted(found))
+        fault = say_as(found, "missing", fits=fitted(found))
     else:
-        fault = sentence(
-            found.code, "offset is {given:g} deg, {fits} deg fits", given=found.given_deg, fits=fitted(found)
-        )
+        fault = say_as(found, "given", fits=fitted(found))
     return _at_joint(found.joint, fault)
 
 
 @say.register
 def _(found: ReversedDirection) -> str:
-    return _at_joint(found.joint, sentence(found.code, "direction reversed"))
+    return _at_joint(found.joint, say_as(found))
 
 
 @say.register
@@ -186,33 +266,27 @@ def _(found: WrongConvention) -> str:
 @say.register
 def _(found: WrongLimits) -> str:
     fault = word(found.code, LIMIT_FAULTS, found.fault)
-    return _at(sentence("place", "every joint"), fault) if found.joint is None else _at_joint(found.joint, fault)
+    return _at(sentence("place#every_joint"), fault) if found.joint is None else _at_joint(found.joint, fault)
 
 
 @say.register
 def _(found: WrongLimit) -> str:
-    fault = sentence(found.code, ONE_LIMIT[found.side], given=found.given_deg, fits=fitted(found))
+    fault = say_as(found, found.side, given=found.given_deg, fits=fitted(found))
     return _at_joint(found.joint, fault)
 
 
 @say.register
 def _(found: WrongLength) -> str:
     if found.given_mm == 0:
-        fault = sentence(found.code, "{entry} missing, {fits} mm fits", entry=found.column, fits=fitted(found))
+        fault = say_as(found, "missing", fits=fitted(found))
     else:
-        fault = sentence(
-            found.code,
-            "{entry} is {given:.6g} mm, {fits} mm fits",
-            entry=found.column,
-            given=found.given_mm,
-            fits=fitted(found),
-        )
+        fault = say_as(found, "given", fits=fitted(found))
     return _at_joint(found.joint, fault)
 
 
 @say.register
 def _(found: WrongScale) -> str:
-    fault = sentence(found.code, "wrong scale: a factor of {factor:.6g} fits", factor=found.factor)
+    fault = say_as(found)
     return _at(word("wrong_unit", ENTRIES, "lengths"), fault)
 
 
@@ -221,49 +295,13 @@ def _(found: FlangePositionDecides) -> str:
     pose = ", ".join(as_text(angle, "g") for angle in found.pose_deg)
     most = f"{found.most_mm:.0f} mm" if found.most_mm >= 10 else f"{found.most_mm:.1f} mm"
     if found.share == 1:
-        return sentence(
-            found.code,
-            "the flange's position at joints ({pose}) deg would distinguish all, by up to {most}",
-            pose=pose,
-            most=most,
-        )
-    return sentence(
-        found.code,
-        "the flange's position at joints ({pose}) deg would distinguish {share:.0%} of the pairs, by up to {most}",
-        pose=pose,
-        share=found.share,
-        most=most,
-    )
-
-
-@say.register
-def _(found: LimitDecides) -> str:
-    return sentence(found.code, LIMITS[found.side], joint=found.joint)
-
-
-@say.register
-def _(found: NothingDecides) -> str:
-    return sentence(found.code, "nothing can: they describe the same arm")
-
-
-@say.register
-def _(found: OrientationDecides) -> str:
-    return sentence(found.code, "the flange's position does not, but its orientation does, or a point off axis 6")
-
-
-@say.register
-def _(found: NothingToRestOn) -> str:
-    return sentence(found.code, "There are no data for a diagnosis.")
+        return say_as(found, "all", pose=pose, most=most)
+    return say_as(found, "share", pose=pose, most=most)
 
 
 @say.register
 def _(found: NothingToExplain) -> str:
-    met = counted(
-        found.code,
-        "Nothing to explain: the one reference about poses, axes and limits is met.",
-        "Nothing to explain: all {count} references about poses, axes and limits are met.",
-        found.references,
-    )
+    met = say_as(found)
     return joined([met, say(found.resolution) if found.resolution else ""], " ")
 
 
@@ -271,75 +309,43 @@ def _(found: NothingToExplain) -> str:
 def _(found: Resolution) -> str:
     texts = []
     if found.length_mm is not None:
-        texts.append(sentence(found.code, "A single wrong length is detected from {mm:.2g} mm on.", mm=found.length_mm))
+        texts.append(say_as(found, "length"))
     if found.angle_deg is not None:
-        texts.append(
-            sentence(found.code, "A single wrong angle is detected from {deg:.2g} deg on.", deg=found.angle_deg)
-        )
+        texts.append(say_as(found, "angle"))
     if found.half_turns:
         entries = joined(found.half_turns, ", ")
-        texts.append(sentence(found.code, "An error of 180 deg in {entries} would not be detected.", entries=entries))
+        texts.append(say_as(found, "half_turns", entries=entries))
     if found.unseen:
         entries = joined(found.unseen, ", ")
-        texts.append(sentence(found.code, "No error in {entries} would be detected.", entries=entries))
+        texts.append(say_as(found, "unseen", entries=entries))
     return joined(texts, " ")
 
 
 @say.register
 def _(found: MostLikelyFault) -> str:
-    return sentence(found.code, "Most likely fault: {hypothesis}.", hypothesis=_residual_falls(found))
+    return say_as(found, hypothesis=_residual_falls(found))
 
 
 @say.register
 def _(found: TooSmallToTell) -> str:
-    return sentence(
-        found.code,
-        "The disagreement ({residual} {unit}) is too small to tell which of {count} faults causes it: "
-        "{candidates}. From about {told} {unit} on these references distinguish them, where they can at all.",
+    return say_as(
+        found,
         residual=shown(found.residual),
         count=len(found.candidates),
         candidates=_candidates(found.candidates),
         told=shown(found.told_from),
-        unit=found.unit,
     )
 
 
 @say.register
 def _(found: MainFault) -> str:
-    return sentence(
-        found.code,
-        "The best hypothesis tried: {hypothesis}, which still exceeds the references' uncertainty.",
-        hypothesis=_residual_falls(found),
-    )
-
-
-@say.register
-def _(found: NoFaultStandsOut) -> str:
-    return counted(
-        found.code,
-        "{count} of {references} references is missed, by up to {times:.3g} times its uncertainty, but none of "
-        "the {tried} faults and pairs of faults that were tried fits better than the table as it is.",
-        "{count} of {references} references are missed, by up to {times:.3g} times their uncertainty, but none "
-        "of the {tried} faults and pairs of faults that were tried fits better than the table as it is.",
-        found.missed,
-        references=found.references,
-        times=found.half_widths,
-        tried=found.tried,
-    )
+    return say_as(found, hypothesis=_residual_falls(found))
 
 
 @say.register
 def _(found: NoFewFaultsExplain) -> str:
-    return sentence(
-        found.code,
-        "None of the {tried} hypotheses tried, of one fault or two, explains the data: the best still leaves "
-        "{after} {unit} of {before} {unit}, and none leaves less than {least} {unit}. This is another arm, or "
-        "more than two numbers are wrong, or one is wrong in a way that was not tried, or a reference is wrong.",
-        tried=found.tried,
-        after=shown(found.residual_after),
-        before=shown(found.residual_before),
-        least=shown(found.least),
-        unit=found.unit,
+    return say_as(
+        found, after=shown(found.residual_after), before=shown(found.residual_before), least=shown(found.least)
     )
 
 
@@ -347,14 +353,10 @@ def _residual_falls(found: MostLikelyFault | MainFault) -> str:
     faults = both(found.faults)
     if found.alternatives:
         faults = sentence(
-            "one_of",
-            "one of {count} that these references can't distinguish ({candidates})",
-            count=1 + len(found.alternatives),
-            candidates=_candidates((found.faults, *found.alternatives)),
+            "one_of", count=1 + len(found.alternatives), candidates=_candidates((found.faults, *found.alternatives))
         )
     return sentence(
         "residual_falls",
-        "{faults}; residual falls from {before} {unit} to {after} {unit}",
         faults=faults,
         before=shown(found.residual_before),
         after=shown(found.residual_after),
@@ -366,13 +368,95 @@ def _candidates(members: Sequence[Faults]) -> str:
     """All members of a set; of a set that no one would read, the first."""
     texts = [both(faults) for faults in members[:MOST_LISTED]]
     if more := len(members) - len(texts):
-        texts.append(counted("candidates", "{count} more", "{count} more", more))
+        texts.append(sentence("candidates", count=more))
     return joined(texts)
 
 
 def _at_joint(joint: int, fault: str) -> str:
-    return _at(sentence("place", "joint {joint}", joint=joint), fault)
+    return _at(sentence("place#joint", joint=joint), fault)
 
 
 def _at(place: str, fault: str) -> str:
-    return sentence("fault_at", "{place}: {fault}", place=place, fault=fault)
+    return sentence("fault_at", place=place, fault=fault)
+
+
+def level(name: str) -> str:
+    """Which entries were estimated, in words."""
+    return word("level", LEVELS, name)
+
+
+@say.register
+def _(found: NotToldApart) -> str:
+    entries = _with_and(found.entries)
+    if found.parallel_joints is None:
+        return say_as(found, entries=entries)
+    first, second = found.parallel_joints
+    return say_as(found, "parallel", entries=entries, first=first, second=second)
+
+
+@say.register
+def _(found: MorePositions) -> str:
+    known = say_as(found, "known", level=level(found.level))
+    needed = say_as(found, "needed")
+    if found.entries:
+        needed = say_as(found, "for_entries", needed=needed)
+    poses = ["(" + ", ".join(as_text(angle, "g") for angle in pose) + ") deg" for pose in found.examples_deg]
+    return say_as(found, "request", known=known, needed=needed, examples=_with_and(poses))
+
+
+@say.register
+def _(found: Misfit) -> str:
+    return say_as(found, level=level(found.level))
+
+
+def lines_of(found: Calibration) -> str:
+    """A calibration as lines of text for a terminal."""
+    lines = [
+        f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
+        f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "
+        f"scatter {found.scatter:.2f} standard deviations",
+        f"{'entry':<9}{'table':>12}{'correction':>14}{'95 % interval':>16}",
+    ]
+    for each in found.estimates:
+        values = as_text(each.nominal, ">12.4f") + as_text(each.correction, ">+14.4f") + f"{each.half_width:>12.4f}"
+        lines.append(f"{each.name:<9}{values} {each.unit}")
+    lines += [f"not estimated: {say(reason)}" for reason in found.held]
+    lines += [
+        f"strongly correlated: {pair.first} and {pair.second} ({as_text(pair.correlation, '.2f')})"
+        for pair in found.close
+    ]
+    if found.scatter > MUCH_SCATTER:
+        lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
+    if found.more:
+        lines.append(f"to estimate more: {say(found.more)}")
+    return "\n".join(lines)
+
+
+def calibration_record(found: Calibration) -> dict[str, object]:
+    """A calibration as plain data, for another program; corrections in mm and deg with half their 95 % interval."""
+    return {
+        "level": found.level,
+        "coordinates": found.coordinates,
+        "poses": found.poses,
+        "rms_before_mm": found.rms_before_mm,
+        "rms_after_mm": found.rms_after_mm,
+        "scatter": found.scatter,
+        "fits": found.fits,
+        "entries": [
+            {
+                "name": each.name,
+                "nominal": each.nominal,
+                "correction": each.correction,
+                "half_width": each.half_width,
+                "unit": each.unit,
+            }
+            for each in found.estimates
+        ],
+        "held": [say(reason) for reason in found.held],
+        "more": say(found.more) if found.more else None,
+    }
+
+
+def _with_and(words: Sequence[str]) -> str:
+    """Words in a row, with "and" before the last."""
+    return sentence("list", others=joined(words[:-1], ", "), last=words[-1])

@@ -1,24 +1,46 @@
-"""What the dynamics page and recording say beside the verdict."""
+"""The verdict of the dynamics stage, and what its page and recording say of masses."""
 
 from __future__ import annotations
 
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import (
-    AboutOrigin,
-    CentreOutside,
     ImpossibleInertia,
-    InertiaWithoutMass,
-    MissingLink,
-    PointMass,
-    SumOffWeight,
-    UnlikelyDensity,
-    UnlikelyInertia,
 )
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import say, sentence, word
+from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.stages.dynamics.model import (
+    AllWithin,
+    Compared,
+    DataOpen,
+    Marginal,
+    Need,
+    NoData,
+    NoLimits,
+    Quantity,
+    Use,
+)
 from er3a.robots.masses import NoBody
 
+QUANTITIES: dict[Quantity, str] = {
+    "peak": N_("peak torque"),
+    "rms": N_("RMS torque"),
+    "holding": N_("holding torque"),
+    "payload": N_("payload"),
+    "moment": N_("wrist moment"),
+    "inertia": N_("wrist inertia"),
+}
+NEEDS: dict[Need, str] = {
+    "masses": N_("mass, centre of mass and inertia of the links"),
+    "peak": N_("peak torques of the drives"),
+    "rated": N_("rated torques of the drives"),
+    "armature": N_("rotor inertias and gear ratios"),
+    "friction": N_("friction of the joints"),
+    "wrist_moment": N_("allowed moments at the wrist"),
+    "wrist_inertia": N_("allowed inertias at the wrist"),
+    "payload": N_("rated payload"),
+    "load": N_("mass, centre and inertia of tool and payload"),
+}
 FIGURES = {
     "paths": N_("Paths computed"),
     "mass": N_("Mass of the links"),
@@ -37,85 +59,151 @@ WHY: dict[NoBody, str] = {
 }
 
 
+TEXTS = texts(
+    {
+        "dynamics.use#path": (
+            "{what} at J{joint} on {path}: {asked:.3g} {unit} of {allowed:.3g} {unit} ({percent:.0f} %)"
+        ),
+        "dynamics.use#value": "{what} {asked:.3g} {unit} of {allowed:.3g} {unit} ({percent:.0f} %)",
+        "dynamics.use#joint": "{what} at J{joint}: {asked:.3g} {unit} of {allowed:.3g} {unit} ({percent:.0f} %)",
+        "dynamics.no_data": "No data: torques need masses. Needed: {needs}.",
+        "dynamics.no_limits#path": (
+            "No drive's limits are known, so the motors can't be judged. The greatest torque is {torque:.3g} ± "
+            "{tolerance:.2g} {unit}, at J{joint} on path {path}."
+        ),
+        "dynamics.no_limits#holding": (
+            "No drive's limits are known, so the motors can't be judged. The greatest holding torque is {torque:.3g} "
+            "± {tolerance:.2g} {unit}, at J{joint}."
+        ),
+        "dynamics.fits": "Fits: every quantity with a known limit is within it; highest utilisation: {use}.",
+        "dynamics.unlimited": "Unknown, wholly or in part: {what}.",
+        "dynamics.marginal": (
+            "Marginal: within the limits, but masses are too uncertain or doubtful to rely on it; highest "
+            "utilisation: {use}."
+        ),
+        "dynamics.overload": Plural(
+            "count",
+            "Overload: {beyond} of {count} comparison is beyond its limit; worst: {use}.",
+            "Overload: {beyond} of {count} comparisons are beyond their limits; worst: {use}.",
+        ),
+        "dynamics.massless": Plural(
+            "count",
+            "Link {links} has no mass in the file and counts as massless.",
+            "Links {links} have no mass in the file and count as massless.",
+        ),
+        "dynamics.doubts": Plural(
+            "count", "{count} finding casts doubt on the masses.", "{count} findings cast doubt on the masses."
+        ),
+        "dynamics.inferred": "Masses are inferred: the results are orders of magnitude only.",
+        "dynamics.unknown#joints": "{what}: J{numbers}",
+        "dynamics.unknown#links": "{what}: link {numbers}",
+        "missing_link": by(
+            "singular",
+            false="link {link}: no mass is given; it counts as massless",
+            true=(
+                "link {link}: no mass, inertia or rotor is given; its joint's torque counts as 0, and accelerations "
+                "under given torques (forward dynamics) have no value"
+            ),
+        ),
+        "point_mass": "link {link}: mass without inertia",
+        "inertia_without_mass": "link {link}: inertia without mass; it is used as given",
+        "centre_outside": (
+            "link {link}: the centre of mass is {outside_mm:.0f} mm outside the link's shape; check its frame and unit"
+        ),
+        "unlikely_density": (
+            "link {link}: {mass_kg:.4g} kg in the link's shape make {density_kg_m3:.3g} kg/m³; check g against kg"
+        ),
+        "unlikely_inertia": (
+            "link {link}: the radius of gyration is {gyration_mm:.3g} mm, that of the link's shape {shape_mm:.3g} mm; "
+            "check the unit of the inertia (kg m²)"
+        ),
+        "about_origin": (
+            "link {link}: the inertia looks as if it were about the frame's origin, not the centre of mass: "
+            "{given_kg_m2:.3g} kg m² given, {about_centre_kg_m2:.3g} if so, {shape_kg_m2:.3g} by the link's shape"
+        ),
+        "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
+        "impossible_inertia": "link {link}: no body can have this inertia ({why})",
+    }
+)
+
+
+def need_word(need: Need) -> str:
+    """What is asked for."""
+    return word("dynamics.need", NEEDS, need)
+
+
+def quantity_word(quantity: Quantity) -> str:
+    """What is compared."""
+    return word("dynamics.quantity", QUANTITIES, quantity)
+
+
+def use_text(use: Use) -> str:
+    """What is asked for and allowed, where."""
+    parts = {
+        "what": quantity_word(use.quantity),
+        "asked": use.asked,
+        "allowed": use.allowed,
+        "unit": use.unit,
+        "percent": 100 * use.ratio,
+        "joint": use.joint,
+        "path": use.path,
+    }
+    if use.joint is None:
+        return sentence("dynamics.use#value", **parts)
+    if use.path is None:
+        return sentence("dynamics.use#joint", **parts)
+    return sentence("dynamics.use#path", **parts)
+
+
+@say.register
+def _(found: NoData) -> str:
+    needs: list[Need] = [each.what for each in found.needs if each.what in ("masses", "peak", "load")]
+    return say_as(found, needs=joined(map(need_word, needs), ", "))
+
+
+@say.register
+def _(found: NoLimits) -> str:
+    parts = {"joint": found.joint, "torque": found.torque, "tolerance": found.tolerance, "unit": found.unit}
+    greatest = say_as(found, "path" if found.path else "holding", **parts)
+    return joined([greatest, *_reservations(found)], " ")
+
+
+@say.register
+def _(found: Compared) -> str:
+    tightest = use_text(found.tightest)
+    if isinstance(found, AllWithin):
+        verdict = sentence("dynamics.fits", use=tightest)
+    elif isinstance(found, Marginal):
+        verdict = sentence("dynamics.marginal", use=tightest)
+    else:
+        verdict = sentence("dynamics.overload", count=found.compared, beyond=found.beyond, use=tightest)
+    open_ = ""
+    if found.unlimited:
+        what = joined(map(need_word, found.unlimited), ", ")
+        open_ = sentence("dynamics.unlimited", what=what)
+    return joined([verdict, open_, *_reservations(found)], " ")
+
+
+def _reservations(found: Compared | NoLimits) -> list[str]:
+    missing = ", ".join(map(str, found.missing_links))
+    return [
+        sentence("dynamics.massless", count=len(found.missing_links), links=missing) if missing else "",
+        sentence("dynamics.doubts", count=found.doubts) if found.doubts else "",
+        sentence("dynamics.inferred") if found.inferred else "",
+    ]
+
+
+@say.register
+def _(found: DataOpen) -> str:
+    if not found.numbers:
+        return need_word(found.what)
+    parts = {"what": need_word(found.what), "numbers": ", ".join(map(str, found.numbers))}
+    if found.what == "masses":
+        return sentence("dynamics.unknown#links", **parts)
+    return sentence("dynamics.unknown#joints", **parts)
+
+
 @say.register
 def _(found: ImpossibleInertia) -> str:
     why = word("dynamics.why", WHY, found.why)
-    return sentence(found.code, "link {link}: no body can have this inertia ({why})", link=found.link, why=why)
-
-
-@say.register
-def _(found: MissingLink) -> str:
-    if found.singular:
-        return sentence(
-            found.code,
-            "link {link}: no mass, inertia or rotor is given; its joint's torque counts as 0, and accelerations under "
-            "given torques (forward dynamics) have no value",
-            link=found.link,
-        )
-    return sentence(found.code, "link {link}: no mass is given; it counts as massless", link=found.link)
-
-
-@say.register
-def _(found: PointMass) -> str:
-    return sentence(found.code, "link {link}: mass without inertia", link=found.link)
-
-
-@say.register
-def _(found: InertiaWithoutMass) -> str:
-    return sentence(found.code, "link {link}: inertia without mass; it is used as given", link=found.link)
-
-
-@say.register
-def _(found: CentreOutside) -> str:
-    return sentence(
-        found.code,
-        "link {link}: the centre of mass is {far:.0f} mm outside the link's shape; check its frame and unit",
-        link=found.link,
-        far=found.outside_mm,
-    )
-
-
-@say.register
-def _(found: UnlikelyDensity) -> str:
-    return sentence(
-        found.code,
-        "link {link}: {mass:.4g} kg in the link's shape make {density:.3g} kg/m³; check g against kg",
-        link=found.link,
-        mass=found.mass_kg,
-        density=found.density_kg_m3,
-    )
-
-
-@say.register
-def _(found: UnlikelyInertia) -> str:
-    return sentence(
-        found.code,
-        "link {link}: the radius of gyration is {own:.3g} mm, that of the link's shape {shape:.3g} mm; check the "
-        "unit of the inertia (kg m²)",
-        link=found.link,
-        own=found.gyration_mm,
-        shape=found.shape_mm,
-    )
-
-
-@say.register
-def _(found: AboutOrigin) -> str:
-    return sentence(
-        found.code,
-        "link {link}: the inertia looks as if it were about the frame's origin, not the centre of mass: "
-        "{given:.3g} kg m² given, {rest:.3g} if so, {shape:.3g} by the link's shape",
-        link=found.link,
-        given=found.given_kg_m2,
-        rest=found.about_centre_kg_m2,
-        shape=found.shape_kg_m2,
-    )
-
-
-@say.register
-def _(found: SumOffWeight) -> str:
-    return sentence(
-        found.code,
-        "the links' masses add to {sum:.4g} kg, and the manufacturer states {weight:.4g} kg",
-        sum=found.sum_kg,
-        weight=found.weight_kg,
-    )
+    return say_as(found, why=why)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import counted, joined, listed, say, sentence, word
-from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet, Outcome, UnmetExpectation
+from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.stages.expectations import Demonstration, Outcome, UnmetExpectation
 
 OUTCOMES: dict[Outcome, str] = {
     "unreachable": N_("unreachable"),
@@ -26,6 +26,20 @@ OUTCOMES: dict[Outcome, str] = {
 }
 
 
+TEXTS = texts(
+    {
+        "expectations_unmet": Plural(
+            "unmet",
+            "{count} of {expectations} expectations is not met: {unmet:; }.",
+            "{count} of {expectations} expectations are not met: {unmet:; }.",
+        ),
+        "demonstrations": Plural("count", "{count} fails as expected: {named}", "{count} fail as expected: {named}"),
+        "demonstration": "{name} ({outcome})",
+        "unmet_expectation": "{name} ({found}; expected: {expected})",
+    }
+)
+
+
 def outcome_word(outcome: Outcome) -> str:
     """What a target or a path came to, in words."""
     return word("trajectory.path", OUTCOMES, outcome)
@@ -35,38 +49,14 @@ def demonstrated(shown: tuple[Demonstration, ...]) -> str:
     """What fails as it is meant to; empty if nothing does."""
     if not shown:
         return ""
-    return counted(
-        "demonstrations",
-        "{count} fails as expected: {named}",
-        "{count} fail as expected: {named}",
-        len(shown),
-        named=joined(listed(shown), ", "),
-    )
+    return sentence("demonstrations", count=len(shown), named=joined(listed(shown), ", "))
 
 
 @say.register
 def _(found: Demonstration) -> str:
-    return sentence(found.code, "{own_name} ({outcome})", own_name=found.name, outcome=outcome_word(found.found))
+    return say_as(found, outcome=outcome_word(found.found))
 
 
 @say.register
 def _(found: UnmetExpectation) -> str:
-    return sentence(
-        found.code,
-        "{own_name} ({found}; expected: {expected})",
-        own_name=found.name,
-        found=outcome_word(found.found),
-        expected=outcome_word(found.expected),
-    )
-
-
-@say.register
-def _(found: ExpectationsUnmet) -> str:
-    return counted(
-        found.code,
-        "{count} of {total} expectations is not met: {named}.",
-        "{count} of {total} expectations are not met: {named}.",
-        len(found.unmet),
-        total=found.expectations,
-        named=joined(listed(found.unmet)),
-    )
+    return say_as(found, found=outcome_word(found.found), expected=outcome_word(found.expected))

@@ -1,22 +1,25 @@
-"""The names of the inverse stage's key figures, and the sentences of its page."""
+"""The verdict of the inverse stage, and what its page says."""
 
 from __future__ import annotations
 
-from er3a.pipeline.messages.inverse_verdict import say
+import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import joined, sentence
+from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts
+from er3a.pipeline.stages.expectations import Demonstration
 from er3a.pipeline.stages.inverse.model import (
-    AtSingularity,
-    MoveObstacle,
-    NearLimit,
-    ShiftingDoesNotHelp,
+    AllSolved,
+    NoneSolved,
+    ReachMissing,
     ShiftTool,
-    TurningDoesNotHelp,
+    SomeUnsolved,
     TurnTool,
+    UnsolvedTarget,
 )
 from er3a.robots.joint_limits import CombinationExceeded, Exceeded, LimitsExceeded, SlideExceeded
 
+NAMED = 3
 FIGURES = {
     "targets_solved": N_("targets solved"),
     "solutions_of_random_pose": N_("solutions of a random reachable pose, mean"),
@@ -35,14 +38,6 @@ FREE_AT = {
     "elbow": N_("arm folded onto itself"),
     "curve": N_("self-motion"),
 }
-AT = {
-    "wrist": N_(
-        "Wrist singularity: axes 4 and 6 are collinear, so J4 and J6 turn the tool about the same line; the "
-        "pair nearest to the reference is taken. Leave this pose by a joint move, not along a straight line."
-    ),
-    "elbow": N_("Elbow singularity: the arm is stretched or folded, so the wrist centre can't move along the arm."),
-    "shoulder": N_("Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows."),
-}
 SHAPES = {
     "front_elbow_up_no_flip": N_("front, elbow up"),
     "front_elbow_up_flip": N_("front, elbow up"),
@@ -53,10 +48,127 @@ SHAPES = {
     "back_elbow_down_no_flip": N_("back, elbow down"),
     "back_elbow_down_flip": N_("back, elbow down"),
 }
-SUM_IN_SHORT = {"above": N_("{sum} {excess:.1f} above"), "below": N_("{sum} {excess:.1f} below")}
-SLIDE_IN_SHORT = {"above": N_("J{joint} {excess:.1f} mm above"), "below": N_("J{joint} {excess:.1f} mm below")}
 ORIENTATIONS = {"tool_down": N_("tool straight down"), "tool_level": N_("tool level, outward")}
 ORIENTATION_TITLES = {"tool_down": N_("Tool straight down"), "tool_level": N_("Tool level, outward")}
+
+
+TEXTS = texts(
+    {
+        "inverse.not_reproduced": (
+            "The solver can't be trusted here: worst residual {worst_mm:.2g} mm and {worst_deg:.2g} deg, the joint "
+            "angles of {lost} random poses not found again."
+        ),
+        "unsolved_target": "{name} ({obstacle})",
+        "nothing_found": "no solution found",
+        "tilt_missing": "{angle_deg:.3g} deg beyond the wrist's range",
+        "branches_leave_limits": Plural(
+            "count", "the only solution is outside the limits", "all {count} solutions are outside the limits"
+        ),
+        "branches_collide": Plural(
+            "count", "the only branch within the limits collides", "all {count} branches within the limits collide"
+        ),
+        "inverse.all_solved#some": Plural(
+            "targets",
+            "{count} of {total} targets has a solution {where}.",
+            "{count} of {total} targets have a solution {where}.",
+        ),
+        "inverse.all_solved#every": "Every target ({targets}) has a solution {where}.",
+        "inverse.none_solved": "No target has a solution {where}: {none_for}.",
+        "inverse.some_unsolved": Plural(
+            "solved",
+            "{count} of {total} targets has a solution {where}; none for {none_for}.",
+            "{count} of {total} targets have a solution {where}; none for {none_for}.",
+        ),
+        "where#itself": "within the limits and free of self-collision",
+        "where#scene": "within the limits and free of collisions",
+        "reach_missing#near": "{gap_mm:.2g} mm out of reach",
+        "reach_missing#far": "{gap_mm:.0f} mm out of reach",
+        "turning_does_not_help": (
+            "Turning the tool does not help: no orientation tried at this position has a solution."
+        ),
+        "shifting_does_not_help": (
+            "Moving the part alone does not help: no position tried has a solution with this orientation."
+        ),
+        "move_obstacle": "Move the part, the obstacle or the base: the joint limits allow this pose.",
+        "near_limit": "Little margin: one joint is {margin_deg:.2g} deg from its limit.",
+        "sum_in_short#above": "{sum} {excess:.1f} above",
+        "sum_in_short#below": "{sum} {excess:.1f} below",
+        "slide_in_short#above": "J{joint} {excess:.1f} mm above",
+        "slide_in_short#below": "J{joint} {excess:.1f} mm below",
+        "at_singularity": by(
+            "kind",
+            wrist=(
+                "Wrist singularity: axes 4 and 6 are collinear, so J4 and J6 turn the tool about the same line; the "
+                "pair nearest to the reference is taken. Leave this pose by a joint move, not along a straight line."
+            ),
+            elbow="Elbow singularity: the arm is stretched or folded, so the wrist centre can't move along the arm.",
+            shoulder="Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows.",
+        ),
+        "turn_in_short#above": "J{joint} {excess:.1f} above",
+        "turn_in_short#below": "J{joint} {excess:.1f} below",
+        "turn_tool": (
+            "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the limits, "
+            "the nearest one found {least_turn_deg:.1f} deg away."
+        ),
+        "shift_tool": (
+            "Move the part or the base: with the tool's orientation kept, a shift of {shift_mm:.0f} mm to ({x:.0f}, "
+            "{y:.0f}, {z:.0f}) mm is enough."
+        ),
+    }
+)
+
+
+@say.register
+def _(found: AllSolved) -> str:
+    if not found.targets:
+        return _and_demonstrations("", found.demonstrations)
+    where = _where(found.collisions)
+    if not found.demonstrations:
+        return say_as(found, "every", where=where)
+    some = say_as(found, "some", total=found.targets + len(found.demonstrations), where=where)
+    return _and_demonstrations(some, found.demonstrations)
+
+
+@say.register
+def _(found: NoneSolved) -> str:
+    none = say_as(found, where=_where(found.collisions), none_for=_none_for(found.unsolved))
+    return _and_demonstrations(none, found.demonstrations)
+
+
+@say.register
+def _(found: SomeUnsolved) -> str:
+    some = say_as(
+        found,
+        total=found.targets + len(found.demonstrations),
+        where=_where(found.collisions),
+        none_for=_none_for(found.unsolved),
+    )
+    return _and_demonstrations(some, found.demonstrations)
+
+
+def _and_demonstrations(text: str, shown: tuple[Demonstration, ...]) -> str:
+    expected = demonstrated(shown)
+    return joined([text, sentence("finding", finding=expected) if expected else ""], " ")
+
+
+def _where(collisions: bool) -> str:
+    if collisions:
+        return sentence("where#scene")
+    return sentence("where#itself")
+
+
+def _none_for(unsolved: tuple[UnsolvedTarget, ...]) -> str:
+    named = listed(unsolved[:NAMED])
+    if len(unsolved) > NAMED:
+        named.append(sentence("more", count=len(unsolved) - NAMED))
+    return joined(named, ", ")
+
+
+@say.register
+def _(found: ReachMissing) -> str:
+    if found.gap_mm >= 10:
+        return say_as(found, "far")
+    return say_as(found, "near")
 
 
 def limits_in_short(found: LimitsExceeded) -> str:
@@ -66,62 +178,20 @@ def limits_in_short(found: LimitsExceeded) -> str:
 
 def _in_short(found: Exceeded) -> str:
     if isinstance(found, CombinationExceeded):
-        text = SUM_IN_SHORT[found.side]
-        return sentence(found.code, text, sum=sum_of_joints(found.joints, found.factors), excess=found.excess)
+        return sentence(
+            f"sum_in_short#{found.side}", sum=sum_of_joints(found.joints, found.factors), excess=found.excess
+        )
     if isinstance(found, SlideExceeded):
-        return sentence(found.code, SLIDE_IN_SHORT[found.side], joint=found.joint, excess=found.excess_mm)
-    if found.side == "above":
-        return sentence(found.code, "J{joint} {excess:.1f} above", joint=found.joint, excess=found.excess_deg)
-    return sentence(found.code, "J{joint} {excess:.1f} below", joint=found.joint, excess=found.excess_deg)
+        return sentence(f"slide_in_short#{found.side}", joint=found.joint, excess=found.excess_mm)
+    return sentence(f"turn_in_short#{found.side}", joint=found.joint, excess=found.excess_deg)
 
 
 @say.register
 def _(found: TurnTool) -> str:
-    return sentence(
-        found.code,
-        "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the limits, the "
-        "nearest one found {angle:.1f} deg away.",
-        share=100 * found.orientation_ratio,
-        angle=found.least_turn_deg,
-    )
-
-
-@say.register
-def _(found: TurningDoesNotHelp) -> str:
-    return sentence(found.code, "Turning the tool does not help: no orientation tried at this position has a solution.")
+    return say_as(found, share=100 * found.orientation_ratio)
 
 
 @say.register
 def _(found: ShiftTool) -> str:
     x, y, z = found.to_mm
-    return sentence(
-        found.code,
-        "Move the part or the base: with the tool's orientation kept, a shift of {shift:.0f} mm to ({x:.0f}, {y:.0f}, "
-        "{z:.0f}) mm is enough.",
-        shift=found.shift_mm,
-        x=x,
-        y=y,
-        z=z,
-    )
-
-
-@say.register
-def _(found: ShiftingDoesNotHelp) -> str:
-    return sentence(
-        found.code, "Moving the part alone does not help: no position tried has a solution with this orientation."
-    )
-
-
-@say.register
-def _(found: MoveObstacle) -> str:
-    return sentence(found.code, "Move the part, the obstacle or the base: the joint limits allow this pose.")
-
-
-@say.register
-def _(found: AtSingularity) -> str:
-    return sentence(found.code, AT[found.kind])
-
-
-@say.register
-def _(found: NearLimit) -> str:
-    return sentence(found.code, "Little margin: one joint is {margin:.2g} deg from its limit.", margin=found.margin_deg)
+    return say_as(found, x=x, y=y, z=z)

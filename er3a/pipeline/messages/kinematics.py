@@ -1,39 +1,35 @@
-"""Sentences about joint solutions, joint limits and arms without a closed form."""
+"""Joint solutions, joint limits, arms without a closed form, and which solution is taken."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.kinematics.solutions import (
-    BadGuess,
     ByClass,
-    DependentJoints,
-    Iteration,
     Label,
-    LimitBound,
-    NearestMiss,
-    NoSolutionOfClass,
     PoseUnsolved,
     SideUnsolved,
-    SingularEnd,
-    Unreachable,
-    WristTiltsTooLittle,
+    Unsolved,
     WristTooFar,
     WristTooNear,
     WristTooNearAxis1,
 )
 from er3a.kinematics.wrist_partitioned import (
-    CoupledJoints,
-    CoupledWrist,
-    ElbowAxesNotParallel,
-    NeighboursParallel,
-    NoArmLength,
     NotSixTurning,
-    NoWristCentre,
 )
-from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import joined, listed, say, sentence, word
+from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts, word
 from er3a.robots.joint_limits import CombinationExceeded, LimitExceeded, LimitsExceeded, SlideExceeded
+from er3a.selection.nearest import (
+    AllOutsideLimits,
+    LowerBranchNumber,
+    MovesLess,
+    MovesLessTogether,
+    NoSolution,
+    OtherBranch,
+)
+from er3a.selection.select import RULES, BestByRules, Measure, Placed
 
 BRANCHES = {
     "front_elbow_up_no_flip": N_("front, elbow up, no flip"),
@@ -81,28 +77,100 @@ SINGULARITIES = {
     "shoulder": N_("shoulder"),
     "dependent_axes": N_("rank loss"),
 }
-LIMIT_SIDES = {
-    "above": N_("J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg"),
-    "below": N_("J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg"),
+RULE_NAMES = {
+    "nearest": N_("nearest"),
+    "weighted": N_("weighted"),
+    "time": N_("time"),
+    "manipulability": N_("manipulability"),
+    "limits": N_("limits"),
+    "clearance": N_("clearance"),
+    "mix": N_("mix"),
 }
-SLIDE_SIDES = {
-    "above": N_("J{joint} at {at:.1f} mm is {by:.3g} mm above its limit of {bound:g} mm"),
-    "below": N_("J{joint} at {at:.1f} mm is {by:.3g} mm below its limit of {bound:g} mm"),
+RULE_TITLES = {
+    "nearest": N_("smallest maximum joint motion"),
+    "weighted": N_("least joint moves, weighted by how far each joint swings the tool"),
+    "time": N_("least time at the joint speeds"),
+    "manipulability": N_("farthest from singularities (manipulability)"),
+    "limits": N_("farthest from the joint limits"),
+    "clearance": N_("farthest from obstacles and from itself"),
 }
-SUM_SIDES = {
-    "above": N_("{sum} at {at:.1f} {unit} is {by:.3g} {unit} above its limit of {bound:g} {unit}"),
-    "below": N_("{sum} at {at:.1f} {unit} is {by:.3g} {unit} below its limit of {bound:g} {unit}"),
-}
-GUESSES = {
-    "other_starts": N_("bad guess: from the start given {miss}; other starts solve it, so allow restarts"),
-    "without_limits": N_("bad guess: {miss}; ignoring the limits, a solution within them was found: start there"),
-}
+
+
+TEXTS = texts(
+    {
+        "coupled_wrist": "its joints are coupled in another way than by whole turns among the first three",
+        "coupled_joints": "its joints are coupled, or sums of them have limits",
+        "elbow_axes_not_parallel": "axes 2 and 3 are not parallel",
+        "neighbouring_axes_parallel": "axes {first} and {second} are parallel",
+        "no_common_point_of_axes_4_5_6": "axes 4, 5 and 6 miss a common point by {miss_mm:.6g} mm",
+        "upper_arm_or_forearm_without_length": "the upper arm or the forearm has no length",
+        "no_solution_of_class": "no joint values reach the pose; {miss}",
+        "dependent_joints": (
+            "its joints move the tool in fewer ways than there are joints (parallel slides, for instance), so that "
+            "each pose has infinitely many solutions or none"
+        ),
+        "iteration": (
+            "iteration from {starts} random starts, which may miss solutions; no closed form, because {lacking}"
+        ),
+        "wrist_tilts_too_little": "the wrist can't tilt that far; {missing_deg:.3g} deg are missing",
+        "nearest_miss": "the nearest configuration found misses by {position_mm:.3g} mm and {rotation_deg:.3g} deg",
+        "limit_bound": "limit-bound: {miss}; a configuration outside the limits solves it: {exceeded}",
+        "singular": "singular: the iteration converges slowly to a singular configuration and ends there: {miss}",
+        "unreachable": "unreachable: {miss}, whatever the start",
+        "limit_exceeded#above": "J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg",
+        "limit_exceeded#below": "J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg",
+        "slide_exceeded#above": "J{joint} at {at:.1f} mm is {by:.3g} mm above its limit of {bound:g} mm",
+        "slide_exceeded#below": "J{joint} at {at:.1f} mm is {by:.3g} mm below its limit of {bound:g} mm",
+        "combination_exceeded#above": "{sum} at {at:.1f} {unit} is {by:.3g} {unit} above its limit of {bound:g} {unit}",
+        "combination_exceeded#below": "{sum} at {at:.1f} {unit} is {by:.3g} {unit} below its limit of {bound:g} {unit}",
+        "bad_guess": by(
+            "solved_by",
+            other_starts="bad guess: from the start given {miss}; other starts solve it, so allow restarts",
+            without_limits="bad guess: {miss}; ignoring the limits, a solution within them was found: start there",
+        ),
+        "found_arm": "solution {number}",
+        "not_six_turning_joints#revolute": "it has {joints} joints",
+        "not_six_turning_joints#sliding": "it has sliding joints ({sliding})",
+        "by_class": "{arm_class}",
+        "by_class_in_doubt": "{arm_class}; because of rounding, solutions may be missing",
+        "by_class_cuspidal": (
+            "{arm_class}; cuspidal: joint moves without a singularity join its branches, so they are numbered"
+        ),
+        "by_class_numbered": "{arm_class}; no signs separate its branches, so they are numbered",
+        "wrist_too_near_axis_1": "the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset",
+        "wrist_too_far": (
+            "the wrist centre would be {gap} too far from axis 2, which the stretched arm reaches to {reach}"
+        ),
+        "wrist_too_near": (
+            "the wrist centre would be {gap} too near to axis 2, which the folded arm reaches down to {least}"
+        ),
+        "side_unsolved": "{side}: {why}",
+        "greatest_move": "greatest joint move {angle_deg:.1f} deg (J{joint})",
+        "only_admissible": "{move}; the only admissible solution",
+        "joint_turned": "J{joint} turned by {turn_deg:+d} deg",
+        "other_turns": "the same branch, {joints:, }",
+        "other_free_joint": "the same branch, its free joint at another angle",
+        "all_collide": "all {count} solutions within the limits collide: {overlap}",
+        "moves_less": "{move}, {less_deg:.3g} deg less than {other}",
+        "moves_less_together": "{move}, as with {other}; all joints taken together move {less_deg:.3g} deg less",
+        "lower_branch_number": "{move}; {other} is just as near, and the lower branch number decides",
+        "next_best": "the next best ({branch})",
+        "no_solution": "out of reach: {fault}",
+        "all_outside_limits#several": (
+            "all {count} solutions leave the limits; the nearest to them is {branch}: {reason}"
+        ),
+        "all_outside_limits#one": "the only solution leaves them: {branch}: {reason}",
+        "placed": "place {place}: {measures}",
+        "best_by_rules#ranked": "{measures}; the next best has {next_best}",
+        "best_by_rules#only": "{measures}; the only admissible solution",
+    }
+)
 
 
 def branch_word(label: Label | str, branch: int = 0) -> str:
     """A branch by its code, or the number of an arm that iteration found."""
     if label == "found_arm":
-        return sentence("found_arm", "solution {number}", number=branch + 1)
+        return sentence("found_arm", number=branch + 1)
     return word("branch", BRANCHES, label)
 
 
@@ -114,20 +182,20 @@ def singularity_word(kind: str) -> str:
 @say.register
 def _(found: LimitExceeded) -> str:
     at, by, bound = found.angle_deg, found.excess_deg, found.limit_deg
-    return sentence(found.code, LIMIT_SIDES[found.side], joint=found.joint, at=at, by=by, bound=bound)
+    return say_as(found, found.side, joint=found.joint, at=at, by=by, bound=bound)
 
 
 @say.register
 def _(found: SlideExceeded) -> str:
     at, by, bound = found.position_mm, found.excess_mm, found.limit_mm
-    return sentence(found.code, SLIDE_SIDES[found.side], joint=found.joint, at=at, by=by, bound=bound)
+    return say_as(found, found.side, joint=found.joint, at=at, by=by, bound=bound)
 
 
 @say.register
 def _(found: CombinationExceeded) -> str:
     at, by, bound, unit = found.value, found.excess, found.limit, "mm" if found.sliding else "deg"
     named = sum_of_joints(found.joints, found.factors)
-    return sentence(found.code, SUM_SIDES[found.side], sum=named, at=at, by=by, bound=bound, unit=unit)
+    return say_as(found, found.side, sum=named, at=at, by=by, bound=bound, unit=unit)
 
 
 def sum_of_joints(joints: Sequence[int], factors: Sequence[float]) -> str:
@@ -148,119 +216,40 @@ def _(found: LimitsExceeded) -> str:
 @say.register
 def _(found: NotSixTurning) -> str:
     if found.sliding:
-        return sentence(found.code, "it has sliding joints ({count})", count=found.sliding)
-    return sentence(found.code, "it has {count} joints", count=found.joints)
-
-
-@say.register
-def _(found: CoupledWrist) -> str:
-    return sentence(found.code, "its joints are coupled in another way than by whole turns among the first three")
-
-
-@say.register
-def _(found: CoupledJoints) -> str:
-    return sentence(found.code, "its joints are coupled, or sums of them have limits")
-
-
-@say.register
-def _(found: ElbowAxesNotParallel) -> str:
-    return sentence(found.code, "axes 2 and 3 are not parallel")
-
-
-@say.register
-def _(found: NeighboursParallel) -> str:
-    return sentence(found.code, "axes {first} and {second} are parallel", first=found.first, second=found.second)
-
-
-@say.register
-def _(found: NoWristCentre) -> str:
-    return sentence(found.code, "axes 4, 5 and 6 miss a common point by {miss:.6g} mm", miss=found.miss_mm)
-
-
-@say.register
-def _(found: NoArmLength) -> str:
-    return sentence(found.code, "the upper arm or the forearm has no length")
+        return say_as(found, "sliding")
+    return say_as(found, "revolute")
 
 
 @say.register
 def _(found: ByClass) -> str:
     parts = {"arm_class": word("arm_class", ARM_CLASSES, found.arm_class)}
     if not found.certain:
-        return sentence("by_class_in_doubt", "{arm_class}; because of rounding, solutions may be missing", **parts)
+        return sentence("by_class_in_doubt", **parts)
     if found.cuspidal:
-        return sentence(
-            "by_class_cuspidal",
-            "{arm_class}; cuspidal: joint moves without a singularity join its branches, so they are numbered",
-            **parts,
-        )
+        return sentence("by_class_cuspidal", **parts)
     if not found.named:
-        return sentence(
-            "by_class_numbered", "{arm_class}; no signs separate its branches, so they are numbered", **parts
-        )
-    return sentence(found.code, "{arm_class}", **parts)
-
-
-@say.register
-def _(found: NoSolutionOfClass) -> str:
-    return sentence(found.code, "no joint values reach the pose; {miss}", miss=say(found.miss))
-
-
-@say.register
-def _(found: DependentJoints) -> str:
-    return sentence(
-        found.code,
-        "its joints move the tool in fewer ways than there are joints (parallel slides, for instance), so that each"
-        " pose has infinitely many solutions or none",
-    )
-
-
-@say.register
-def _(found: Iteration) -> str:
-    return sentence(
-        found.code,
-        "iteration from {starts} random starts, which may miss solutions; no closed form, because {lacking}",
-        starts=found.starts,
-        lacking=say(found.lacking),
-    )
-
-
-@say.register
-def _(found: WristTiltsTooLittle) -> str:
-    return sentence(found.code, "the wrist can't tilt that far; {angle:.3g} deg are missing", angle=found.missing_deg)
+        return sentence("by_class_numbered", **parts)
+    return say_as(found, **parts)
 
 
 @say.register
 def _(found: WristTooNearAxis1) -> str:
-    return sentence(
-        found.code,
-        "the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset",
-        gap=_mm(found.gap_mm),
-    )
+    return say_as(found, gap=_mm(found.gap_mm))
 
 
 @say.register
 def _(found: WristTooFar) -> str:
-    return sentence(
-        found.code,
-        "the wrist centre would be {gap} too far from axis 2, which the stretched arm reaches to {reach}",
-        gap=_mm(found.gap_mm),
-        reach=_mm(found.reach_mm),
-    )
+    return say_as(found, gap=_mm(found.gap_mm), reach=_mm(found.reach_mm))
 
 
 @say.register
 def _(found: WristTooNear) -> str:
-    return sentence(
-        found.code,
-        "the wrist centre would be {gap} too near to axis 2, which the folded arm reaches down to {least}",
-        gap=_mm(found.gap_mm),
-        least=_mm(found.least_mm),
-    )
+    return say_as(found, gap=_mm(found.gap_mm), least=_mm(found.least_mm))
 
 
 @say.register
 def _(found: SideUnsolved) -> str:
-    return sentence(found.code, "{side}: {fault}", side=word("side", SIDES, found.side), fault=say(found.why))
+    return say_as(found, side=word("side", SIDES, found.side))
 
 
 @say.register
@@ -268,44 +257,71 @@ def _(found: PoseUnsolved) -> str:
     return say(found.why)
 
 
-@say.register
-def _(found: NearestMiss) -> str:
-    return sentence(
-        found.code,
-        "the nearest configuration found misses by {position:.3g} mm and {rotation:.3g} deg",
-        position=found.position_mm,
-        rotation=found.rotation_deg,
-    )
-
-
-@say.register
-def _(found: BadGuess) -> str:
-    return sentence(found.code, GUESSES[found.solved_by], miss=say(found.miss))
-
-
-@say.register
-def _(found: LimitBound) -> str:
-    return sentence(
-        found.code,
-        "limit-bound: {miss}; a configuration outside the limits solves it: {beyond}",
-        miss=say(found.miss),
-        beyond=say(found.exceeded),
-    )
-
-
-@say.register
-def _(found: SingularEnd) -> str:
-    return sentence(
-        found.code,
-        ("singular: the iteration converges slowly to a singular configuration and ends there: {miss}"),
-        miss=say(found.miss),
-    )
-
-
-@say.register
-def _(found: Unreachable) -> str:
-    return sentence(found.code, "unreachable: {miss}, whatever the start", miss=say(found.miss))
-
-
 def _mm(length: float) -> str:
     return f"{length:.1f} mm" if length >= 0.1 else f"{length:.2g} mm"
+
+
+@say.register
+def _(found: MovesLess) -> str:
+    return say_as(found, other=_next_best(found))
+
+
+@say.register
+def _(found: MovesLessTogether) -> str:
+    return say_as(found, other=_next_best(found))
+
+
+@say.register
+def _(found: LowerBranchNumber) -> str:
+    return say_as(found, other=_next_best(found))
+
+
+def _next_best(found: MovesLess | MovesLessTogether | LowerBranchNumber) -> str:
+    return sentence("next_best", branch=say(found.next_best))
+
+
+@say.register
+def _(found: OtherBranch) -> str:
+    return branch_word(found.label, found.branch)
+
+
+@say.register
+def _(found: NoSolution) -> str:
+    if len(found.unsolved) == 1:
+        return say(found.unsolved[0])
+    faults = list(dict.fromkeys(say(part.why) for part in found.unsolved))
+    fault = faults[0] if len(faults) == 1 else joined(map(_of_side, found.unsolved))
+    return say_as(found, fault=fault)
+
+
+def _of_side(found: Unsolved) -> str:
+    side = word("side", SIDES, found.side) if isinstance(found, SideUnsolved) else ""
+    return joined((side, say(found.why)), ", ")
+
+
+@say.register
+def _(found: AllOutsideLimits) -> str:
+    label, reason = branch_word(found.label, found.branch), say(found.exceeded)
+    if found.count == 1:
+        return say_as(found, "one", branch=label, reason=reason)
+    return say_as(found, "several", branch=label, reason=reason)
+
+
+@say.register
+def _(found: Measure) -> str:
+    return f"{RULE_NAMES[found.rule]} {as_text(found.value, '.3g')} {RULES[found.rule].unit}".removesuffix(" 1")
+
+
+@say.register
+def _(found: Placed) -> str:
+    measures = joined(listed(found.measures), ", ")
+    return say_as(found, measures=measures)
+
+
+@say.register
+def _(found: BestByRules) -> str:
+    measures = joined(listed(found.measures), ", ")
+    if not found.next_best:
+        return say_as(found, "only", measures=measures)
+    next_best = joined(listed(found.next_best), ", ")
+    return say_as(found, "ranked", measures=measures, next_best=next_best)

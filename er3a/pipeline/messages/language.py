@@ -1,20 +1,23 @@
 """Texts in the reader's language, through gettext catalogues.
 
-Texts are written in English in the code. What a page says itself goes through :func:`tr`; what was found is a finding,
-of which :mod:`er3a.pipeline.messages.say` makes a text.
+What a page says itself is written in English where it stands and goes through :func:`tr`; what was found is a finding,
+of which :mod:`er3a.pipeline.messages.say` makes a text. Catalogues hold the former by the English text, the latter by
+its key.
 """
 
 from __future__ import annotations
 
 import gettext
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 from string import Formatter
 from typing import Any
 
 LANGUAGES = ("en", "zh")
+KEYED = "key"  # the context of texts whose key, not whose English, is their entry in a catalogue
 CATALOGUES = Path(__file__).with_name("locale")
 
 _catalogue: gettext.NullTranslations = gettext.NullTranslations()
@@ -41,6 +44,18 @@ def use(language: str, own: Mapping[str, str] | None = None) -> None:
     _catalogue = gettext.NullTranslations() if language == "en" else _load(catalogue_file(language))
 
 
+@contextmanager
+def using(language: str) -> Iterator[None]:
+    """Texts in a language for a while."""
+    global _catalogue, _language, _own
+    kept = _catalogue, _language, _own
+    use(language)
+    try:
+        yield
+    finally:
+        _catalogue, _language, _own = kept
+
+
 def current() -> str:
     """The language in use."""
     return _language
@@ -62,10 +77,11 @@ def tr(text: str, /, **parts: Any) -> str:
     return filled(found, text, parts) if parts else found
 
 
-def filled(text: str, template: str, parts: dict[str, Any]) -> str:
+def filled(text: str, template: str, parts: Mapping[str, Any], written: Callable[[Any, str], str] | None = None) -> str:
     """A translation of a template, its fields filled in with the formats of the template: translations have none."""
     formats = {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
-    return _AsIs().format(text, **{name: as_text(part, formats.get(name, "")) for name, part in parts.items()})
+    write = written or as_text
+    return _AsIs().format(text, **{name: write(parts[name], spec) for name, spec in formats.items()})
 
 
 def as_text(part: Any, spec: str = "") -> str:
@@ -85,10 +101,11 @@ def translated(context: str, text: str) -> str:
     return found if found != text else _catalogue.gettext(text)
 
 
-def translated_count(context: str, one: str, many: str, count: int) -> str:
-    """The form of a text that fits a number."""
-    found = _catalogue.npgettext(context, one, many, count)
-    return found if found not in (one, many) else _catalogue.ngettext(one, many, count)
+def by_key(key: str, english: str, count: int | None = None) -> str:
+    """A text in the language in use, looked up by its key; in English where the catalogue has none."""
+    catalogue = _catalogue
+    found = catalogue.pgettext(KEYED, key) if count is None else catalogue.npgettext(KEYED, key, key, count)
+    return english if found == key else found
 
 
 def _load(file: Path) -> gettext.NullTranslations:

@@ -4,29 +4,17 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import joined, listed, say, sentence, word
-from er3a.planning.avoidance import avoidance_findings
+from er3a.pipeline.messages.say import by, joined, listed, say, say_as, texts, word
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import (
-    AboveLimit,
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
-    BelowLimit,
     JerkTooGreat,
     PathOutOfReach,
     TooFast,
     TooFastIfAssumed,
 )
-from er3a.planning.timing import MustStandStill, NoTimeLawFound, ToppraMissing
 from er3a.planning.tool_proof import Quantity, Undecided
-from er3a.planning.way_around import (
-    EndOutsideLimits,
-    EndOverlaps,
-    EndUnreached,
-    NoneFound,
-    NothingMeasured,
-    PlannerMissing,
-)
 
 STRATEGIES: dict[StrategyName, str] = {
     "slow": N_("Keep the path and slow down"),
@@ -40,26 +28,53 @@ STRATEGIES: dict[StrategyName, str] = {
 }
 
 
-@say.register
-def _(found: AboveLimit) -> str:
-    return sentence(
-        found.code,
-        "J{joint} goes to {reached:.1f} deg; its upper limit is {bound:g} deg",
-        joint=found.joint,
-        reached=found.reached_deg,
-        bound=found.limit_deg,
-    )
-
-
-@say.register
-def _(found: BelowLimit) -> str:
-    return sentence(
-        found.code,
-        "J{joint} goes to {reached:.1f} deg; its lower limit is {bound:g} deg",
-        joint=found.joint,
-        reached=found.reached_deg,
-        bound=found.limit_deg,
-    )
+TEXTS = texts(
+    {
+        "above_limit": "J{joint} goes to {reached_deg:.1f} deg; its upper limit is {limit_deg:g} deg",
+        "below_limit": "J{joint} goes to {reached_deg:.1f} deg; its lower limit is {limit_deg:g} deg",
+        "must_stand_still": "the arm would have to stop along the path",
+        "no_time_law_found": "the time-optimal parametrisation found no time law under the joints' limits",
+        "toppra_missing": "the library toppra is not installed; it has wheels for Linux on x86-64 only",
+        "planner_missing": "the planner OMPL is not installed; it has wheels for Linux on x86-64 only",
+        "nothing_measured": "distances can't be measured here, so nothing can be planned",
+        "end_overlaps": by("end", end="at its end {overlap}", start="at its start {overlap}"),
+        "end_outside_limits": by("end", end="at its end {limits}", start="at its start {limits}"),
+        "end_unreached": by(
+            "end",
+            end="no joint angles within the limits reach its end",
+            start="no joint angles within the limits reach its start",
+        ),
+        "none_found": "the planner found no path in {rounds} rounds; there may be one",
+        "nothing_to_avoid": "there is nothing to avoid",
+        "no_singular_region": "there is no singular region on this path",
+        "begins_out_of_reach": "the path begins out of reach",
+        "ends_out_of_reach": "the path ends out of reach",
+        "partly_out_of_reach": "a part of the path is out of reach",
+        "begins_in_region": "the path begins inside the region",
+        "ends_in_region": "the path ends inside the region",
+        "branch_ends": "at t = {t_s:.4g} s the branch ends: J{joint} would have to jump",
+        "no_other_branch": "the other branches are singular, beyond a limit or out of reach there too",
+        "no_shift_keeps_distance": "no shift of the tool point up to {up_to_mm:.0f} mm keeps the distance",
+        "no_tilt_keeps_distance": "no tilt of the tool up to {up_to_deg:.0f} deg keeps the distance",
+        "bent_path_singular": "the bent path runs into another singular region",
+        "no_damping_suffices": "no damping keeps the joint speeds within their limits at this speed",
+        "path_not_finished": "only {done:.0%} of the path is completed",
+        "ends_off_path": "it ends {distance_mm:.3g} mm and {angle_deg:.3g} deg from the path's end",
+        "speed_exceeded": "a joint needs {ratio:.2f} times its greatest speed",
+        "acceleration_exceeded": "a joint needs {ratio:.2f} times its greatest acceleration",
+        "too_fast": "J{joint} would need {needed_deg_s:.0f} {unit}/s; it can do {limit_deg_s:g} {unit}/s",
+        "too_fast_if_assumed": "J{joint} would need {needed_deg_s:.0f} {unit}/s; {limit_deg_s:g} {unit}/s are assumed",
+        "acceleration_too_great": (
+            "J{joint} would need {needed_deg_s2:.0f} {unit}/s²; it can do {limit_deg_s2:g} {unit}/s²"
+        ),
+        "acceleration_too_great_if_assumed": (
+            "J{joint} would need {needed_deg_s2:.0f} {unit}/s²; {limit_deg_s2:g} {unit}/s² are assumed"
+        ),
+        "jerk_too_great#needed": "J{joint} would need {needed:.0f} {unit}/s³; its jerk limit is {able:g} {unit}/s³",
+        "jerk_too_great#step": "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³",
+        "undecided": "the bounds can't decide {what}",
+    }
+)
 
 
 def unit_of(slides: bool) -> str:
@@ -69,66 +84,31 @@ def unit_of(slides: bool) -> str:
 
 @say.register
 def _(found: TooFast) -> str:
-    return sentence(
-        found.code,
-        "J{joint} would need {needed:.0f} {unit}/s; it can do {able:g} {unit}/s",
-        joint=found.joint,
-        unit=unit_of(found.slides),
-        needed=found.needed_deg_s,
-        able=found.limit_deg_s,
-    )
+    return say_as(found, unit=unit_of(found.slides))
 
 
 @say.register
 def _(found: TooFastIfAssumed) -> str:
-    return sentence(
-        found.code,
-        "J{joint} would need {needed:.0f} {unit}/s; {able:g} {unit}/s are assumed",
-        joint=found.joint,
-        unit=unit_of(found.slides),
-        needed=found.needed_deg_s,
-        able=found.limit_deg_s,
-    )
+    return say_as(found, unit=unit_of(found.slides))
 
 
 @say.register
 def _(found: AccelerationTooGreat) -> str:
-    return sentence(
-        found.code,
-        "J{joint} would need {needed:.0f} {unit}/s²; it can do {able:g} {unit}/s²",
-        joint=found.joint,
-        unit=unit_of(found.slides),
-        needed=found.needed_deg_s2,
-        able=found.limit_deg_s2,
-    )
+    return say_as(found, unit=unit_of(found.slides))
 
 
 @say.register
 def _(found: AccelerationTooGreatIfAssumed) -> str:
-    return sentence(
-        found.code,
-        "J{joint} would need {needed:.0f} {unit}/s²; {able:g} {unit}/s² are assumed",
-        joint=found.joint,
-        unit=unit_of(found.slides),
-        needed=found.needed_deg_s2,
-        able=found.limit_deg_s2,
-    )
+    return say_as(found, unit=unit_of(found.slides))
 
 
 @say.register
 def _(found: JerkTooGreat) -> str:
     values = {"joint": found.joint, "unit": unit_of(found.slides), "able": found.limit_deg_s3}
     if found.needed_deg_s3 is None:
-        return sentence(
-            found.code, "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³", **values
-        )
+        return say_as(found, "step", **values)
     needed = found.needed_deg_s3
-    return sentence(
-        found.code,
-        "J{joint} would need {needed:.0f} {unit}/s³; its jerk limit is {able:g} {unit}/s³",
-        needed=needed,
-        **values,
-    )
+    return say_as(found, "needed", needed=needed, **values)
 
 
 OPEN: dict[Quantity, str] = {
@@ -143,159 +123,9 @@ OPEN: dict[Quantity, str] = {
 
 @say.register
 def _(found: Undecided) -> str:
-    return sentence(found.code, "the bounds can't decide {what}", what=word("undecided", OPEN, found.quantity))
+    return say_as(found, what=word("undecided", OPEN, found.quantity))
 
 
 @say.register
 def _(found: PathOutOfReach) -> str:
     return joined(listed(found.reasons))
-
-
-@say.register
-def _(found: MustStandStill) -> str:
-    return sentence(found.code, "the arm would have to stop along the path")
-
-
-@say.register
-def _(found: NoTimeLawFound) -> str:
-    return sentence(found.code, "the time-optimal parametrisation found no time law under the joints' limits")
-
-
-@say.register
-def _(found: ToppraMissing) -> str:
-    return sentence(found.code, "the library toppra is not installed; it has wheels for Linux on x86-64 only")
-
-
-@say.register
-def _(found: PlannerMissing) -> str:
-    return sentence(found.code, "the planner OMPL is not installed; it has wheels for Linux on x86-64 only")
-
-
-@say.register
-def _(found: NothingMeasured) -> str:
-    return sentence(found.code, "distances can't be measured here, so nothing can be planned")
-
-
-@say.register
-def _(found: EndOverlaps) -> str:
-    if found.end == "start":
-        return sentence(found.code, "at its start {overlap}", overlap=say(found.overlap))
-    return sentence(found.code, "at its end {overlap}", overlap=say(found.overlap))
-
-
-@say.register
-def _(found: EndOutsideLimits) -> str:
-    if found.end == "start":
-        return sentence(found.code, "at its start {limits}", limits=say(found.limits))
-    return sentence(found.code, "at its end {limits}", limits=say(found.limits))
-
-
-@say.register
-def _(found: EndUnreached) -> str:
-    if found.end == "start":
-        return sentence(found.code, "no joint angles within the limits reach its start")
-    return sentence(found.code, "no joint angles within the limits reach its end")
-
-
-@say.register
-def _(found: NoneFound) -> str:
-    return sentence(found.code, "the planner found no path in {rounds} rounds; there may be one", rounds=found.rounds)
-
-
-@say.register
-def _(found: avoidance_findings.NothingToAvoid) -> str:
-    return sentence(found.code, "there is nothing to avoid")
-
-
-@say.register
-def _(found: avoidance_findings.NoSingularRegion) -> str:
-    return sentence(found.code, "there is no singular region on this path")
-
-
-@say.register
-def _(found: avoidance_findings.BeginsOutOfReach) -> str:
-    return sentence(found.code, "the path begins out of reach")
-
-
-@say.register
-def _(found: avoidance_findings.EndsOutOfReach) -> str:
-    return sentence(found.code, "the path ends out of reach")
-
-
-@say.register
-def _(found: avoidance_findings.PartlyOutOfReach) -> str:
-    return sentence(found.code, "a part of the path is out of reach")
-
-
-@say.register
-def _(found: avoidance_findings.BeginsInRegion) -> str:
-    return sentence(found.code, "the path begins inside the region")
-
-
-@say.register
-def _(found: avoidance_findings.EndsInRegion) -> str:
-    return sentence(found.code, "the path ends inside the region")
-
-
-@say.register
-def _(found: avoidance_findings.BranchEnds) -> str:
-    return sentence(
-        found.code,
-        "at t = {t:.4g} s the branch ends: J{joint} would have to jump",
-        t=found.t_s,
-        joint=found.joint,
-    )
-
-
-@say.register
-def _(found: avoidance_findings.NoOtherBranch) -> str:
-    return sentence(found.code, "the other branches are singular, beyond a limit or out of reach there too")
-
-
-@say.register
-def _(found: avoidance_findings.NoShiftKeepsDistance) -> str:
-    return sentence(
-        found.code,
-        "no shift of the tool point up to {far:.0f} mm keeps the distance",
-        far=found.up_to_mm,
-    )
-
-
-@say.register
-def _(found: avoidance_findings.NoTiltKeepsDistance) -> str:
-    return sentence(found.code, "no tilt of the tool up to {far:.0f} deg keeps the distance", far=found.up_to_deg)
-
-
-@say.register
-def _(found: avoidance_findings.BentPathSingular) -> str:
-    return sentence(found.code, "the bent path runs into another singular region")
-
-
-@say.register
-def _(found: avoidance_findings.NoDampingSuffices) -> str:
-    return sentence(found.code, "no damping keeps the joint speeds within their limits at this speed")
-
-
-@say.register
-def _(found: avoidance_findings.PathNotFinished) -> str:
-    return sentence(found.code, "only {share:.0%} of the path is completed", share=found.done)
-
-
-@say.register
-def _(found: avoidance_findings.EndsOffPath) -> str:
-    return sentence(
-        found.code,
-        "it ends {mm:.3g} mm and {deg:.3g} deg from the path's end",
-        mm=found.distance_mm,
-        deg=found.angle_deg,
-    )
-
-
-@say.register
-def _(found: avoidance_findings.SpeedExceeded) -> str:
-    return sentence(found.code, "a joint needs {share:.2f} times its greatest speed", share=found.ratio)
-
-
-@say.register
-def _(found: avoidance_findings.AccelerationExceeded) -> str:
-    return sentence(found.code, "a joint needs {share:.2f} times its greatest acceleration", share=found.ratio)

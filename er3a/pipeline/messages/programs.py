@@ -1,13 +1,119 @@
-"""What the page and the recording of programs say, beside the verdict."""
+"""Robot programs: what was read and written, what they make the arm do, what to do about it, and the verdict."""
 
 from __future__ import annotations
 
-import er3a.pipeline.messages.program_check  # noqa: F401
-from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import counted, joined
-from er3a.pipeline.stages.programs.model import ProgramSummary
-from er3a.programs.syntax import Language
+import math
+from collections.abc import Iterable
+from functools import singledispatch
+from typing import Any
 
+import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.kinematics.singularity import EventType
+from er3a.pipeline.messages.expectations import demonstrated, outcome_word
+from er3a.pipeline.messages.kinematics import SINGULARITIES, branch_word
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.planning import unit_of
+from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.stages.programs.model import ProgramCounts, ProgramSummary
+from er3a.planning.intervals import TooFast
+from er3a.program_check import program_check_findings as found_in
+from er3a.program_check.program_check_findings import (
+    CheckFinding,
+    FasterThanAssumed,
+    Level,
+    MeetsSingularity,
+    NotFollowedToEnd,
+    PassesSingularity,
+    ZoneTooLarge,
+)
+from er3a.programs import program_findings as text
+from er3a.programs.execution import EndKind
+from er3a.programs.instructions import Unresolved
+from er3a.programs.syntax import Language, ProgramOutcome
+
+LEVELS: dict[Level, str] = {
+    "pass": N_("pass"),
+    "note": N_("note"),
+    "caution": N_("caution"),
+    "fail": N_("fail"),
+}
+REASONS: dict[Unresolved, str] = {
+    "undefined": N_("the program does not define it"),
+    "not_finite": N_("it is no finite number"),
+    "position_unknown": N_("it depends on where the arm stands, which is not known"),
+    "external_tool": N_("the workpiece is moved along a fixed tool, which is not supported"),
+    "not_understood": N_("it is not understood"),
+    "too_many_joints": N_("it refers to axes that the arm does not have"),
+}
+NEARER = N_("Move the target or the workpiece nearer to the arm, or tilt the tool towards the arm.")
+OTHER_SOLUTION = N_(
+    "Teach the target in another configuration or with the tool turned otherwise, or go through a via point that keeps "
+    "the joint away from its limit."
+)
+BY_HAND = N_("Watch this line at low speed on the controller, or replace it by an instruction that is understood.")
+FURTHER = N_("Give the check more time, or in a study raise most_steps, most_branches or loop_rounds of programs.")
+REMEDIES: dict[str, str] = {
+    "above_limit": OTHER_SOLUTION,
+    "below_limit": OTHER_SOLUTION,
+    "slide_exceeded": OTHER_SOLUTION,
+    "combination_exceeded": OTHER_SOLUTION,
+    "target_out_of_reach": NEARER,
+    "way_out_of_reach": NEARER,
+    "configuration_ends": N_("Go there by a joint move, or begin the line in another configuration."),
+    "accelerates_more_than_assumed": N_("Lower acceleration and speed of this line."),
+    "more_than_full_speed": N_("Ask for 100 % at most."),
+    "configuration_changes": N_(
+        "If the change is not meant, give the target's configuration or joint angles; if it is, make it where there "
+        "is room."
+    ),
+    "joint_jumps": N_("Teach the target with this joint near to where it comes from."),
+    "whole_turn": N_("Teach the target with the nearer angle, unless the turn is meant to unwind cables."),
+    "arrives_otherwise": N_("Teach the target again where the line arrives, or go there by a joint move."),
+    "turns_at_start": N_("Turn the joint by a joint move first, or begin the line beside the singular pose."),
+    "turn_not_met": N_("Correct the target's Turn (T), or teach the target again."),
+    "motion_collides": N_(
+        "Go round by a via point, take another configuration or tool orientation, or move what stands in the way."
+    ),
+    "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
+    "zone_collides": N_("Make the zone smaller, or stop at the corner."),
+    "zone_not_settled": N_("Make the zone smaller, or move the corner away from what is near."),
+    "arc_has_no_circle": N_("Teach the arc's via point off the straight line between its ends, or use a line."),
+    "arc_goes_on": N_("Check on the controller where the arc ends, or split it into arcs that end at targets."),
+    "undecided": N_("Keep the path farther from singular poses and limits, or run this line slowly under supervision."),
+    "line_not_checked": BY_HAND,
+    "may_move": BY_HAND,
+    "program_not_understood": BY_HAND,
+    "program_form_inferred": N_("Compare this element with what the controller does."),
+    "external_axes_left_out": N_("Check by hand that the external axes stand as assumed."),
+    "target_not_given": N_("Give the target in the program or in its data file."),
+    "frame_not_given": N_("Map the name to a frame under `frames` in the file of programs."),
+    "frame_taken_as_flange": N_(
+        "Map the name to a frame under `frames` in the file of programs, if a tool is mounted."
+    ),
+    "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
+    "not_come_to": FURTHER,
+    "rest_not_checked": N_("Give the check more time or motions, or split the program and check its parts."),
+    "loop_comes_back_otherwise": N_("Begin the loop with a joint move to fixed angles."),
+    "program_data_file_missing": N_("Put the data file beside the program."),
+    "program_name_twice": N_("Remove one of the two definitions."),
+    "program_nothing_moves": N_("Check that this is the program to run."),
+    "speed_not_given": N_("Give a speed before the motion."),
+    "zone_without_size": N_("Give the zone's size in mm."),
+    "configuration_not_read": N_("Check on the controller that it takes this solution."),
+}
+SINGULAR: dict[EventType, str] = {
+    "wrist": N_("Tilt the tool so that J5 stays away from 0, or cross this place by a joint move."),
+    "elbow": N_("Keep the target nearer to the arm, so that it is not stretched, or cross this place by a joint move."),
+    "shoulder": N_("Lead the wrist past axis 1 at a distance by a via point, or cross this place by a joint move."),
+    "dependent_axes": N_("Shift or tilt the path, or cross this place by a joint move."),
+}
+STOPPED: dict[EndKind, str] = {
+    "drifts": N_("Let the loop come back to where it began, or give it a fixed number of rounds."),
+    "operations": FURTHER,
+    "branches": FURTHER,
+    "stopped": FURTHER,
+    "recursion": N_("Give the routine a condition to return."),
+}
 FIGURES = {
     "programs_passed": N_("Programs that pass"),
     "instructions_passed": N_("Motion instructions that pass"),
@@ -24,16 +130,342 @@ LANGUAGES: dict[Language, str] = {
 }
 
 
+TEXTS = texts(
+    {
+        "programs.none": "The robot's list of programs is empty.",
+        "programs.programs": Plural("count", "{passed} of {count} program passes", "{passed} of {count} programs pass"),
+        "programs.not_examined": "not all examined ({names})",
+        "programs.fault": "{count} {word} ({names})",
+        "frame_not_given": by(
+            "frame",
+            base="the base {name} is not given; map it to a frame",
+            tool="the tool {name} is not given; map it to a frame",
+        ),
+        "frame_taken_as_flange": "{name} is not given; the flange was taken for it",
+        "way_not_known": "the start of the motion is not known; only the target was checked",
+        "more_than_full_speed": "asks for {percent:g} % of the joints' speed or acceleration",
+        "joint_jumps": "J{joint} turns by {angle_deg:.1f} deg while the tool moves by {moved_mm:.1f} mm",
+        "whole_turn": "J{joint} turns by {angle_deg:.1f} deg; its nearest equivalent is {nearest_deg:.1f} deg away",
+        "turns_at_start": (
+            "the line starts at a singular pose: J{joint} first has to turn by {angle_deg:.1f} deg with the tool at "
+            "rest"
+        ),
+        "turn_not_met": "no solution within the limits has the signs that T {turn} asks for; the nearest was taken",
+        "configuration_not_read": (
+            "the meaning of the configuration {text} is not known; the solution nearest to the joints before was taken"
+        ),
+        "zone_collides": "a corner path that the blending zone allows collides: {pair}, {depth_mm:.1f} mm deep",
+        "zone_not_settled": (
+            "not every corner path that the zone allows is proven clear; the nearest measured passes at "
+            "{least_mm:.1f} mm"
+        ),
+        "zone_too_large": "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm",
+        "zone_without_size": "the size of the zone {zone} is not known; half of each motion was taken",
+        "arc_has_no_circle": "the arc's points do not define a circle",
+        "spline_as_line": "the spline was checked as a straight line from point to point",
+        "external_axes_left_out": "external axes are assumed at rest: {axes:, }",
+        "line_not_checked": (
+            "the arm has no closed-form inverse: the line was not followed, only its target was checked"
+        ),
+        "may_move": "not understood, and may move the arm: {text}",
+        "never_reached": "no branch of the program leads to this motion; it was not checked",
+        "not_come_to": "not checked: the program was not followed as far as this motion",
+        "both_sides_checked": "both sides were checked: {condition}",
+        "not_followed_to_end": by(
+            "kind",
+            drifts="the loop never comes back to a state that it was in; it was followed for {limit} rounds",
+            operations="the program was followed for {limit} instructions, and no further than here",
+            branches=(
+                "not each side of this branch was followed: the program has more than {limit} sequences of its branches"
+            ),
+            stopped="the program was followed no further than here: the time for it was over",
+            recursion="routines call themselves or each other without end",
+        ),
+        "target_not_given.named": "the target {name} is not known: {reason}",
+        "target_not_given": "the target is not known: {reason}",
+        "target_out_of_reach": "the target is out of reach: {reasons:; }",
+        "target_out_of_reach.bare": "the target is out of reach",
+        "way_out_of_reach": "out of reach after {at_mm:.1f} mm: {reasons}",
+        "configuration_ends": (
+            "the configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {angle_deg:.1f} {unit}"
+        ),
+        "meets_singularity": "meets the {type} singularity after {at:.1f} mm, where joint speeds have no bound",
+        "meets_singularity.bounded": "meets the {type} singularity after {at:.1f} mm",
+        "passes_singularity": "passes the {type} singularity at {distance:.2f} deg, after {at:.1f} mm",
+        "passes_singularity.mm": "passes the {type} singularity at {distance:.1f} mm, after {at:.1f} mm",
+        "faster_than_assumed": (
+            "J{joint} would need {needed_deg_s:.0f} {unit}/s; {assumed_deg_s:g} {unit}/s are assumed, as no document "
+            "gives its speed"
+        ),
+        "accelerates_more_than_assumed": (
+            "J{joint} would need {needed_deg_s2:.0f} {unit}/s²; {assumed_deg_s2:g} {unit}/s² are assumed"
+        ),
+        "configuration_changes": "the configuration changes from {before} to {after}",
+        "arrives_otherwise": (
+            "the arm arrives in other joint angles than the target's: J{joint} differs by {difference_deg:.2f} {unit}"
+        ),
+        "motion_collides": "collision after {at:.1f} mm of {pairs}, {depth:.1f} mm deep",
+        "motion_collides.joint": "collision of {pairs}, {depth:.1f} mm deep",
+        "arc_goes_on": "the arc ends after {angle_deg:g} deg, not at its target",
+        "arc_goes_on.unknown": "the angle at which the arc ends is not known; the arc was not checked",
+        "arc_goes_on.turns": (
+            "the arc ends after {angle:g} deg, not at its target; the tool is taken to have the target's orientation "
+            "there"
+        ),
+        "speed_not_given": "the program gives no speed; {assumed:g} m/s were assumed for the duration",
+        "speed_not_given.share": "the program gives no speed; {percent:g} % were assumed for the duration",
+        "rest_not_checked.targets": (
+            "only the first {checked} motions that are carried out were checked; of those from here on {targets} "
+            "targets, for reach and limits, but not the motions between them"
+        ),
+        "rest_not_checked": "only the first {checked} motions that are carried out were checked, none from here on",
+        "loop_comes_back_otherwise": (
+            "the loop begins again with J{joint} {difference_deg:.2f} {unit} from where it was in the round that was "
+            "checked"
+        ),
+        "program_data_file_missing": "{file} is missing, which holds the program's points",
+        "program_name_twice": "{name} is declared twice; the later one counts",
+        "program_not_understood": "not understood: {text}",
+        "program_form_inferred": "the structure of <{element}> is not documented; it was read like that of <while>",
+        "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
+        "program_nothing_moves": "no instruction moves the arm",
+        "written_zones_dropped": Plural(
+            "zones",
+            "{count} zone has no equivalent in this language: the arm stops there",
+            "{count} zones have no equivalent in this language: the arm stops there",
+        ),
+        "written_splines_as_lines": Plural(
+            "points",
+            "{count} point of splines written as a straight line",
+            "{count} points of splines written as straight lines",
+        ),
+        "written_speeds_estimated": Plural(
+            "motions",
+            "{count} duration written as a speed: the controller's ramps decide the time",
+            "{count} durations written as speeds: the controller's ramps decide the time",
+        ),
+        "written_speeds_cut": Plural(
+            "motions",
+            "{count} speed above the joints' limit written as that limit",
+            "{count} speeds above the joints' limit written as that limit",
+        ),
+        "written_half_turns_split": Plural(
+            "lines",
+            "{count} line that turns the tool by 180 deg written in two halves, which fixes the sense",
+            "{count} lines that turn the tool by 180 deg written in two halves, which fixes the sense",
+        ),
+        "written_targets_left_out": Plural(
+            "motions",
+            "{count} motion left out: its target is not known",
+            "{count} motions left out: their targets are not known",
+        ),
+        "written_tool_not_given": "set this tool or base on the controller: {name}",
+        "written_values_rounded": Plural(
+            "values",
+            "{count} speed or zone rounded down to the next that has a name",
+            "{count} speeds or zones rounded down to the next that has a name",
+        ),
+        "written_not_translated": Plural(
+            "instructions",
+            "{count} instruction of the other language kept as a comment",
+            "{count} instructions of the other language kept as comments",
+        ),
+        "written_arcs_split": Plural(
+            "arcs",
+            "{count} arc written as {lines} lines that stay within {deviation:g} mm of it",
+            "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
+        ),
+        "written_unsafe": "the path {path} is not safe: {verdict}",
+        "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
+        "remedy.slower": "Lower the speed of this line to {percent:g} % of its own or less.",
+        "programs.waits": Plural("count", "and {count} wait for a signal", "and {count} waits for signals"),
+    }
+)
+
+
+@say.register
+def _(found: ProgramCounts) -> str:
+    passed = sentence("programs.programs", count=found.programs + len(found.demonstrations), passed=found.passed)
+    unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
+    others = []
+    for outcome, names in unsound.items():
+        parts = {"count": len(names), "word": outcome_word(outcome), "names": ", ".join(names)}
+        others.append(sentence("programs.fault", **parts) if names else "")
+    missed = ", ".join(found.not_examined)
+    open_parts = sentence("programs.not_examined", names=missed) if missed else ""
+    sentences = [passed if found.programs else "", joined(others, ", "), open_parts, demonstrated(found.demonstrations)]
+    return sentence("finding", finding=joined(sentences))
+
+
+def level_word(level: Level) -> str:
+    """A level in the language in use."""
+    return word("program_level", LEVELS, level)
+
+
+def _type(kind: EventType) -> str:
+    return word("singularity", SINGULARITIES, kind)
+
+
+@say.register
+def _(found: found_in.TargetNotGiven) -> str:
+    reason = word("target_reason", REASONS, found.reason)
+    if not found.target:
+        return say_as(found, reason=reason)
+    return sentence("target_not_given.named", name=found.target, reason=reason)
+
+
+@say.register
+def _(found: found_in.TargetOutOfReach) -> str:
+    if not found.reasons:
+        return sentence("target_out_of_reach.bare")
+    return say_as(found)
+
+
+@say.register
+def _(found: found_in.WayOutOfReach) -> str:
+    reasons = joined(listed(found.reasons))
+    return say_as(found, reasons=reasons)
+
+
+@say.register
+def _(found: found_in.ConfigurationEnds) -> str:
+    return say_as(found, unit=unit_of(found.slides))
+
+
+@say.register
+def _(found: found_in.MeetsSingularity) -> str:
+    parts = {"type": _type(found.type), "at": found.at_mm}
+    if found.bounded:
+        return sentence("meets_singularity.bounded", **parts)
+    return say_as(found, **parts)
+
+
+@say.register
+def _(found: found_in.PassesSingularity) -> str:
+    parts = {"type": _type(found.type), "at": found.at_mm, "distance": found.distance}
+    if found.type == "shoulder":
+        return sentence("passes_singularity.mm", **parts)
+    return say_as(found, **parts)
+
+
+@say.register
+def _(found: found_in.FasterThanAssumed) -> str:
+    return say_as(found, unit=unit_of(found.slides))
+
+
+@say.register
+def _(found: found_in.AcceleratesMoreThanAssumed) -> str:
+    return say_as(found, unit=unit_of(found.slides))
+
+
+@say.register
+def _(found: found_in.ConfigurationChanges) -> str:
+    return say_as(found, before=branch_word(found.before), after=branch_word(found.after))
+
+
+@say.register
+def _(found: found_in.ArrivesOtherwise) -> str:
+    return say_as(found, unit=unit_of(found.slides))
+
+
+@say.register
+def _(found: found_in.MotionCollides) -> str:
+    parts = {"pairs": joined(listed(found.pairs[:2])), "depth": found.depth_mm}
+    if found.at_mm is None:
+        return sentence("motion_collides.joint", **parts)
+    return say_as(found, at=found.at_mm, **parts)
+
+
+@say.register
+def _(found: found_in.ArcGoesOn) -> str:
+    if found.angle_deg is None:
+        return sentence("arc_goes_on.unknown")
+    if found.turns:
+        return sentence("arc_goes_on.turns", angle=found.angle_deg)
+    return say_as(found)
+
+
+@say.register
+def _(found: found_in.SpeedNotGiven) -> str:
+    if found.unit == "share":
+        return sentence("speed_not_given.share", percent=found.assumed * 100)
+    return say_as(found)
+
+
+@say.register
+def _(found: found_in.RestNotChecked) -> str:
+    if not found.targets:
+        return say_as(found)
+    return sentence("rest_not_checked.targets", checked=found.checked, targets=found.targets)
+
+
+@say.register
+def _(found: found_in.LoopComesBackOtherwise) -> str:
+    return say_as(found, unit=unit_of(found.slides))
+
+
+@say.register
+def _(found: text.ArcsSplit) -> str:
+    return say_as(found, deviation=found.deviation_m * 1000)
+
+
+@say.register
+def _(found: text.WrittenUnsafe) -> str:
+    return say_as(found, verdict=outcome_word(found.verdict))
+
+
+@singledispatch
+def remedy(finding: Any) -> str:
+    """What to do about a finding, as a sentence in the language in use; empty where nothing is to be done."""
+    return word("remedy", REMEDIES, finding.code) if finding.code in REMEDIES else ""
+
+
+@remedy.register
+def _(found: MeetsSingularity | PassesSingularity) -> str:
+    return word("remedy", SINGULAR, found.type)
+
+
+@remedy.register
+def _(found: NotFollowedToEnd) -> str:
+    return word("remedy", STOPPED, found.kind)
+
+
+@remedy.register
+def _(found: TooFast | FasterThanAssumed) -> str:
+    return _slower(_allowed(found))
+
+
+@remedy.register
+def _(found: ZoneTooLarge) -> str:
+    return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
+
+
+def _allowed(found: TooFast | FasterThanAssumed) -> float:
+    """The share of its speed that the joint can do."""
+    return (found.limit_deg_s if isinstance(found, TooFast) else found.assumed_deg_s) / found.needed_deg_s
+
+
+def _slower(share: float) -> str:
+    percent = math.floor(1000 * share) / 10
+    return sentence("remedy.slower", percent=percent)
+
+
+def remedies(findings: Iterable[CheckFinding]) -> list[str]:
+    """What to do about findings at one line, each thing once; of speeds the lowest."""
+    checked = list(findings)
+    slowest = min(
+        (each for each in checked if isinstance(each, TooFast | FasterThanAssumed)), key=_allowed, default=None
+    )
+    kept = [each for each in checked if not isinstance(each, TooFast | FasterThanAssumed) or each is slowest]
+    return list(dict.fromkeys(text for each in kept if (text := remedy(each))))
+
+
 def cycle_text(program: ProgramSummary) -> str:
     """How long a program takes, and what that leaves out."""
     cycle = program.cycle
     low, high = f"{cycle.blended_s:.2f}", f"{cycle.stopping_s:.2f}"
     time = tr("{time} s", time=low) if low == high else tr("{low} to {high} s", low=low, high=high)
     what = tr("one round: {time}", time=time) if cycle.repeats else time
-    waits = (
-        counted("programs.waits", "and {count} wait for a signal", "and {count} waits for signals", cycle.waits)
-        if cycle.waits
-        else ""
-    )
+    waits = sentence("programs.waits", count=cycle.waits) if cycle.waits else ""
     unknown = "" if cycle.complete else tr("without the motions whose path is unknown")
     return joined([what, waits, unknown], ", ")

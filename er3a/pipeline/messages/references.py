@@ -1,18 +1,17 @@
-"""Words and sentences about references."""
+"""References, what evidence settles of a table, and what would settle the rest."""
 
 from __future__ import annotations
 
-from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import say, sentence, word
+from er3a.identifiability.evidence import PartEvidence
+from er3a.identifiability.proposals import LookAtMotion, MeasureAngle, MeasureLength
+from er3a.identifiability.statements import InconsistentWithOwnText
+from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.say import by, joined, say, say_as, sentence, texts, word
 from er3a.references.rows import GROUPS, check_complete
 from er3a.references.subjects import (
-    AxisDirection,
     AxisPosition,
     DrawingCorner,
-    DrawingExtent,
     EntryOfTable,
-    JointLimit,
-    JointSpeed,
     MotionOfJoint,
     PointAtPose,
     PoseExcess,
@@ -42,53 +41,128 @@ MISSING_WORDS = {
 POINT_WORDS = {"flange": N_("flange"), "wrist_centre": N_("wrist centre")}
 SEGMENT_WORDS = {"upper_arm": N_("upper arm from the vertical"), "forearm": N_("forearm from the vertical")}
 LABELS = {"abs_x": "|x|"}
-MOTION_WORDS = {
-    "up": N_("the {point} moves up"),
-    "down": N_("the {point} moves down"),
-    "left": N_("the {point} moves to the left"),
-    "right": N_("the {point} moves to the right"),
-    "forward": N_("the {point} moves forward"),
-    "back": N_("the {point} moves back"),
-    "tilts_up": N_("the tool tilts up"),
-    "tilts_down": N_("the tool tilts down"),
-    "tilts_left": N_("the tool tilts to the left"),
-    "tilts_right": N_("the tool tilts to the right"),
-    "tilts_forward": N_("the tool tilts forward"),
-    "tilts_back": N_("the tool tilts back"),
-    "clockwise_looking_up": N_("the tool turns clockwise as seen looking up"),
-    "clockwise_looking_down": N_("the tool turns clockwise as seen looking down"),
-    "clockwise_looking_left": N_("the tool turns clockwise as seen looking left"),
-    "clockwise_looking_right": N_("the tool turns clockwise as seen looking right"),
-    "clockwise_looking_forward": N_("the tool turns clockwise as seen looking forward"),
-    "clockwise_looking_back": N_("the tool turns clockwise as seen looking back"),
-}
-
 check_complete("words for groups of references", GROUPS, GROUP_WORDS)
 check_complete("words for groups that a set lacks", GROUPS, MISSING_WORDS)
+STATUS_WORDS = {
+    "settled": N_("settled"),
+    "weak": N_("weak"),
+    "contradicted": N_("contradicted"),
+    "consistent": N_("consistent"),
+    "open": N_("open"),
+    "gauge": N_("free choice"),
+    "given": N_("given"),
+    "absent": N_("not given"),
+}
+STATUS_MEANINGS = {
+    "settled": N_("what independent documents leave open moves the tool by less than the tolerance"),
+    "weak": N_(
+        "independent documents depend on it, but what they leave open moves the tool by more than the tolerance"
+    ),
+    "contradicted": N_("the evidence excludes the value"),
+    "consistent": N_("no document but its own source covers it"),
+    "open": N_("no document distinguishes it from another value that moves the tool"),
+    "gauge": N_("not determined alone: changed together with other entries it describes the same robot"),
+    "given": N_("chosen by the author of the file"),
+}
+CHECK_KINDS = {
+    "independent": N_("independent"),
+    "consistency": N_("consistency"),
+    "claim": N_("claim"),
+}
+PART_WORDS = {
+    "geometry": N_("geometry"),
+    "zero_and_directions": N_("zero and directions"),
+    "limits": N_("limits"),
+    "speeds": N_("speeds"),
+}
+
+
+TEXTS = texts(
+    {
+        "axis_direction": by("signed", false="axis {joint} direction", true="axis {joint} direction and sense"),
+        "drawing_extent": by(
+            "extreme", least="least {axis} in the side view", greatest="greatest {axis} in the side view"
+        ),
+        "joint_limit": by("side", upper="joint {joint} upper limit", lower="joint {joint} lower limit"),
+        "joint_speed": "joint {joint} speed",
+        "motion#up": "the {point} moves up",
+        "motion#down": "the {point} moves down",
+        "motion#left": "the {point} moves to the left",
+        "motion#right": "the {point} moves to the right",
+        "motion#forward": "the {point} moves forward",
+        "motion#back": "the {point} moves back",
+        "motion#tilts_up": "the tool tilts up",
+        "motion#tilts_down": "the tool tilts down",
+        "motion#tilts_left": "the tool tilts to the left",
+        "motion#tilts_right": "the tool tilts to the right",
+        "motion#tilts_forward": "the tool tilts forward",
+        "motion#tilts_back": "the tool tilts back",
+        "motion#clockwise_looking_up": "the tool turns clockwise as seen looking up",
+        "motion#clockwise_looking_down": "the tool turns clockwise as seen looking down",
+        "motion#clockwise_looking_left": "the tool turns clockwise as seen looking left",
+        "motion#clockwise_looking_right": "the tool turns clockwise as seen looking right",
+        "motion#clockwise_looking_forward": "the tool turns clockwise as seen looking forward",
+        "motion#clockwise_looking_back": "the tool turns clockwise as seen looking back",
+        "pose_excess": "outside the limits by",
+        "at_pose#quoted": "{seen} ({own_pose})",
+        "axis_position": "axis {joint}",
+        "at_pose#row": "{own_pose}: {seen}",
+        "drawing_corner": "corner ({q2_deg:g}, {q3_deg:g})",
+        "reach#least": "least distance of the {point} from axis {axis}",
+        "reach#greatest": "greatest distance of the {point} from axis {axis}",
+        "motion_of_joint": "+J{joint}: {motion}",
+        "entry_of_table": "{own_entry}, measured",
+        "coordinate_of": "{vector} {coordinate}",
+        "read_limit": by(
+            "side",
+            upper="jog joint {joint} to its upper limit and read the angle",
+            lower="jog joint {joint} to its lower limit and read the angle",
+        ),
+        "time_joint": "time a long turn of joint {joint} at full speed, to ±{half_width_deg_s:g} deg/s",
+        "not_the_robot_described": (
+            "This is not the robot that these describe: {against:; }. Positions differ by up to {mismatch_mm:.0f} mm, "
+            "and none of {tried} corrections at one or two places leaves less than {left_mm:.1f} mm."
+        ),
+        "measure_angle#offset": (
+            "measure the angle {own_entry} of joint {joint} at the zero mark, to ±{half_width:g} deg"
+        ),
+        "measure_angle#alpha": (
+            "measure the angle {own_entry} between the z axes of frames {before} and {joint}, to ±{half_width:g} deg"
+        ),
+        "measure_length#d": "measure the length {own_entry} along the axis of joint {joint}, to ±{half_width:g} mm",
+        "measure_length#a": (
+            "measure the distance {own_entry} between the z axes of frames {before} and {joint}, to ±{half_width:g} mm"
+        ),
+        "part_off": "{part}: {status} (the tool could be off by {mm:.0f} mm, {deg:.0f} deg)",
+        "part": "{part}: {status}",
+        "look_at_motion_from": "jog +J{joint} from ({own_pose}) deg and see whether {motion}",
+        "look_at_motion": "jog +J{joint} from the zero pose and see whether {motion}",
+        "inconsistent_with_own_text": (
+            "The table contradicts its own text ({against:; }): {entry} would have to be {needed:g} {unit} instead of "
+            "{given:g}. That makes it agree with itself; it says nothing about any real robot."
+        ),
+        "inconsistent_unexplained": (
+            "The table contradicts its own text: {own_documents}; no single sign or quarter turn makes them agree."
+        ),
+    }
+)
 
 
 def quoted(subject: Subject) -> str:
     """A subject within a sentence: the pose behind what is seen there."""
     if isinstance(subject, PointAtPose | PoseExcess):
-        return sentence("at_pose", "{seen} ({own_pose})", seen=_seen(subject), own_pose=subject.pose)
+        return sentence("at_pose#quoted", seen=_seen(subject), own_pose=subject.pose)
     return say(subject)
 
 
 @say.register
-def _(found: AxisDirection) -> str:
-    if found.signed:
-        return sentence(found.code, "axis {joint} direction and sense", joint=found.joint)
-    return sentence(found.code, "axis {joint} direction", joint=found.joint)
-
-
-@say.register
 def _(found: AxisPosition) -> str:
-    return _with_coordinate(sentence(found.code, "axis {joint}", joint=found.joint), found.coordinate)
+    return _with_coordinate(say_as(found), found.coordinate)
 
 
 @say.register
 def _(found: PointAtPose | PoseExcess) -> str:
-    return sentence("at_pose", "{own_pose}: {seen}", own_pose=found.pose, seen=_seen(found))
+    return sentence("at_pose#row", own_pose=found.pose, seen=_seen(found))
 
 
 @say.register
@@ -98,61 +172,78 @@ def _(found: SegmentInclination) -> str:
 
 @say.register
 def _(found: DrawingCorner) -> str:
-    corner = sentence(found.code, "corner ({q2:g}, {q3:g})", q2=found.q2_deg, q3=found.q3_deg)
+    corner = say_as(found)
     return _with_coordinate(corner, found.coordinate)
-
-
-@say.register
-def _(found: DrawingExtent) -> str:
-    if found.extreme == "greatest":
-        return sentence(found.code, "greatest {coordinate} in the side view", coordinate=found.axis)
-    return sentence(found.code, "least {coordinate} in the side view", coordinate=found.axis)
 
 
 @say.register
 def _(found: Reach) -> str:
     point = word("point", POINT_WORDS, found.point)
     if found.extreme == "greatest":
-        return sentence(found.code, "greatest distance of the {point} from axis {axis}", point=point, axis=found.axis)
-    return sentence(found.code, "least distance of the {point} from axis {axis}", point=point, axis=found.axis)
-
-
-@say.register
-def _(found: JointLimit) -> str:
-    if found.side == "lower":
-        return sentence(found.code, "joint {joint} lower limit", joint=found.joint)
-    return sentence(found.code, "joint {joint} upper limit", joint=found.joint)
-
-
-@say.register
-def _(found: JointSpeed) -> str:
-    return sentence(found.code, "joint {joint} speed", joint=found.joint)
+        return say_as(found, "greatest", point=point)
+    return say_as(found, "least", point=point)
 
 
 @say.register
 def _(found: MotionOfJoint) -> str:
-    return sentence(found.code, "+J{joint}: {motion}", joint=found.joint, motion=motion_seen(found))
+    return say_as(found, motion=motion_seen(found))
 
 
 @say.register
 def _(found: EntryOfTable) -> str:
-    return sentence(found.code, "{own_entry}, measured", own_entry=f"{found.column}{found.joint}")
+    return say_as(found, own_entry=f"{found.column}{found.joint}")
 
 
 def motion_seen(found: MotionOfJoint) -> str:
     """What is seen, as a clause."""
-    return sentence("motion", MOTION_WORDS[found.seen], point=word("point", POINT_WORDS, found.point))
+    return sentence(f"motion#{found.seen}", point=word("point", POINT_WORDS, found.point))
 
 
 def _seen(subject: PointAtPose | PoseExcess) -> str:
     if isinstance(subject, PoseExcess):
-        return sentence(subject.code, "outside the limits by")
+        return say_as(subject)
     return _with_coordinate(word("point", POINT_WORDS, subject.point), subject.coordinate)
 
 
 def _with_coordinate(vector: str, coordinate: str | None) -> str:
     if coordinate is None:
         return vector
-    return sentence(
-        "coordinate_of", "{vector} {coordinate}", vector=vector, coordinate=LABELS.get(coordinate, coordinate)
-    )
+    return sentence("coordinate_of", vector=vector, coordinate=LABELS.get(coordinate, coordinate))
+
+
+@say.register
+def _(found: PartEvidence) -> str:
+    part, status = word("part", PART_WORDS, found.code), word("status", STATUS_WORDS, found.status)
+    if not found.off.mm and not found.off.deg:
+        return sentence("part", part=part, status=status)
+    return sentence("part_off", part=part, status=status, mm=found.off.mm, deg=found.off.deg)
+
+
+@say.register
+def _(found: LookAtMotion) -> str:
+    motion = motion_seen(MotionOfJoint(found.joint, found.point, found.seen))
+    if not any(found.pose_deg):
+        return say_as(found, motion=motion)
+    pose = joined([as_text(angle, "g") for angle in found.pose_deg], ", ")
+    return sentence("look_at_motion_from", joint=found.joint, own_pose=pose, motion=motion)
+
+
+@say.register
+def _(found: MeasureAngle) -> str:
+    return _measurement(found, found.half_width_deg)
+
+
+@say.register
+def _(found: MeasureLength) -> str:
+    return _measurement(found, found.half_width_mm)
+
+
+def _measurement(found: MeasureAngle | MeasureLength, half_width: float) -> str:
+    return say_as(found, found.column, own_entry=found.entry, before=found.joint - 1, half_width=half_width)
+
+
+@say.register
+def _(found: InconsistentWithOwnText) -> str:
+    if found.entry is None:
+        return sentence("inconsistent_unexplained", own_documents=joined(found.against))
+    return say_as(found)

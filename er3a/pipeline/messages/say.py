@@ -1,46 +1,138 @@
 """From findings to sentences in the language in use.
 
-Each module of this room makes sentences for the findings of one area::
+The texts of an area stand in one table, by key: the code of a finding, or of a sentence that others are made of, and
+where it has several forms, ``#`` and which one. The fields of a text are those of its finding::
+
+    TEXTS = texts(
+        {
+            "not_reached": "joint {joint} is {gap_mm:.1f} mm short",
+            "wrong_limit": by("side", lower="the lower limit is wrong", upper="the upper limit is wrong"),
+            "missed": Plural("missed", "{count} check is missed", "{count} checks are missed"),
+            "blocked": "blocked by {bodies:, }",
+        }
+    )
+
+Numbers are formatted as the English text says, and a finding in a field is said; several findings or texts are joined
+by ``", "``, ``"; "`` or ``" "``, whichever stands as their format. Catalogues hold translations by key, so that a
+changed English wording loses none. Where a sentence needs more than that, a function makes it::
 
     @say.register
-    def _(found: OutOfReach) -> str:
-        return sentence(found.code, "joint {joint} is {gap:.1f} mm short", joint=found.joint, gap=found.gap_mm)
+    def _(found: FreeSpace) -> str:
+        return say_as(found, percent=100 * found.free_ratio)
 
-Views and the command line import the modules whose findings they show. The code of a finding is the context of its
-text in the catalogues.
+Views and the command line import the modules whose findings they show.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import singledispatch
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from er3a.findings import Finding
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.language import N_
 
 KeyT = TypeVar("KeyT", bound=str)
+Separator = Literal["; ", ", ", " "]
 
 
-PAIRS = {"; ": N_("{first}; {rest}"), ", ": N_("{first}, {rest}"), " ": N_("{first} {rest}")}
+@dataclass(frozen=True)
+class Plural:
+    """A text whose form depends on a field: a number, or how many it holds; ``{count}`` in the text."""
+
+    field: str
+    one: str
+    many: str
+
+
+@dataclass(frozen=True)
+class By:
+    """Texts of which a field decides."""
+
+    field: str
+    texts: Mapping[str, str]
+
+
+Text = str | Plural
+_texts: dict[str, Text] = {}
+_fields: dict[str, str] = {}  # of keys whose form is decided by a field of the finding
+
+
+def by(field: str, **variants: str) -> By:
+    """Texts by the value of a field; those of a truth value are ``true`` and ``false``."""
+    return By(field, variants)
+
+
+def texts(table: Mapping[str, Text | By]) -> Mapping[str, Text | By]:
+    """Make the texts of an area known, and return them."""
+    for key, text in table.items():
+        if isinstance(text, By):
+            _fields[key] = text.field
+            _texts.update({f"{key}#{variant}": each for variant, each in text.texts.items()})
+        else:
+            _texts[key] = text
+    return table
+
+
+TEXTS = texts(
+    {
+        "joined#; ": "{first}; {rest}",
+        "joined#, ": "{first}, {rest}",
+        "joined# ": "{first} {rest}",
+        "finding": "{finding}.",
+        "more": "{count} more",
+        "stage.not_computed": "Not computed: {reason}",
+        "stage.not_examined": "This stage has not been computed yet.",
+    }
+)
+
+
+def english(key: str) -> tuple[str, ...]:
+    """The English forms of a text by its key."""
+    text = _texts[key]
+    return (text.one, text.many) if isinstance(text, Plural) else (text,)
+
+
+def is_known(key: str) -> bool:
+    """Whether there is a text for a finding's code, in one form or several."""
+    return key in _texts or key in _fields
 
 
 @singledispatch
 def say(finding: Any) -> str:
-    """A finding as a text in the language in use."""
-    raise TypeError(f"no sentence is known for {type(finding).__name__}; import the room of messages that has it")
+    """A finding as a text in the language in use, by its code; functions for types are registered with it."""
+    field = _fields.get(finding.code)
+    return say_as(finding, str(getattr(finding, field)).lower() if field else "")
 
 
-def sentence(code: str, template: str, /, **parts: Any) -> str:
-    """A text in the language in use, its fields filled in as ``str.format`` does; ``code`` tells equal texts apart."""
-    return language.filled(language.translated(code, template), template, parts)
+def say_as(finding: Finding, variant: str = "", /, **parts: Any) -> str:
+    """A finding as one of its texts, with parts besides its own fields or in place of them."""
+    fields = {name: getattr(finding, name) for name in finding.__dataclass_fields__}
+    return sentence(f"{finding.code}#{variant}" if variant else finding.code, **fields | parts)
 
 
-def counted(code: str, one: str, many: str, count: int, /, **parts: Any) -> str:
-    """A text whose form depends on a number, which is the field ``{count}`` in it."""
-    found = language.translated_count(code, one, many, count)
-    return language.filled(found, one if count == 1 else many, {"count": count} | parts)
+def sentence(key: str, /, **parts: Any) -> str:
+    """A text by its key in the language in use, its fields filled in."""
+    try:
+        text = _texts[key]
+    except KeyError:
+        raise KeyError(f"no text is known for {key!r}; import the module of messages that has it") from None
+    if isinstance(text, Plural):
+        count = parts[text.field]
+        count = len(count) if isinstance(count, Sequence) else count
+        form, parts = text.one if count == 1 else text.many, parts | {"count": count}
+        return language.filled(language.by_key(key, form, count), text.many + form, parts, _as_text)
+    return language.filled(language.by_key(key, text), text, parts, _as_text)
+
+
+def _as_text(part: Any, spec: str) -> str:
+    """A part of a text: findings as sentences, several parts joined as the format says."""
+    if isinstance(part, tuple | list):
+        return joined([_as_text(each, "") for each in part], spec or "; ")
+    if hasattr(part, "code"):
+        return say(part)
+    return language.as_text(part, spec)
 
 
 def word(code: str, words: Mapping[KeyT, str], key: KeyT) -> str:
@@ -58,10 +150,10 @@ def say_all(findings: Iterable[Finding]) -> str:
     return joined(listed(findings), " ")
 
 
-def joined(texts: Iterable[str], separator: str = "; ") -> str:
+def joined(parts: Iterable[str], separator: Separator | str = "; ") -> str:
     """Texts as one: apart by ``"; "``, ``", "`` or ``" "`` (whole sentences); empty ones are left out."""
-    told = [text for text in texts if text]
-    whole = told[-1] if told else ""
-    for text in reversed(told[:-1]):
-        whole = sentence("joined", PAIRS[separator], first=text, rest=whole)
+    kept = [text for text in parts if text]
+    whole = kept[-1] if kept else ""
+    for text in reversed(kept[:-1]):
+        whole = sentence(f"joined#{separator}", first=text, rest=whole)
     return whole

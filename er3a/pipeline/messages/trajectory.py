@@ -1,16 +1,18 @@
-"""What the trajectory page and recording say of paths, beside the verdict."""
+"""The verdict of the trajectory stage, and what its page and recording say of paths."""
 
 from __future__ import annotations
 
-import er3a.pipeline.messages.pairs  # noqa: F401
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.kinematics.singularity import EventType
+from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
-from er3a.pipeline.messages.say import joined, listed, say, sentence, word
+from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
     Jump,
+    PathCounts,
     PathKind,
     PathSummary,
     Singularity,
@@ -19,6 +21,7 @@ from er3a.pipeline.stages.trajectory.model import (
 )
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import JerkTooGreat, RateCause
+from er3a.planning.path_verdicts import PathVerdict
 
 FIGURES = {
     "safe": N_("Safe paths"),
@@ -57,6 +60,86 @@ WHOLE = 10.0  # from which on numbers are rounded to whole ones
 PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
 
+TEXTS = texts(
+    {
+        "trajectory.paths": Plural("count", "{safe} of {count} path is safe", "{safe} of {count} paths are safe"),
+        "trajectory.not_followed": "{count} not followed to the end ({names})",
+        "trajectory.fault": "{count} {word} ({names})",
+        "dependent_axes": "axes {axes} dependent",
+        "smallest_singular_value": "smallest singular value {value:.3g}",
+        "path.safe": "far from singular poses, within limits and reach",
+        "path.shown": "the figure shows the straight joint move",
+        "path.harmless": "passes singular poses ({places}); joint moves are unaffected by singularities",
+        "path.no_fault": "no fault",
+        "path.pace#profile": (
+            "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path takes "
+            "{fastest:.2f} s"
+        ),
+        "path.pace#least": "it takes at least {fastest:.2f} s",
+        "path.speeds#unbounded": "no finite joint speed follows the path there",
+        "path.speeds#bounded": (
+            "joint speeds stay finite on this configuration, but two configurations meet there: a controller may stop "
+            "or change to the other"
+        ),
+        "singularity.passed": "{type} singularity within {distance} at t = {when} s",
+        "dependent.passed": "close to {type} at t = {when} s ({distance})",
+        "singularity.met": "{type} singularity at t = {when} s",
+        "dependent.met": "{type} at t = {when} s",
+        "path.jump": "the branch in use ends at t = {t:.4g} s, J{joint} would jump",
+        "path.stretch": "{when}: {cause}",
+        "path.when": "from t = {start:.4g} to {end:.4g} s",
+        "bodies_overlap": "{pairs} overlap, up to {depth:.1f} mm at t = {t:.4g} s",
+        "bodies_overlap.more": "{pairs} and more",
+        "path.either_way": "{open}; the path is not safe in either case",
+        "advice.out_of_reach": "it is out of reach {when}",
+        "advice.only": "{way}, as the study requires, does not repair it: {reason}",
+        "advice.none": "No avoidance strategy completes this path: {why}",
+        "advice.no_way": "No avoidance strategy works: {reason}",
+        "advice.slower": (
+            "Or run all of it at {percent:.3g} % of its speed: duration_s {needed:.4g} in the path file, or the speed "
+            "in its program"
+        ),
+        "advice.clear_until": (
+            "Nothing overlaps before t = {t:.4g} s ({far:.1f} mm): end the path there, or move its end or the body "
+            "that it hits"
+        ),
+        "advice.chosen": "{way}: {tool}, and {time}",
+        "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
+        "advice.tool#none": "the tool stays on the path",
+        "advice.tool#far": "the tool leaves the path by {far} mm",
+        "advice.tool#turned": "the tool leaves the path by {turned} deg",
+        "advice.time#less": "it takes {shorter:.2f} s less than programmed",
+        "advice.time#same": "it takes no more time than programmed",
+        "advice.time#more": "it takes {longer:.2f} s more than programmed",
+    }
+)
+
+
+@say.register
+def _(found: PathCounts) -> str:
+    unsafe: dict[PathVerdict, tuple[str, ...]] = {
+        "unreachable": found.unreachable,
+        "none found": found.none_found,
+        "leaves limits": found.leaves_limits,
+        "collides": found.collides,
+        "too fast": found.too_fast,
+        "singular": found.singular,
+        "too fast for the assumed limits": found.too_fast_if_assumed,
+        "undecided": found.undecided,
+        "near-singular": found.near_singular,
+    }
+    faults = []
+    for verdict, names in unsafe.items():
+        parts = {"count": len(names), "word": outcome_word(verdict), "names": ", ".join(names)}
+        faults.append(sentence("trajectory.fault", **parts) if names else "")
+    safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
+    if found.not_followed:
+        parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
+        faults.append(sentence("trajectory.not_followed", **parts))
+    sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
+    return sentence("finding", finding=joined(sentences))
+
+
 def kind_word(kind: PathKind) -> str:
     """What kind of path it is."""
     return word("trajectory.kind", KINDS, kind)
@@ -71,7 +154,7 @@ def event_word(event: Singularity) -> str:
     """A singularity's type, or the axes that become dependent where the field has no name for it."""
     if event.type != "dependent_axes":
         return type_word(event.type)
-    return sentence("dependent_axes", "axes {axes} dependent", axes=", ".join(map(str, event.axes)))
+    return sentence("dependent_axes", axes=", ".join(map(str, event.axes)))
 
 
 def event_distance(event: Singularity) -> str:
@@ -80,9 +163,7 @@ def event_distance(event: Singularity) -> str:
         return f"{event.distance_deg:.3g} deg"
     if event.distance_mm is not None:
         return f"{event.distance_mm:.3g} mm"
-    return sentence(
-        "smallest_singular_value", "smallest singular value {value:.3g}", value=event.smallest_singular_value
-    )
+    return sentence("smallest_singular_value", value=event.smallest_singular_value)
 
 
 def strategy_word(name: StrategyName) -> str:
@@ -103,7 +184,7 @@ def path_text(path: PathSummary) -> str:
 
 def _apart_from_collisions(path: PathSummary) -> str:
     if path.no_way:
-        shown = sentence("path.shown", "the figure shows the straight joint move")
+        shown = sentence("path.shown")
         return joined([say(path.no_way), shown])
     if path.unreachable:
         return joined(map(_when, path.unreachable))
@@ -114,17 +195,13 @@ def _apart_from_collisions(path: PathSummary) -> str:
     met = [say(event) for event in path.singularities if event.crossing]
     if path.in_joint_space:
         if not met:
-            return sentence("path.no_fault", "no fault")
-        return sentence(
-            "path.harmless",
-            "passes singular poses ({places}); joint moves are unaffected by singularities",
-            places=joined(met),
-        )
+            return sentence("path.no_fault")
+        return sentence("path.harmless", places=joined(met))
     if met or path.jumps:
         return joined([*met, *map(say, path.jumps), _speeds(path.joint_speed_bounded)])
     if path.singularities:
         return joined(map(say, path.singularities))
-    return sentence("path.safe", "far from singular poses, within limits and reach")
+    return sentence("path.safe")
 
 
 def _worst(stretches: tuple[Stretch[RateCause], ...]) -> list[Stretch[RateCause]]:
@@ -140,13 +217,8 @@ def _at_another_pace(path: PathSummary) -> str:
     if path.fastest_s is None or not _only_too_fast(path):
         return ""
     if path.fastest_s > path.duration_s:
-        return sentence("path.pace", "it takes at least {fastest:.2f} s", fastest=path.fastest_s)
-    return sentence(
-        "path.pace",
-        "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path takes "
-        "{fastest:.2f} s",
-        fastest=path.fastest_s,
-    )
+        return sentence("path.pace#least", fastest=path.fastest_s)
+    return sentence("path.pace#profile", fastest=path.fastest_s)
 
 
 def _only_too_fast(path: PathSummary) -> bool:
@@ -157,12 +229,8 @@ def _only_too_fast(path: PathSummary) -> bool:
 
 def _speeds(bounded: bool) -> str:
     if bounded:
-        return sentence(
-            "path.speeds",
-            "joint speeds stay finite on this configuration, but two configurations meet there: a controller may stop "
-            "or change to the other",
-        )
-    return sentence("path.speeds", "no finite joint speed follows the path there")
+        return sentence("path.speeds#bounded")
+    return sentence("path.speeds#unbounded")
 
 
 @say.register
@@ -171,43 +239,43 @@ def _(event: Singularity) -> str:
     parts = {"type": event_word(event), "when": when, "distance": event_distance(event)}
     if event.type == "dependent_axes":
         if event.crossing:
-            return sentence("dependent.met", "{type} at t = {when} s", **parts)
-        return sentence("dependent.passed", "close to {type} at t = {when} s ({distance})", **parts)
+            return sentence("dependent.met", **parts)
+        return sentence("dependent.passed", **parts)
     if event.crossing:
-        return sentence("singularity.met", "{type} singularity at t = {when} s", **parts)
-    return sentence("singularity.passed", "{type} singularity within {distance} at t = {when} s", **parts)
+        return sentence("singularity.met", **parts)
+    return sentence("singularity.passed", **parts)
 
 
 @say.register
 def _(jump: Jump) -> str:
     parts = {"t": jump.t_s, "joint": jump.joint}
-    return sentence("path.jump", "the branch in use ends at t = {t:.4g} s, J{joint} would jump", **parts)
+    return sentence("path.jump", **parts)
 
 
 @say.register
 def _(stretch: Stretch) -> str:  # type: ignore[type-arg]  # singledispatch takes no parametrised class
-    return sentence("path.stretch", "{when}: {cause}", when=_when(stretch), cause=say(stretch.cause))
+    return sentence("path.stretch", when=_when(stretch), cause=say(stretch.cause))
 
 
 def _when(stretch: Stretch) -> str:  # type: ignore[type-arg]
-    return sentence("path.when", "from t = {start:.4g} to {end:.4g} s", start=stretch.t0_s, end=stretch.t1_s)
+    return sentence("path.when", start=stretch.t0_s, end=stretch.t1_s)
 
 
 @say.register
 def _(found: BodiesOverlap) -> str:
     pairs = joined(listed(found.pairs[:MOST_PAIRS]), ", ")
     if len(found.pairs) > MOST_PAIRS:
-        pairs = sentence("bodies_overlap.more", "{pairs} and more", pairs=pairs)
+        pairs = sentence("bodies_overlap.more", pairs=pairs)
     worst = {"pairs": pairs, "depth": found.depth_mm, "t": found.t_s}
-    return sentence(found.code, "{pairs} overlap, up to {depth:.1f} mm at t = {t:.4g} s", **worst)
+    return say_as(found, **worst)
 
 
 def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-arg]
     """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
-    told = say(part.cause)
+    cause = say(part.cause)
     if part in path.undecided and path.verdict != "undecided":
-        return sentence("path.either_way", "{open}; the path is not safe in either case", open=told)
-    return told
+        return sentence("path.either_way", open=cause)
+    return cause
 
 
 def advice(path: PathSummary) -> str | None:
@@ -218,18 +286,18 @@ def advice(path: PathSummary) -> str | None:
         return _chosen(path.chosen, path.duration_s) + _slower_throughout(path)
     if path.unreachable:
         when = joined(map(_when, path.unreachable), ", ")
-        why = sentence("advice.out_of_reach", "it is out of reach {when}", when=when)
+        why = sentence("advice.out_of_reach", when=when)
     else:
         causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
         why = joined(dict.fromkeys(causes))
     if len(path.avoidance) == 1:
         (only,) = path.avoidance
         if only.name == "planned":
-            no_way = sentence("advice.no_way", "No avoidance strategy works: {reason}", reason=reasons(only))
+            no_way = sentence("advice.no_way", reason=reasons(only))
             return no_way + _clear(path)
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
-        return sentence("advice.only", "{way}, as the study requires, does not repair it: {reason}", **parts)
-    return sentence("advice.none", "No avoidance strategy completes this path: {why}", why=why) + _clear(path)
+        return sentence("advice.only", **parts)
+    return sentence("advice.none", why=why) + _clear(path)
 
 
 def _slower_throughout(path: PathSummary) -> str:
@@ -238,13 +306,7 @@ def _slower_throughout(path: PathSummary) -> str:
     if speed is None or acceleration is None or not _only_too_fast(path):
         return ""
     longer = PACE_MARGIN * max(1.0, speed, acceleration**0.5)
-    return ". " + sentence(
-        "advice.slower",
-        "Or run all of it at {percent:.3g} % of its speed: duration_s {needed:.4g} in the path file, or the speed in "
-        "its program",
-        percent=100 / longer,
-        needed=path.duration_s * longer,
-    )
+    return ". " + sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
 
 
 def _clear(path: PathSummary) -> str:
@@ -252,13 +314,7 @@ def _clear(path: PathSummary) -> str:
     if not path.collisions or path.unreachable or not path.collisions[0].s0_m:
         return ""
     first = path.collisions[0]
-    return ". " + sentence(
-        "advice.clear_until",
-        "Nothing overlaps before t = {t:.4g} s ({far:.1f} mm): end the path there, or move its end or the body "
-        "that it hits",
-        t=first.t0_s,
-        far=first.s0_m * 1000,
-    )
+    return ". " + sentence("advice.clear_until", t=first.t0_s, far=first.s0_m * 1000)
 
 
 def reasons(tried: TriedStrategy) -> str:
@@ -272,18 +328,18 @@ def _chosen(tried: TriedStrategy, programmed_s: float) -> str:
         raise ValueError(f"{tried.name} was chosen and has no motion")
     tool = _leaves(motion.max_deviation_mm, motion.max_deviation_deg)
     cost = {"tool": tool, "time": _takes(motion.duration_s - programmed_s)}
-    return sentence("advice.chosen", "{way}: {tool}, and {time}", way=word("advice", ADVICE, tried.name), **cost)
+    return sentence("advice.chosen", way=word("advice", ADVICE, tried.name), **cost)
 
 
 def _leaves(far_mm: float, turned_deg: float) -> str:
     if far_mm < NO_DEVIATION and turned_deg < NO_DEVIATION:
-        return sentence("advice.tool", "the tool stays on the path")
+        return sentence("advice.tool#none")
     if turned_deg < NO_DEVIATION:
-        return sentence("advice.tool", "the tool leaves the path by {far} mm", far=_shortly(far_mm))
+        return sentence("advice.tool#far", far=_shortly(far_mm))
     if far_mm < NO_DEVIATION:
-        return sentence("advice.tool", "the tool leaves the path by {turned} deg", turned=_shortly(turned_deg))
+        return sentence("advice.tool#turned", turned=_shortly(turned_deg))
     both = {"far": _shortly(far_mm), "turned": _shortly(turned_deg)}
-    return sentence("advice.tool", "the tool leaves the path by {far} mm and {turned} deg", **both)
+    return sentence("advice.tool#both", **both)
 
 
 def _shortly(value: float) -> str:
@@ -292,7 +348,7 @@ def _shortly(value: float) -> str:
 
 def _takes(longer_s: float) -> str:
     if abs(longer_s) < NO_TIME:
-        return sentence("advice.time", "it takes no more time than programmed")
+        return sentence("advice.time#same")
     if longer_s > 0:
-        return sentence("advice.time", "it takes {longer:.2f} s more than programmed", longer=longer_s)
-    return sentence("advice.time", "it takes {shorter:.2f} s less than programmed", shorter=-longer_s)
+        return sentence("advice.time#more", longer=longer_s)
+    return sentence("advice.time#less", shorter=-longer_s)

@@ -1,24 +1,44 @@
-"""What only the validation page says: names of key figures, and why something is not judged."""
+"""The verdict of the validation stage, and what its page says."""
 
 from __future__ import annotations
 
-import er3a.pipeline.messages.kinematics
-import er3a.pipeline.messages.validation_verdict  # noqa: F401
-from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS
-from er3a.pipeline.messages.say import say, sentence, word
+from collections.abc import Sequence
+
+import er3a.pipeline.messages.diagnosis  # noqa: F401
+from er3a.identifiability.reactions import CheckCounts
+from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_WORDS, quoted
+from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
-    InNoSet,
+    AnotherArm,
+    Confirmed,
+    Contradicted,
+    Contradiction,
+    JudgedTable,
+    LeftOpen,
+    ModelUnsound,
     NamedPose,
-    NearSingularLeftOut,
-    NoClosedForm,
-    NotInRobotFile,
-    NumbersMissing,
-    SetHasNoData,
-    SourceGivesNone,
+    NothingToCompare,
+    PartFound,
+    SelfCheck,
     WholeGroup,
 )
+from er3a.robots.robot import Grade
 
+SELF_CHECKS = {
+    "numbers_not_finite": N_("numbers that are not finite"),
+    "crossed_limits": N_("joints whose lower limit is above the upper one"),
+    "odd_directions": N_("joint directions other than +1 and -1"),
+    "length_unit": N_("lengths in another unit (longest below 10 mm or above 20 m)"),
+    "limit_unit": N_("limits in another unit (widest below 6.3 deg)"),
+    "closed_form": N_("properties lacking for a closed-form inverse (parallel axes 2 and 3, spherical wrist)"),
+    "joints_to_pose_to_joints": N_("joints to pose to joints"),
+    "unsolved_poses": N_("random poses without any solution"),
+    "joint_error": N_("worst joint error"),
+    "position_error": N_("worst position error"),
+    "orientation_error": N_("worst orientation error"),
+}
+DATA_GRADES = {"official": N_("official"), "measured": N_("measured"), "cad": N_("CAD"), "export": N_("exported")}
 FIGURES = {
     "independent_checks": N_("Independent checks passed"),
     "consistency_checks": N_("Consistency checks passed"),
@@ -50,6 +70,239 @@ CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
 
 
+TEXTS = texts(
+    {
+        "labels_missed": Plural(
+            "count", "{count} label is missed, by up to {worst} mm.", "{count} labels are missed, by up to {worst} mm."
+        ),
+        "graded": "{own_source} ({grade})",
+        "claims": Plural(
+            "failed",
+            "Of the {claims} claims in {reference_set}, {count} doesn't hold.",
+            "Of the {claims} claims in {reference_set}, {count} don't hold.",
+        ),
+        "counted_checks#independent": "{passed} of {total} independent checks pass",
+        "counted_checks#consistency": "{same_passed} of {same_total} consistency checks pass, and none is independent",
+        "counted_checks#both": (
+            "{passed} of {total} independent and {same_passed} of {same_total} consistency checks pass"
+        ),
+        "validation.left_open#up_to": (
+            "Open and weak entries could put the tool off by up to {mm:.0f} mm and {deg:.0f} deg."
+        ),
+        "validation.left_open#at_least": (
+            "Open and weak entries could put the tool off by {mm:.0f} mm and {deg:.0f} deg, or by more."
+        ),
+        "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
+        "validation.left_open#uncontradicted": "Nothing independent contradicts the table ({checks}), but:",
+        "validation.missed#contradicted": (
+            "The model contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}; "
+            "{checks}."
+        ),
+        "validation.missed#described": (
+            "Against the {grades} data in {own_set} the {quantity} is {measured}, not {expected}; {checks}."
+        ),
+        "validation.missed#another_arm": (
+            "This is not the arm that the {grades} data in {own_set} describe: the {quantity} is {measured}, not "
+            "{expected}; {checks}."
+        ),
+        "chain#or": "{value} or {values}",
+        "chain#and": "{value} and {values}",
+        "validation.confirmed": (
+            "Independent documents settle every entry that moves the tool: {checks} ({grades} data)."
+        ),
+        "validation.left_open#parts": "{parts}.",
+        "validation.left_open#tolerance": (
+            "Settled: what is left open moves the tool by less than {mm} mm and {deg} deg."
+        ),
+        "validation.left_open#measurement": "Most useful measurement: {next_measurement}.",
+        "validation.left_open#unbounded": (
+            "{count} entries that move the tool rest on their own source alone: if it is wrong, the error has no bound."
+        ),
+        "validation.left_open#conflicting": "{count} undecided, as documents contradict each other",
+        "part_found#settled": "{part}: {settled} of {entries} entries settled",
+        "part_found#excluded": "excluded: {names}",
+        "part_found#open": "open: {names}",
+        "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
+        "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
+        "validation.another_arm": "They exclude {names}.",
+        "contradiction#more": (
+            "The references contradict each other about the {subject} ({stated}) and {more} more, which is not "
+            "counted against the model."
+        ),
+        "contradiction#one": (
+            "The references contradict each other about the {subject} ({stated}), which is not counted against the "
+            "model."
+        ),
+        "not_in_robot_file": "the robot's file gives no value",
+        "source_gives_none": "the source gives none",
+        "set_has_no_data": "{reference_set} has no data",
+        "in_no_set": "no reference set gives it",
+        "numbers_missing": "numbers are missing",
+        "no_closed_form": "no closed-form inverse, because {missing}",
+        "near_singular_left_out": (
+            "{judged} of {poses} random poses; the others lie within {wrist_deg:g} deg (wrist, elbow) or "
+            "{shoulder_mm:g} mm (shoulder) of a singularity, where joints follow from a pose less exactly"
+        ),
+    }
+)
+
+
+@say.register
+def _(found: SelfCheck) -> str:
+    return word(found.code, SELF_CHECKS, found.quantity)
+
+
+@say.register
+def _(found: Confirmed) -> str:
+    text = say_as(found, checks=counted_checks(found.counts), grades=_grades(found.grades))
+    return joined([text, *_contradiction(found.contradiction), *_of_claims(found)], " ")
+
+
+def counted_checks(counts: CheckCounts) -> str:
+    """How many checks pass, by what they rest on: the one scheme of counts of all pages."""
+    own, same = counts.independent, counts.consistency
+    if not same.total:
+        form = "independent"
+    elif not own.total:
+        form = "consistency"
+    else:
+        form = "both"
+    return sentence(
+        f"counted_checks#{form}",
+        passed=own.passed,
+        total=own.total,
+        same_passed=same.passed,
+        same_total=same.total,
+    )
+
+
+def _of_claims(found: JudgedTable) -> list[str]:
+    return [*map(say, found.claims), *map(say, found.own_text)]
+
+
+@say.register
+def _(found: LeftOpen) -> str:
+    parts = [say(part) for part in found.parts if part.status != "settled"]
+    sentences = [_what_speaks(found.counts), say_as(found, "parts", parts=joined(parts)) if parts else ""]
+    if found.tolerance and any(part.settled for part in found.parts):
+        sentences.append(
+            say_as(found, "tolerance", mm=as_text(found.tolerance.mm, "g"), deg=as_text(found.tolerance.deg, "g"))
+        )
+    sentences += _how_far_off(found)
+    if found.next_measurement:
+        sentences.append(say_as(found, "measurement"))
+    return joined([*sentences, *_contradiction(found.contradiction), *_of_claims(found)], " ")
+
+
+def _how_far_off(found: LeftOpen) -> list[str]:
+    sentences = []
+    if found.off.moves:
+        form = "at_least" if found.at_least else "up_to"
+        sentences.append(sentence(f"validation.left_open#{form}", mm=found.off.mm, deg=found.off.deg))
+    if found.unbounded:
+        sentences.append(sentence("validation.left_open#unbounded", count=found.unbounded))
+    return sentences
+
+
+def _what_speaks(counts: CheckCounts) -> str:
+    checks = counted_checks(counts)
+    if counts.independent.conflicting:
+        undecided = sentence("validation.left_open#conflicting", count=counts.independent.conflicting)
+        checks = joined([checks, undecided], ", ")
+    form = "uncontradicted" if counts.independent.total else "uncovered"
+    return sentence(f"validation.left_open#{form}", checks=checks)
+
+
+@say.register
+def _(found: PartFound) -> str:
+    part, settled = word("part", PART_WORDS, found.part), found.settled
+    counts = say_as(found, "settled", part=part, settled=settled)
+    excluded = say_as(found, "excluded", names=shortened(found.contradicted))
+    left = say_as(found, "open", names=shortened(found.open))
+    parts = [counts, excluded if found.contradicted else "", left if found.open else ""]
+    return joined(parts, ", ")
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Names of entries, joints of one kind together: direction 1, 4, 5, 6."""
+    by_kind: dict[str, list[str]] = {}
+    for name in names:
+        kind = name.rstrip("0123456789")
+        by_kind.setdefault(kind, []).append(name[len(kind) :])
+    return joined((f"{kind} {', '.join(own)}" if own[0] else kind for kind, own in by_kind.items()), ", ")
+
+
+def _contradiction(found: Contradiction | None) -> list[str]:
+    return [say(found)] if found else []
+
+
+@say.register
+def _(found: NothingToCompare) -> str:
+    text = say_as(found)
+    return joined([text, *_of_claims(found)], " ")
+
+
+@say.register
+def _(found: ModelUnsound) -> str:
+    value = _value(found.measured, found.unit)
+    return say_as(found, value=value)
+
+
+@say.register
+def _(found: Contradicted) -> str:
+    return joined(
+        [_missed(found, "contradicted"), say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " "
+    )
+
+
+@say.register
+def _(found: AnotherArm) -> str:
+    excluded = say_as(found, names=shortened(found.contradicted))
+    sentences = [
+        say(found.described) if found.described else "",
+        _missed(found, "described" if found.described else "another_arm"),
+        excluded if found.contradicted else "",
+        *_of_claims(found),
+    ]
+    return joined(sentences, " ")
+
+
+@say.register
+def _(found: Contradiction) -> str:
+    values = [_value(value, found.unit) for value in found.stated]
+    stated = _chained("or", values)
+    if not found.more:
+        return say_as(found, "one", stated=stated)
+    return say_as(found, "more", stated=stated)
+
+
+def _missed(found: Contradicted | AnotherArm, form: str) -> str:
+    return sentence(
+        f"validation.missed#{form}",
+        grades=_grades(found.grades),
+        own_set=found.reference_set,
+        checks=counted_checks(found.counts),
+        quantity=quoted(found.check),
+        measured=_value(found.measured, found.unit),
+        expected=_value(found.expected, found.unit),
+    )
+
+
+def _grades(grades: Sequence[Grade]) -> str:
+    return _chained("and", [word("data", DATA_GRADES, grade) for grade in grades])
+
+
+def _chained(link: str, words: Sequence[str]) -> str:
+    """Words as one text, with "and" or "or" between each two."""
+    if len(words) == 1:
+        return words[0]
+    return sentence(f"chain#{link}", value=words[0], values=_chained(link, words[1:]))
+
+
+def _value(value: float, unit: str) -> str:
+    return f"{as_text(value, '.1f')} {unit}" if unit else as_text(value, "g")
+
+
 @say.register
 def _(found: NamedPose) -> str:
     return found.name
@@ -58,46 +311,3 @@ def _(found: NamedPose) -> str:
 @say.register
 def _(found: WholeGroup) -> str:
     return word(found.code, MISSING_WORDS, found.group)
-
-
-@say.register
-def _(found: NotInRobotFile) -> str:
-    return sentence(found.code, "the robot's file gives no value")
-
-
-@say.register
-def _(found: SourceGivesNone) -> str:
-    return sentence(found.code, "the source gives none")
-
-
-@say.register
-def _(found: SetHasNoData) -> str:
-    return sentence(found.code, "{own_set} has no data", own_set=found.reference_set)
-
-
-@say.register
-def _(found: InNoSet) -> str:
-    return sentence(found.code, "no reference set gives it")
-
-
-@say.register
-def _(found: NumbersMissing) -> str:
-    return sentence(found.code, "numbers are missing")
-
-
-@say.register
-def _(found: NoClosedForm) -> str:
-    return sentence(found.code, "no closed-form inverse, because {missing}", missing=say(found.missing))
-
-
-@say.register
-def _(found: NearSingularLeftOut) -> str:
-    return sentence(
-        found.code,
-        "{judged} of {poses} random poses; the others lie within {wrist:g} deg (wrist, elbow) or {shoulder:g} mm "
-        "(shoulder) of a singularity, where joints follow from a pose less exactly",
-        judged=found.judged,
-        poses=found.poses,
-        wrist=found.wrist_deg,
-        shoulder=found.shoulder_mm,
-    )

@@ -1,13 +1,80 @@
-"""The names of the vision stage's key figures, and the words of its page."""
+"""Hand-eye calibrations and grasps: the verdict of the vision stage, its page, and lines for a terminal."""
 
 from __future__ import annotations
 
-from er3a.pipeline.messages.hand_eye import METHODS, direction_word, pose_words
-from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.vision_verdict import say
+import numpy as np
 
-__all__ = ["FIGURES", "METHODS", "direction_word", "pose_words", "say"]
+import er3a.pipeline.messages.collision
+import er3a.pipeline.messages.diagnosis
+import er3a.pipeline.messages.planning  # noqa: F401
+from er3a.geometry.transforms import rpy_of
+from er3a.pipeline.messages.expectations import demonstrated
+from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.stages.vision.model import (
+    DirectionContradicted,
+    GraspCounts,
+    UnsureGrasp,
+)
+from er3a.vision.calibration_set import TimeOffset, quaternion_of
+from er3a.vision.grasping import (
+    GraspCollides,
+    LineLeaves,
+    LineUnproven,
+    WayCollides,
+)
+from er3a.vision.hand_eye import HandEye, spread_of
+from er3a.vision.table_corrections import NoCorrections, TableCorrections
+from er3a.vision.vision_findings import (
+    AngleOrder,
+    DirectionTried,
+    OtherDirection,
+    ParallelTurns,
+    QuaternionOrder,
+    RotationMismatch,
+    TransposedRotations,
+)
 
+PARTS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
+MENDING = {
+    "half_turn_x": N_("the board is detected turned by 180 deg about its x axis"),
+    "half_turn_y": N_("the board is detected turned by 180 deg about its y axis"),
+    "half_turn_z": N_("the board is detected turned by 180 deg in its plane"),
+    "quarter_turn_z": N_("the board is detected turned by 90 deg in its plane"),
+    "mirrored_tilt": N_("the board's tilt is mirrored, as of a flat board seen from far or head-on"),
+    "rotation": N_("no typical detector error explains it"),
+}
+STREAMS = {"flange": N_("flange"), "target": N_("board"), "both": N_("flange and board")}
+POSES = {
+    "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
+    "eye_to_hand": (N_("camera in the base (T_base_camera)"), N_("board on the flange (T_flange_board)")),
+}
+DIRECTION_WORDS = {
+    (False, False): N_("both streams as given"),
+    (True, True): N_("both inverted"),
+    (True, False): N_("flange inverted"),
+    (False, True): N_("board inverted"),
+}
+DIRECTION_STATUS = {
+    "best": N_("supported: the smallest residuals"),
+    "same_problem": N_("the same equations with the two unknowns swapped; poses alone can't distinguish them"),
+    "excluded": N_("excluded by the residuals"),
+    "open": N_("can't be told"),
+}
+METHODS = {
+    "park": "Park",
+    "horaud": "Horaud",
+    "tsai": "Tsai",
+    "andreff": "Andreff",
+    "daniilidis": "Daniilidis",
+    "shah": "Shah",
+    "li": "Li",
+}
+NO_CORRECTIONS = {
+    "joints": N_("corrections to the table need recorded joint angles and an arm with six revolute joints"),
+    "few": N_("too few samples for corrections to the table"),
+    "steps": N_("no corrections to the table fit: it has a gross fault or belongs to another arm"),
+}
 FIGURES = {
     "samples_used": N_("samples used"),
     "position_half_width": N_("camera's position, largest half-width (95 %)"),
@@ -16,3 +83,364 @@ FIGURES = {
     "worst_error": N_("error at the worst grasp (95 %)"),
     "least_success": N_("least probability of success"),
 }
+
+
+TEXTS = texts(
+    {
+        "calibration_impossible": "The samples determine no hand-eye pose: {why}.",
+        "calibration_doubtful": "The calibration can't be used, so no grasp rests on it: {warnings:; }.",
+        "touch_contradicts": Plural(
+            "points",
+            "{count} touched point contradicts the calibration: it is {largest_mm:.3g} mm off (probability "
+            "{probability:.1g}).",
+            "{count} touched points contradict the calibration: they are up to {largest_mm:.3g} mm off "
+            "(probability {probability:.1g}).",
+        ),
+        "not_grasped_object": "not {name} ({why})",
+        "grasp_out_of_reach": Plural(
+            "poses", "its only grasp is out of reach", "all {count} poses of its grasps are out of reach"
+        ),
+        "grasp_near_limits": Plural(
+            "solutions",
+            "the only solution is {margin_deg:.1f} deg from the joint limits; {needed_deg:g} deg are required",
+            "the best of {count} solutions is {margin_deg:.1f} deg from the joint limits; {needed_deg:g} deg are "
+            "required",
+        ),
+        "grasp_singular": (
+            "all solutions within the limits are singular: the least singular value is {singular_value:.2g} at best, "
+            "and {needed:g} is required"
+        ),
+        "no_transfer": "the straight move to the approach collides, and there is no other: {why}",
+        "direction_contradicted": (
+            "The direction of the poses is contradicted: with {which} the residuals are {rms_mm:.3g} mm, as given "
+            "{rms_given_mm:.3g} mm."
+        ),
+        "vision.inverted#both": "both streams inverted",
+        "vision.inverted#flange": "the flange's poses inverted",
+        "vision.inverted#board": "the board's poses inverted",
+        "grasp_counts#grasped": Plural(
+            "count", "{grasped} of {count} object can be grasped", "{grasped} of {count} objects can be grasped"
+        ),
+        "grasp_counts#error": "at the worst grasp 95 % of errors stay below {point_mm:.2g} mm",
+        "grasp_counts#uncertain": "uncertain: {unsure:, }",
+        "grasp_counts#left_out": "calibrated without {left_out:, }",
+        "unsure_grasp": "{name} ({p:.3g} %)",
+        "grasp_collides#apart": (
+            "at the grasp {pair} are at most {clearance_mm:.1f} mm apart; {needed_mm:g} mm are required"
+        ),
+        "grasp_collides#overlap": "at the grasp {pair} overlap by at least {depth:.1f} mm",
+        "line_leaves": "the straight {part} exceeds limits or becomes singular {after_mm:.0f} mm from the grasp",
+        "line_unproven": (
+            "along the straight {part} the bounds can't decide whether limits, joint speeds and distances from "
+            "singularities are kept"
+        ),
+        "way_collides#apart": "on the {part} {pair} are {clearance_mm:.1f} mm apart; {needed_mm:g} mm are required",
+        "way_collides#overlap": "on the {part} {pair} overlap by {depth:.1f} mm",
+        "far_from_fit": (
+            "{sample}: {off_mm:.3g} mm and {off_deg:.2g} deg from what the other samples predict (probability "
+            "{probability:.1g})"
+        ),
+        "repeated_pose": (
+            "{sample}: the arm has the same pose as in {first}, and the two board poses differ by {apart_mm:.2g} mm "
+            "and {apart_deg:.2g} deg; a sample at another pose would add more"
+        ),
+        "ambiguous_tilt": (
+            "{sample}: the flat board is seen almost head-on, or too small: the mirrored tilt fits with only "
+            "{ratio:.2g} times the error. Take the image from nearer, or tilt the board by 30 deg"
+        ),
+        "no_majority": (
+            "flange and board rotate by different angles in {pairs} of {of} pairs of samples ({median_deg:.3g} deg in "
+            "the median): the robot's table, the order of the samples, or the orientations of one stream are wrong"
+        ),
+        "board_scale": (
+            "the samples fit a board {factor:.4g} ± {half_width:.1g} times as large: check the stated size of its "
+            "squares, the units, or the camera's focal length"
+        ),
+        "little_motion": (
+            "the samples rotate by at most {greatest_turn_deg:.3g} deg, about axes within {axes_apart_deg:.2g} deg of "
+            "one direction: add poses rotated by 30 deg or more about a second axis"
+        ),
+        "more_scatter": (
+            "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
+            "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated"
+        ),
+        "too_few_samples": "{samples} samples; {needed} are needed, and ten or more advised",
+        "all_samples_equal": by(
+            "stream",
+            target="the board is seen in the same pose in all samples: check what was recorded",
+            flange="the flange has the same pose in all samples: move the arm between them",
+        ),
+        "no_rotation": (
+            "the flange rotates by at most {greatest_turn_deg:.2g} deg, so the camera's position is undetermined: "
+            "rotate it by 30 deg or more"
+        ),
+        "nothing_fits": "no poses of camera and board fit the samples: the two streams don't belong together",
+        "rotation_mismatch": (
+            "{sample}: flange and board rotate by different angles relative to the other samples, {off_deg:.1f} deg "
+            "in the median; {kind}"
+        ),
+        "quaternion_order": (
+            "the quaternions of the {stream} have their real part at the other end: read that way the residuals are "
+            "{rms_other_deg:.2g} deg, as given {rms_given_deg:.3g} deg"
+        ),
+        "angle_order": (
+            "the angles of the {stream} fit if read as R = {product}: the residuals are then {rms_other_deg:.2g} deg, "
+            "as given {rms_given_deg:.3g} deg; convert them to R = Rz(yaw) Ry(pitch) Rx(roll)"
+        ),
+        "transposed_rotations": (
+            "the rotations of the {stream} are transposed, its positions are right: read that way the residuals are "
+            "{rms_other_deg:.2g} deg, as given {rms_given_deg:.3g} deg; write matrices row by row"
+        ),
+        "other_direction#one": (
+            "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other "
+            "one, or the flange poses are those of the base in the flange's frame (T_flange_base), or the board poses "
+            "are those of the camera in the board's frame"
+        ),
+        "other_direction#both": "the samples exclude this direction; invert both streams",
+        "parallel_axes": (
+            "all motions rotate about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread_deg:.2g} deg, so the "
+            "translation along it is undetermined: add poses rotated about another axis by 30 deg or more"
+        ),
+        "direction_tried": "{direction}: {status}",
+        "vision.corrections#consistent": (
+            "The samples do not contradict the table: corrections lower the residuals from {before:.3g} to "
+            "{after:.3g} standard deviations, by chance with a probability of {p:.2g}"
+        ),
+        "vision.corrections#contradicted": (
+            "The samples contradict the table: corrections lower the residuals from {before:.3g} to {after:.3g} "
+            "standard deviations, by chance with a probability of {p:.1g}"
+        ),
+    }
+)
+
+
+@say.register
+def _(found: DirectionContradicted) -> str:
+    which = {
+        (True, False): sentence("vision.inverted#flange"),
+        (False, True): sentence("vision.inverted#board"),
+    }.get((found.flange_inverted, found.target_inverted), sentence("vision.inverted#both"))
+    return say_as(found, which=which)
+
+
+@say.register
+def _(found: GraspCounts) -> str:
+    grasped = say_as(found, "grasped", count=found.objects + len(found.demonstrations))
+    error = say_as(found, "error") if found.point_mm is not None else ""
+    unsure = say_as(found, "uncertain") if found.unsure else ""
+    left = say_as(found, "left_out") if found.left_out else ""
+    sentences = [
+        grasped if found.objects else "",
+        error,
+        *listed(found.missed),
+        unsure,
+        left,
+        demonstrated(found.demonstrations),
+    ]
+    return sentence("finding", finding=joined(sentences))
+
+
+@say.register
+def _(found: UnsureGrasp) -> str:
+    return say_as(found, p=100 * found.probability)
+
+
+@say.register
+def _(found: GraspCollides) -> str:
+    if found.clearance_mm < 0:
+        return say_as(found, "overlap", depth=-found.clearance_mm)
+    return say_as(found, "apart")
+
+
+@say.register
+def _(found: LineLeaves) -> str:
+    return say_as(found, part=word("vision.part", PARTS, found.part))
+
+
+@say.register
+def _(found: LineUnproven) -> str:
+    return say_as(found, part=word("vision.part", PARTS, found.part))
+
+
+@say.register
+def _(found: WayCollides) -> str:
+    if found.clearance_mm < 0:
+        return say_as(found, "overlap", part=word("vision.part", PARTS, found.part), depth=-found.clearance_mm)
+    return say_as(found, "apart", part=word("vision.part", PARTS, found.part))
+
+
+@say.register
+def _(found: RotationMismatch) -> str:
+    return say_as(found, kind=word("vision.mending", MENDING, found.kind))
+
+
+@say.register
+def _(found: QuaternionOrder) -> str:
+    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
+
+
+@say.register
+def _(found: AngleOrder) -> str:
+    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
+
+
+@say.register
+def _(found: TransposedRotations) -> str:
+    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
+
+
+@say.register
+def _(found: OtherDirection) -> str:
+    if found.flange_inverted == found.target_inverted:
+        return say_as(found, "both")
+    return say_as(found, "one")
+
+
+@say.register
+def _(found: ParallelTurns) -> str:
+    return say_as(found, x=found.axis[0], y=found.axis[1], z=found.axis[2])
+
+
+@say.register
+def _(found: DirectionTried) -> str:
+    return say_as(
+        found, direction=direction_word(found), status=word("vision.direction_status", DIRECTION_STATUS, found.status)
+    )
+
+
+@say.register
+def _(found: NoCorrections) -> str:
+    return word("vision.no_corrections", NO_CORRECTIONS, found.why)
+
+
+def correction_verdict(probability: float, before: float, after: float, limit: float = 0.01) -> str:
+    """Whether the samples speak against the table as it is."""
+    if probability < limit:
+        return sentence("vision.corrections#contradicted", before=before, after=after, p=probability)
+    return sentence("vision.corrections#consistent", before=before, after=after, p=probability)
+
+
+def correction_lines(found: TableCorrections | NoCorrections) -> list[str]:
+    """Corrections to a table as lines for a terminal."""
+    if isinstance(found, NoCorrections):
+        return [say(found)]
+    lines = ["corrections to the arm's table, with 95 % intervals:"]
+    for each, half in zip(found.estimates, found.entry_half_width):
+        values = f"{as_text(each.nominal, '>10.3f')} {as_text(each.correction, '>+9.4f')} ± {half:.4f} {each.unit}"
+        lines.append(f"  {each.name:<9}{values}")
+    lines += [f"  {say(each)}" for each in found.held]
+    verdict = correction_verdict(found.probability, found.scatter_before, found.scatter)
+    mm, deg = 1000 * found.moved[0], np.degrees(found.moved[1])
+    return [*lines, verdict, f"with them the camera's pose changes by {mm:.3g} mm and {deg:.2g} deg"]
+
+
+def direction_word(found: DirectionTried) -> str:
+    """Which streams are inverted, in words."""
+    text = DIRECTION_WORDS[found.flange_inverted, found.target_inverted]
+    return word("vision.direction", {"direction": text}, "direction")
+
+
+def pose_words(setup: str) -> tuple[str, str]:
+    """What the two unknown poses of a setup are, in words."""
+    first, second = POSES[setup]
+    return word("vision.pose", {"pose": first}, "pose"), word("vision.pose", {"pose": second}, "pose")
+
+
+def hand_eye_lines(found: HandEye, offset: TimeOffset | None) -> str:
+    """A calibration as lines of text for a terminal."""
+    spread, turned = spread_of(found)
+    about = {"roll": "x", "pitch": "y", "yaw": "z"}
+    lines = [
+        f"{int(found.used.sum())} of {len(found.samples)} samples used; rotated by up to "
+        f"{np.degrees(found.greatest_turn):.0f} deg, about axes up to {np.degrees(found.axes_apart):.0f} deg away from "
+        "one direction",
+        f"camera's standard deviation per axis {1000 * found.deviations[0]:.3g} mm, "
+        f"{np.degrees(found.deviations[1]):.3g} deg "
+        + (
+            "(estimated)" if found.samples.camera_covariance is None else f"(stated; scatter {found.scatter:.2f} of it)"
+        ),
+        f"spread of the board's position {1000 * spread:.3g} mm, {np.degrees(turned):.2g} deg (root mean square)",
+    ]
+    if offset:
+        shift = as_text(offset.offset, ".4f")
+        lines.append(f"the camera's clock plus {shift} ± {offset.half_width:.2g} s is the arm's")
+    for name, T, half in zip(pose_words(found.samples.setup), (found.X, found.Y), found.half_width.reshape(2, 6)):
+        lines.append(f"{name}, with 95 % intervals; rotations are about the parent frame's axes:")
+        for axis, value, h in zip("xyz", 1000 * T[:3, 3], 1000 * half[:3]):
+            lines.append(f"  {axis:<6}{as_text(value, '>12.3f')} ± {h:.3f} mm")
+        for axis, value, h in zip(("roll", "pitch", "yaw"), np.degrees(rpy_of(T)), np.degrees(half[3:])):
+            lines.append(f"  {axis:<6}{as_text(value, '>12.4f')} deg; about {about[axis]} ± {h:.4f} deg")
+        lines.append("  quaternion (w, x, y, z) " + " ".join(as_text(part, ".6f") for part in quaternion_of(T)))
+    lines.append(f"{'method':<12}{'apart mm':>10}{'deg':>9}{'/ interval':>12}{'rms mm':>9}")
+    for each in found.methods:
+        values = f"{each.apart_mm:>10.3f}{each.apart_deg:>9.4f}{each.beyond:>12.2f}{each.rms_mm:>9.3f}"
+        lines.append(f"{METHODS[each.name]:<12}" + (values if each.X is not None else "      fails"))
+    lines += [f"direction: {say(each)}" for each in found.directions]
+    if found.touch:
+        far = 1000 * np.linalg.norm(found.touch.difference, axis=1).max()
+        lines.append(f"touched points: {far:.2g} mm apart at most, probability {found.touch.probability:.2g}")
+    lines += [f"sample {say(each)}" for each in found.suspects]
+    if found.without_suspects is not None:
+        mm, deg = 1000 * found.without_suspects[0], np.degrees(found.without_suspects[1])
+        lines.append(f"if included, they would move the camera by {mm:.3g} mm and {deg:.2g} deg")
+    lines += [f"warning: {say(each)}" for each in found.warnings]
+    return "\n".join(lines)
+
+
+def hand_eye_record(
+    found: HandEye, offset: TimeOffset | None, table: TableCorrections | NoCorrections | None = None
+) -> dict[str, object]:
+    """A calibration as plain data, for another program; half widths of 95 % intervals in mm and deg."""
+
+    def pose(T: np.ndarray, half: np.ndarray) -> dict[str, object]:
+        return {
+            "matrix": T.tolist(),
+            "xyz_mm": (1000 * T[:3, 3]).tolist(),
+            "quaternion_wxyz": quaternion_of(T).tolist(),
+            "half_width_mm": (1000 * half[:3]).tolist(),
+            "half_width_deg": np.degrees(half[3:]).tolist(),
+        }
+
+    return {
+        "setup": found.samples.setup,
+        "samples": len(found.samples),
+        "used": [name for name, used in zip(found.samples.names, found.used) if used],
+        "hand_eye": pose(found.X, found.half_width[:6]),
+        "board": pose(found.Y, found.half_width[6:]),
+        "scatter": found.scatter,
+        "camera_mm": float(1000 * found.deviations[0]),
+        "camera_deg": float(np.degrees(found.deviations[1])),
+        "methods": [
+            {"name": each.name, "apart_mm": each.apart_mm, "apart_deg": each.apart_deg}
+            for each in found.methods
+            if each.X is not None
+        ],
+        "directions": [
+            {
+                "flange_inverted": each.flange_inverted,
+                "target_inverted": each.target_inverted,
+                "status": each.status,
+                "rms_mm": each.rms_mm,
+            }
+            for each in found.directions
+        ],
+        "suspects": [{"code": each.code, "sample": each.sample, "text": say(each)} for each in found.suspects],
+        "warnings": [{"code": each.code, "text": say(each)} for each in found.warnings],
+        "time_offset_s": offset.offset if offset else None,
+        "touch_probability": found.touch.probability if found.touch else None,
+        "table_corrections": _corrections_record(table) if table else None,
+    }
+
+
+def _corrections_record(found: TableCorrections | NoCorrections) -> dict[str, object]:
+    if isinstance(found, NoCorrections):
+        return {"code": found.code, "text": say(found)}
+    return {
+        "entries": [
+            {"entry": each.name, "unit": each.unit, "correction": each.correction, "half_width": half}
+            for each, half in zip(found.estimates, found.entry_half_width.tolist())
+        ],
+        "held": [say(each) for each in found.held],
+        "probability": found.probability,
+        "scatter": found.scatter,
+    }

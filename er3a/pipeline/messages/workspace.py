@@ -1,12 +1,27 @@
-"""What only the workspace stage's page says: names of figures, words for codes, and why capability is missing."""
+"""The workspace: what makes a void, how cells were decided, the verdict of the stage, and what its page says."""
 
 from __future__ import annotations
 
-from er3a.pipeline.messages import workspace_verdict as _verdict  # noqa: F401
-from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.say import say, sentence
-from er3a.pipeline.stages.workspace.model import CapabilityMissing, PlacementTooLong, ToolPointsElsewhere
-from er3a.workspace.tool_inverse import InverseUnknown, JointOneShared, OrientationsUnknown
+import er3a.pipeline.messages.collision
+import er3a.pipeline.messages.kinematics  # noqa: F401
+from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
+from er3a.pipeline.stages.workspace.model import (
+    CapabilityMissing,
+    NoVoid,
+    OnSurface,
+    ToolPointsElsewhere,
+    VoidAtShoulder,
+    VoidUncertain,
+    VoidUnexpected,
+)
+from er3a.workspace.causes import (
+    Disappears,
+    Geometry,
+    Relaxed,
+    SeveralLimits,
+    VoidCause,
+)
 
 FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
@@ -27,51 +42,209 @@ SWEEPS = {"joint_2": N_("joint 2"), "joint_3": N_("joint 3"), "wrist": N_("wrist
 POINTS = {"tool_point": N_("tool point"), "wrist_centre": N_("wrist centre"), "flange": N_("flange")}
 
 
+TEXTS = texts(
+    {
+        "workspace.flat": "The tool point moves on a line or not at all, so there is no volume.",
+        "workspace.undersampled": (
+            "Too few samples for cells this small: about {unseen_percent:.0f} % of the reachable cells hold no sample "
+            "yet, so voids can't be judged."
+        ),
+        "workspace.on_surface#sphere": (
+            "The tool point moves on a sphere and reaches at least {lower:.4g} m² and at most {upper:.4g} m² of it."
+        ),
+        "workspace.on_surface#unknown": "The tool point moves on a surface; its area was not computed.",
+        "workspace.on_surface#curved": (
+            "The tool point moves on a curved surface of at most {upper:.4g} m²: the area that two joints sweep; "
+            "parts swept twice count twice."
+        ),
+        "workspace.on_surface#plane": (
+            "The tool point moves on a plane and reaches at least {lower:.4g} m² and at most {upper:.4g} m² of it."
+        ),
+        "workspace.void_unexpected": (
+            "An enclosed void of {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven empty."
+        ),
+        "workspace.void_uncertain": (
+            "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no "
+            "proof, and the samples can't tell."
+        ),
+        "workspace.void_at_shoulder": (
+            "An enclosed void of {litres:.3g} L surrounds the shoulder, where the arm can't fold to; no other void "
+            "indicates a wrong joint range."
+        ),
+        "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
+        "workspace.no_void#undecided": (
+            "The proof finds no enclosed void; {undecided_percent:.2g} % of the volume is left undecided."
+        ),
+        "workspace.no_void#none": "The workspace holds no enclosed void.",
+        "void_advice#cause": (
+            "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3."
+        ),
+        "void_advice#predicate": "It {cause}: check the limits, the zero and the direction of joints 2 and 3.",
+        "void_only_sampled": "unknown: known from samples only",
+        "spherical_wrist": "spherical wrist",
+        "general_method": "general method, because {lacks}",
+        "tool_near_wrist": "its tool point is only {distance_mm:.3g} mm from the wrist centre",
+        "bounds_far_apart": "the method for spherical wrists leaves {percent:.3g} % between its bounds",
+        "void_disappears#one": "disappears if {extended}",
+        "void_disappears#two": "disappears if {first} or if {second}",
+        "void_of_several_limits#only": "made by several limits together",
+        "void_of_several_limits#together": "only several limits together make it",
+        "void_of_geometry": "geometry: {percent:.0f} % of it stays without any joint limit",
+        "void_shrinks": "shrinks by {percent:.0f} % if {extended}",
+        "limit_extended#lower_deg": "joint {joint}'s lower limit is extended to {limit} deg",
+        "limit_extended#lower_mm": "joint {joint}'s lower limit is extended to {limit} mm",
+        "limit_extended#upper_deg": "joint {joint}'s upper limit is extended to {limit} deg",
+        "limit_extended#upper_mm": "joint {joint}'s upper limit is extended to {limit} mm",
+        "limit_extended#sum_lower_deg": "the lower limit of {sum} is extended to {limit} deg",
+        "limit_extended#sum_lower_mm": "the lower limit of {sum} is extended to {limit} mm",
+        "limit_extended#sum_upper_deg": "the upper limit of {sum} is extended to {limit} deg",
+        "limit_extended#sum_upper_mm": "the upper limit of {sum} is extended to {limit} mm",
+        "workspace.pockets": Plural("count", "{count} open pocket", "{count} open pockets"),
+        "workspace.voids": Plural("count", "{count} enclosed void", "{count} enclosed voids"),
+        "workspace.rule": Plural(
+            "count",
+            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: "
+            "{count} enclosed void lies away from the shoulder. Relaxing one limit at a time names joint 2 or 3 "
+            "in {named} of {count} cases.",
+            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: "
+            "{count} enclosed voids lie away from the shoulder. Relaxing one limit at a time names joint 2 or 3 "
+            "in {named} of {count} cases.",
+        ),
+        "inverse_unknown": "no method here finds all inverse solutions of this arm",
+        "joint_one_shared": (
+            "joint 1 is coupled with other joints or limited together with them, so that what holds at one azimuth "
+            "does not follow from another"
+        ),
+        "orientations_unknown": (
+            "with its {joints} joints the arm takes only few orientations at each point, and which these are is not "
+            "known for its kind"
+        ),
+        "workspace.placement_too_long": (
+            "Not computed: a pose takes milliseconds with this arm, and within seconds only points wider apart than "
+            "the box could be asked. A larger box or a narrower cone may do."
+        ),
+        "workspace.tool_points_elsewhere": (
+            "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
+            "cone."
+        ),
+    }
+)
+
+
+@say.register
+def _(found: OnSurface) -> str:
+    surface = found.surface
+    lower, upper = surface.lower, surface.upper
+    if upper is None:
+        return say_as(found, "unknown")
+    if lower is None:
+        return say_as(found, "curved", upper=upper)
+    if surface.kind == "plane":
+        return say_as(found, "plane", lower=lower, upper=upper)
+    return say_as(found, "sphere", lower=lower, upper=upper)
+
+
+@say.register
+def _(found: VoidUnexpected) -> str:
+    where = say_as(found, **_place(found))
+    return joined([where, _advice(found.cause)], " ")
+
+
+@say.register
+def _(found: VoidUncertain) -> str:
+    return say_as(found, **_place(found))
+
+
+@say.register
+def _(found: VoidAtShoulder) -> str:
+    return say_as(found, **_place(found))
+
+
+@say.register
+def _(found: NoVoid) -> str:
+    if found.undecided_percent is not None:
+        return say_as(found, "undecided")
+    if found.proven:
+        return say_as(found, "none")
+    return say_as(found, "sampled")
+
+
+def _advice(cause: VoidCause) -> str:
+    """What to check, given a void's cause."""
+    if is_predicate(cause):
+        return sentence("void_advice#predicate", cause=say(cause))
+    return sentence("void_advice#cause", cause=say(cause))
+
+
+def _place(found: VoidUnexpected | VoidUncertain | VoidAtShoulder) -> dict[str, float | str]:
+    shown = {"x": found.x_mm, "y": found.y_mm, "z": found.z_mm}
+    return {"litres": found.litres} | {key: str(round(value)).replace("-", "−") for key, value in shown.items()}
+
+
+@say.register
+def _(found: Disappears) -> str:
+    first, *others = (_extended(limit) for limit in found.limits)
+    if others:
+        return say_as(found, "two", first=first, second=others[0])
+    return say_as(found, "one", extended=first)
+
+
+@say.register
+def _(found: SeveralLimits) -> str:
+    if found.most is None:
+        return say_as(found, "only")
+    return joined([_shrinks(found.most), say_as(found, "together")])
+
+
+@say.register
+def _(found: Geometry) -> str:
+    left = say_as(found, percent=100 * found.remaining_ratio)
+    return joined([left, _shrinks(found.most) if found.most else ""])
+
+
+def is_predicate(cause: VoidCause) -> bool:
+    """Whether a cause's sentence says what the void does, so that "it" can stand before it."""
+    return isinstance(cause, Disappears) or (isinstance(cause, SeveralLimits) and cause.most is not None)
+
+
+def _shrinks(limit: Relaxed) -> str:
+    return sentence("void_shrinks", percent=100 * limit.filled, extended=_extended(limit))
+
+
+def _extended(limit: Relaxed) -> str:
+    value = as_text(limit.extended, "+.4g")
+    if limit.factors == (1.0,):
+        return _joint_extended(limit, {"joint": limit.joints[0], "limit": value})
+    terms = " ".join(f"{factor:+.4g} × J{joint}" for joint, factor in zip(limit.joints, limit.factors))
+    return _sum_extended(limit, {"sum": terms, "limit": value})
+
+
+def _joint_extended(limit: Relaxed, shown: dict[str, int | str]) -> str:
+    if limit.unit == "mm":
+        if limit.side == "upper":
+            return sentence("limit_extended#upper_mm", **shown)
+        return sentence("limit_extended#lower_mm", **shown)
+    if limit.side == "upper":
+        return sentence("limit_extended#upper_deg", **shown)
+    return sentence("limit_extended#lower_deg", **shown)
+
+
+def _sum_extended(limit: Relaxed, shown: dict[str, int | str]) -> str:
+    if limit.unit == "mm":
+        if limit.side == "upper":
+            return sentence("limit_extended#sum_upper_mm", **shown)
+        return sentence("limit_extended#sum_lower_mm", **shown)
+    if limit.side == "upper":
+        return sentence("limit_extended#sum_upper_deg", **shown)
+    return sentence("limit_extended#sum_lower_deg", **shown)
+
+
 @say.register
 def _(found: CapabilityMissing) -> str:
     return say(found.lacks)
 
 
 @say.register
-def _(found: InverseUnknown) -> str:
-    return sentence(found.code, "no method here finds all inverse solutions of this arm")
-
-
-@say.register
-def _(found: JointOneShared) -> str:
-    return sentence(
-        found.code,
-        "joint 1 is coupled with other joints or limited together with them, so that what holds at one azimuth does "
-        "not follow from another",
-    )
-
-
-@say.register
-def _(found: OrientationsUnknown) -> str:
-    return sentence(
-        found.code,
-        "with its {joints} joints the arm takes only few orientations at each point, and which these are is not known "
-        "for its kind",
-        joints=found.joints,
-    )
-
-
-@say.register
 def _(found: ToolPointsElsewhere) -> str:
     x, y, z = found.direction
-    return sentence(
-        found.code,
-        "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the cone.",
-        x=x,
-        y=y,
-        z=z,
-    )
-
-
-@say.register
-def _(found: PlacementTooLong) -> str:
-    return sentence(
-        found.code,
-        "Not computed: a pose takes milliseconds with this arm, and within seconds only points wider apart than the "
-        "box could be asked. A larger box or a narrower cone may do.",
-    )
+    return say_as(found, x=x, y=y, z=z)

@@ -19,4 +19,4 @@ STAGES: dict[str, Stage] = {
 
 def all_messages() -> list[str]:
     """The modules with the sentences of all stages, for pages that show more than one."""
-    return [name for stage in STAGES.values() for name in (stage.verdict_messages, stage.messages)]
+    return [stage.messages for stage in STAGES.values()]

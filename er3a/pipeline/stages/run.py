@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from er3a.errors import Er3aError, InputError, ResultError, WriteError
-from er3a.pipeline.messages.common import say
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
     AbsentResults,
     NotComputed,
@@ -53,14 +53,15 @@ def compute(name: str, study: Study, robot: str, folder: Path, parts: list[Path]
     absent : why the stage was not computed, in words; None if it was
     """
     stage = STAGES[name]
-    import_module(stage.verdict_messages)
     results = _computed(stage, study, robot, {"parts": parts} if stage.sampled else {})
-    write_results(folder, study, robot, stage, results, say)
-    if not isinstance(results, AbsentResults):
-        with suppress(OSError):
-            stage.compiled.parent.mkdir(parents=True, exist_ok=True)
-            stage.compiled.touch()
-    return say(results.summary.verdict.finding) if isinstance(results, AbsentResults) else None
+    write_results(folder, study, robot, stage, results)
+    if isinstance(results, AbsentResults):
+        import_module(stage.messages)
+        return say(results.summary.verdict.finding)
+    with suppress(OSError):
+        stage.compiled.parent.mkdir(parents=True, exist_ok=True)
+        stage.compiled.touch()
+    return None
 
 
 def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> Results[Any]:
@@ -82,7 +83,7 @@ def _computed(stage: Stage, study: Study, robot: str, extra: dict[str, Any]) -> 
 def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: Path) -> None:
     """Write a view of a stage's results: ``record`` or ``report``."""
     stage = STAGES[name]
-    import_module(stage.verdict_messages)
+    import_module(stage.messages)
     stored = read_stage(folder, stage)
     if isinstance(stored.results, AbsentResults):
         from er3a.pipeline.viewing.absent import record_absent, report_absent

@@ -102,13 +102,8 @@ class Stage:
 
     @property
     def messages(self) -> str:
-        """The module with the names of the stage's key figures and the sentences of its page."""
+        """The module with the sentences of the stage's verdict and page, and the names of its key figures."""
         return f"er3a.pipeline.messages.{self.name}"
-
-    @property
-    def verdict_messages(self) -> str:
-        """The module that makes a sentence of the stage's verdict."""
-        return f"er3a.pipeline.messages.{self.name}_verdict"
 
     @property
     def compiled(self) -> Path:
@@ -116,5 +111,5 @@ class Stage:
         return cache_folder() / "computed" / f"{self.name}-{self.digest('compute')[:16]}"
 
     def digest(self, verb: str) -> str:
-        """The digest of what a verb's outcome depends on: its own modules, and the sentences of the verdict."""
-        return code_digest(f"{self.package}.{verb}", self.verdict_messages)
+        """The digest of what a verb's outcome depends on: its modules, and for a view the stage's sentences."""
+        return code_digest(f"{self.package}.{verb}", *([] if verb == "compute" else [self.messages]))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-import er3a.pipeline.messages.pairs  # noqa: F401
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.pairs import PairsUnexamined
@@ -18,12 +18,12 @@ from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import TYPES, NearSingular, characteristic_length
 from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
-from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_verdict
+from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_status
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
@@ -262,7 +262,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     robot = study.robot(name)
     validated = results / name / "validation"
-    told_first = caveat(read_verdict(validated)[0] if (validated / SUMMARY).exists() else "not_computed")
+    told_first = caveat(read_status(validated) if (validated / SUMMARY).exists() else "not_computed")
     settings = study.section(TrajectorySettings)
     scene_file = study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None

@@ -25,9 +25,8 @@ from scipy.spatial import ConvexHull
 from er3a.files.kept_files import write_atomically
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.messages.decision import decision
-from er3a.pipeline.messages.foundations import caveat
 from er3a.pipeline.messages.language import N_, own_title, tr
+from er3a.pipeline.messages.pages import caveat, decision
 from er3a.pipeline.results import (
     AbsentResults,
     Input,

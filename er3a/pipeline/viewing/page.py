@@ -23,11 +23,10 @@ from er3a.errors import ResultError
 from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.foundations import Caveat, caveat
-from er3a.pipeline.messages.glossary import glossary
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.pages import Caveat, caveat, glossary
 from er3a.pipeline.messages.say import say_all
-from er3a.pipeline.results import Provenance, Stored, read_verdict
+from er3a.pipeline.results import Provenance, Stored, read_status
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings, svg_data_uri
@@ -296,7 +295,7 @@ def table_instead(study: Study, name: str, results: Path) -> str | None:
     where there is none, or none that was computed."""
     for other in study.other_tables(name):
         try:
-            status = read_verdict(results / other / "validation")[0]
+            status = read_status(results / other / "validation")
         except ResultError:
             continue
         if status in ("pass", "caution"):

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from er3a.pipeline.messages.dynamics import BINDING, FIGURES
-from er3a.pipeline.messages.dynamics_verdict import quantity_word
+from er3a.pipeline.messages.dynamics import BINDING, FIGURES, quantity_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import listed, say, word
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style

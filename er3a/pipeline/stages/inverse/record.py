@@ -9,9 +9,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from er3a.pipeline.messages.inverse import limits_in_short
-from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.kinematics import branch_word, say
 from er3a.pipeline.messages.say import listed
-from er3a.pipeline.messages.selection import say
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult, shown_targets
 from er3a.pipeline.study import Study

@@ -26,10 +26,9 @@ from er3a.pipeline.messages.inverse import (
     SHAPES,
     limits_in_short,
 )
-from er3a.pipeline.messages.kinematics import branch_word, singularity_word
+from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, listed, say, word
-from er3a.pipeline.messages.selection import RULE_NAMES, RULE_TITLES
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import (
     SINGULAR_PARTS,

@@ -12,8 +12,7 @@ import rerun.blueprint as rrb
 
 from er3a.numerics.arrays import Integers
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.program_check import level_word
-from er3a.pipeline.messages.programs import LANGUAGES, cycle_text
+from er3a.pipeline.messages.programs import LANGUAGES, cycle_text, level_word
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary

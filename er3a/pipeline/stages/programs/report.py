@@ -11,9 +11,7 @@ from markupsafe import Markup, escape
 
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.program_check import level_word
-from er3a.pipeline.messages.program_remedies import remedies, remedy
-from er3a.pipeline.messages.programs import FIGURES, LANGUAGES, cycle_text
+from er3a.pipeline.messages.programs import FIGURES, LANGUAGES, cycle_text, level_word, remedies, remedy
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style, stretch
 from er3a.pipeline.results import Stored

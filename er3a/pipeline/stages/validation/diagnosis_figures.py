@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
-from er3a.pipeline.messages.calibration import level
-from er3a.pipeline.messages.diagnosis import both
+from er3a.pipeline.messages.diagnosis import both, level
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.stages.validation.model import (
@@ -137,7 +136,6 @@ def _calibration_story(calibration: SetCalibration, corrections: Corrections) ->
         close=[
             sentence(
                 "close",
-                "{first} and {second} ({correlation})",
                 first=pair.first,
                 second=pair.second,
                 correlation=fixed(pair.correlation, 2),
@@ -214,7 +212,6 @@ def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
     if alike := hypothesis.indistinguishable_from:
         words = sentence(
             "alike",
-            "{faults} (or {more} more that these references can't tell from it)",
             faults=words,
             more=len(alike),
         )
@@ -226,6 +223,6 @@ def corrected_robot(robot: Robot, diagnoses: Iterable[SetDiagnosis]) -> tuple[Ro
     """The robot with the first named fault corrected, and its label; None if no fault is named."""
     for diagnosis in diagnoses:
         if diagnosis.corrected and isinstance(diagnosis.conclusion, MostLikelyFault | MainFault):
-            label = sentence("corrected", "corrected: {faults}", faults=typographic(both(diagnosis.conclusion.faults)))
+            label = sentence("corrected", faults=typographic(both(diagnosis.conclusion.faults)))
             return robot.replace(**asdict(diagnosis.corrected)), label
     return None, ""

@@ -10,8 +10,8 @@ from markupsafe import Markup
 
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
-from er3a.pipeline.messages.evidence import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import TableEvidence
 from er3a.pipeline.viewing.numbers import fixed, number

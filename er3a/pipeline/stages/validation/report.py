@@ -11,12 +11,11 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
-from er3a.pipeline.messages.decision import decision
-from er3a.pipeline.messages.evidence import CHECK_KINDS
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import counted, joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS
-from er3a.pipeline.messages.validation_verdict import counted_checks
+from er3a.pipeline.messages.pages import decision
+from er3a.pipeline.messages.references import CHECK_KINDS
+from er3a.pipeline.messages.say import joined, say, sentence, word
+from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.arm_figures import axis_deviation, link_frames, side_view, workspace_drawing
 from er3a.pipeline.stages.validation.diagnosis_figures import (
@@ -116,7 +115,7 @@ def check_row(check: Judged) -> list[str]:
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
     if isinstance(check, ReferenceCheck):
         grade = word("grade", GRADE_NAMES, check.grade)
-        source = sentence("graded", "{own_source} ({grade})", own_source=check.source, grade=grade)
+        source = sentence("graded", own_source=check.source, grade=grade)
     else:
         source = tr("the model itself")
     return [say(check.subject), *values, f"{check.tolerance:g}", check.unit, source]
@@ -465,13 +464,7 @@ def _drawing_picture(section: Section, labels: KeyPoses, summary: ValidationSumm
             worst=worst,
         )
         if not missed
-        else counted(
-            "labels_missed",
-            "{count} label is missed, by up to {worst} mm.",
-            "{count} labels are missed, by up to {worst} mm.",
-            len(missed),
-            worst=worst,
-        )
+        else sentence("labels_missed", count=len(missed), worst=worst)
     )
     alt = tr("Region that the wrist centre sweeps with joints 2 and 3, and the drawing's labels, numbered.")
     return Picture(workspace_drawing(section, labels, summary.section_origin_mm), alt, caption)

@@ -13,10 +13,9 @@ from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.hand_eye import correction_verdict
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, listed, say, word
-from er3a.pipeline.messages.vision import FIGURES, METHODS, direction_word, pose_words
+from er3a.pipeline.messages.vision import FIGURES, METHODS, correction_verdict, direction_word, pose_words
 from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings

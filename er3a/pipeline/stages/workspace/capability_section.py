@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import AxLine, Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
 
-import er3a.pipeline.messages.pairs  # noqa: F401
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.geometry.transforms import rpy_along
 from er3a.numerics.arrays import Flags, Integers, Reals

@@ -9,7 +9,7 @@ import numpy as np
 
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import counted, joined, say, word
+from er3a.pipeline.messages.say import joined, say, sentence, word
 from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace.capability_section import capability_context
@@ -118,17 +118,8 @@ def _rule(enclosed: list[VoidSummary]) -> str:
             "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: no "
             "enclosed void lies away from the shoulder, so no table entry is indicated."
         )
-    return counted(
-        "workspace.rule",
-        "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: {count} "
-        "enclosed void lies away from the shoulder. Relaxing one limit at a time names joint 2 or 3 in {named} of "
-        "{count} cases.",
-        "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: {count} "
-        "enclosed voids lie away from the shoulder. Relaxing one limit at a time names joint 2 or 3 in {named} of "
-        "{count} cases.",
-        len(elsewhere),
-        named=sum(bool(joints_behind(void.cause) & {2, 3}) for void in elsewhere),
-    )
+    named = sum(bool(joints_behind(void.cause) & {2, 3}) for void in elsewhere)
+    return sentence("workspace.rule", count=len(elsewhere), named=named)
 
 
 def _void_row(row: int, void: VoidSummary) -> list[str]:
@@ -200,10 +191,8 @@ def _slices_caption(summary: WorkspaceSummary) -> str:
     return tr(
         "The hull contains {voids} and {pockets}. Every point of the blue area is reached by some joint vector "
         "within the limits; place nothing in the white.",
-        voids=counted("workspace.voids", "{count} enclosed void", "{count} enclosed voids", enclosed)
-        if enclosed
-        else tr("no enclosed void"),
-        pockets=counted("workspace.pockets", "{count} open pocket", "{count} open pockets", pockets),
+        voids=sentence("workspace.voids", count=enclosed) if enclosed else tr("no enclosed void"),
+        pockets=sentence("workspace.pockets", count=pockets),
     )
 
 

@@ -1,0 +1,165 @@
+"""What pages share: captions for the report, the sentence that decides, what to know first, and the glossary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.say import word
+
+# Words of the lists in which a reader of the report chooses pages; the workflow's rules use them.
+PAGE, INDEX, ALL_ROBOTS = N_("page"), N_("index"), N_("All robots")
+TEACH_PANEL, COMPARISON = N_("teach panel"), N_("two robots side by side")
+FOUNDATIONS: Mapping[str, str] = {
+    "fail": N_("Never use this table: evidence contradicts it. These results hold for the table, not for the robot."),
+    "caution": N_("Validation leaves part of this D-H table open: these results are only as good as the table."),
+    "no_reference": N_("This D-H table was compared with no data: these results are only as good as the table."),
+    "not_computed": N_("This D-H table was not validated: these results are only as good as the table."),
+}
+GLOSSARY = {
+    N_("branch"): N_("one choice of shoulder, elbow and wrist among the joint angles that bring the tool to a pose"),
+    N_("self-motion"): N_("a continuum of solutions: joints that move while the tool stays on its target"),
+    N_("arm angle"): N_("where the elbow of an arm with spherical shoulder and wrist is on its circle"),
+    N_("cuspidal"): N_("of an arm that can change between solutions of a pose without passing a singularity"),
+    N_("manipulability"): N_(
+        "the product of the Jacobian's singular values, lengths divided by the wrist's reach; 0 at a singularity"
+    ),
+    N_("condition number"): N_(
+        "the Jacobian's largest singular value divided by its smallest; without bound at a singularity"
+    ),
+    N_("characteristic length"): N_(
+        "by which the Jacobian's linear rows are divided, so that its singular values have no unit"
+    ),
+    N_("wrist centre"): N_("the point in which the last three axes meet"),
+    N_("rank loss"): N_("where axes become dependent, so that the tool can't move in some direction"),
+    N_("admissible"): N_("within the joint limits and free of collisions"),
+    N_("singular segment"): N_("the part of a path where joint speeds grow without bound or beyond the joints' limits"),
+    N_("avoidance strategy"): N_(
+        "what can be done about a path's singular segment: slow down, another branch, a via point, damped least "
+        "squares, a joint detour, stop"
+    ),
+    N_("most likely fault"): N_("the table entry whose correction explains the differences best"),
+    N_("authoritative"): N_("of a source: official, CAD or exported; a verdict rests on such sources alone"),
+    N_("settled"): N_(
+        "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
+    ),
+    N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
+    N_("margin"): N_("how far something is from a limit, in its unit"),
+    N_("capability"): N_("what the tool can do at a place: share of directions, solutions, dexterity"),
+    N_("void"): N_("a region that the tool point can't reach: enclosed, or an open pocket"),
+    N_("undecided"): N_("what the bounds between two solved poses can't decide; never called safe"),
+    N_("allowed collision matrix"): N_(
+        "which pairs of bodies are checked for collisions: pairs that never collide are proven so, adjacent "
+        "ones touch at their joint only; all others are checked"
+    ),
+    N_("penetration tolerance"): N_(
+        "the depth of overlap below which a contact between checked points may go unnoticed"
+    ),
+    N_("acceleration time"): N_("the time in which each joint is taken to reach its greatest speed"),
+    N_("hand-eye calibration"): N_("where a camera is: on the flange (eye-in-hand) or in the base (eye-to-hand)"),
+    N_("holding torque"): N_("the torque or force by which a drive keeps a joint at rest in a pose"),
+    N_("RMS torque"): N_("root-mean-square over a motion, which heats the motor; compared with the rated torque"),
+    N_("armature"): N_("the rotor's inertia at the joint: times the gear ratio squared"),
+    N_("utilisation"): N_("a value divided by its limit, in percent"),
+    N_("load diagram"): N_("how far from flange and last axis a load's centre may be, a curve for each mass"),
+    N_("quasi-random"): N_("spread more evenly than chance, as Sobol' points are"),
+}
+
+
+def of_study() -> str:
+    """The report's first page."""
+    sentences = (
+        tr("Evidence on kinematic models of robots: can each table be trusted, and what can the arm do?"),
+        tr(
+            "Start with the index: verdicts and key figures of every robot and stage. Each robot has a page for"
+            " each stage and a teach panel. Pages are complete and work offline; links between pages do not "
+            "work inside this report, so choose pages from the lists here."
+        ),
+        tr(
+            "A fail is a result, not a broken run: evidence contradicts the table. The foot of each page lists "
+            "its inputs and the command that reproduces it."
+        ),
+    )
+    return "\n\n".join(sentences)
+
+
+def of_stage(robot: str, question: str) -> str:
+    """A stage's page: what it answers."""
+    return tr(
+        "{robot}: {question} The verdict comes first, then the figures behind it; the foot of the page names their "
+        "sources.",
+        robot=robot,
+        question=tr(question),
+    )
+
+
+def of_teach_panel(robot: str) -> str:
+    """The teach panel."""
+    return tr(
+        "Move {robot} by hand: joints, typed poses, jogging, way points, distance from singularities, and all "
+        "IK solutions of the pose.",
+        robot=robot,
+    )
+
+
+def of_index() -> str:
+    """The index."""
+    return tr("What to do with each robot's model, and the verdicts and key figures behind that.")
+
+
+def of_comparison() -> str:
+    """The comparison of two robots."""
+    return tr("Two robots side by side: parameters, key figures, and the borders of what they reach in one drawing.")
+
+
+def decision(
+    table: str, failed: Sequence[str], instead: str | None = None, geometry: tuple[int, int] | None = None
+) -> str:
+    """What to do with a robot's model, from validation's status and the titles of the stages that failed.
+
+    ``instead`` is a model of the same arm that evidence does not contradict; ``geometry``: how many of how many lengths
+    and twists of a table that is not contradicted independent documents settle.
+    """
+    if table == "not_examined":
+        return tr("Its table has not been examined yet: run the stage validation before you use it.")
+    if table == "fail" and instead:
+        return tr("Never use this table: evidence contradicts it. Use {robot} instead.", robot=instead)
+    if table == "fail":
+        return tr("Never use this table: evidence contradicts it, so nothing computed from it holds for the robot.")
+    if failed:
+        return tr("Do not use it as it is: see {stages}.", stages=", ".join(failed))
+    if table == "pass":
+        return tr(
+            "Use it: every entry that moves the tool is settled by independent documents, and nothing here fails."
+        )
+    if table == "caution" and geometry and not geometry[0]:
+        return tr("Not proven: nothing contradicts its table, but no independent document settles any of its geometry.")
+    if table == "caution" and geometry:
+        return tr(
+            "Use it with care: nothing contradicts its table, and {settled} of {entries} entries of its geometry are "
+            "settled, but not the whole table.",
+            settled=geometry[0],
+            entries=geometry[1],
+        )
+    if table == "caution":
+        return tr("Use it with care: nothing contradicts its table, but part of it is not settled.")
+    return tr("There is no evidence on its table: check it before you use it.")
+
+
+@dataclass(frozen=True)
+class Caveat:
+    """What to know first, and the status of validation that it comes from."""
+
+    status: str
+    text: str
+
+
+def caveat(status: str) -> Caveat | None:
+    """What a status of validation says to know first; None for ``pass``."""
+    return Caveat(status, word("foundation", FOUNDATIONS, status)) if status in FOUNDATIONS else None
+
+
+def glossary() -> dict[str, str]:
+    """Each term and its meaning in the page's language."""
+    return {tr(term): tr(meaning) for term, meaning in GLOSSARY.items()}
