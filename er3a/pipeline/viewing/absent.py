@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from er3a.pipeline.messages.common import say
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import AbsentResults, Stored
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import head_of, render, run_command
