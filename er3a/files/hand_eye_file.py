@@ -32,7 +32,7 @@ from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.numerics.units import in_si
+from er3a.numerics.si_units import in_si
 from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardNotFoundError, BoardViews, Camera, board_views
 from er3a.vision.calibration_set import CalibrationSet, Stream, TimeOffset, exp_rotation, paired, posed, time_offset

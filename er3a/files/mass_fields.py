@@ -12,7 +12,7 @@ from er3a.files.units import FARTHEST_MM, Triple, check_degrees, suspect
 from er3a.files.yaml_file import StrictModel
 from er3a.geometry.transforms import rot_z, transform
 from er3a.kinematics.chain import constant_links, joint_starts
-from er3a.numerics.units import in_si
+from er3a.numerics.si_units import in_si
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
 from er3a.robots.robot import MOST_JOINTS, Robot
 

@@ -17,7 +17,7 @@ from er3a.files.robot_file import LEAST_LONGEST_MM, SHORTEST_PLAIN_LENGTH_MM, Ro
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
-from er3a.numerics.units import from_si, split_unit
+from er3a.numerics.si_units import from_si, split_unit
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import MassBody
 from er3a.robots.robot import CombinedLimit, Robot, Source

@@ -17,7 +17,7 @@ from er3a.files.units import PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
-from er3a.numerics.units import in_si
+from er3a.numerics.si_units import in_si
 from er3a.robots.robot import Robot
 from er3a.vision.grasping import DetectedObject, Grasp
 from er3a.vision.next_view import FieldOfView

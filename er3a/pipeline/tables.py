@@ -11,7 +11,7 @@ A table is a frozen dataclass of equally long arrays::
 
 ``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg`` (of joints that slide ``q3_mm``, in mm), ``point_mm``
 (rows, 3) as ``x_mm, y_mm, z_mm``. Unit and meaning go into the file; the unit is the name's ending
-(:mod:`er3a.numerics.units`) unless a column states another, and the annotation says what kind of numbers it holds. A
+(:mod:`er3a.numerics.si_units`) unless a column states another, and the annotation says what kind of numbers it holds. A
 column of findings is written as JSON texts, with each finding's code and parameters.
 """
 
@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from er3a.by_value import ByValue
-from er3a.numerics.units import filled, split_unit, unit_text
+from er3a.numerics.si_units import filled, split_unit, unit_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -212,8 +212,10 @@ class Table(ByValue):
 
     @classmethod
     def of(cls, found: object = None, /, **given: Any) -> Self:
-        """A table filled with what the library found, as :func:`er3a.numerics.units.stated` fills a dataclass; a single
-        text or number that is given stands in every row."""
+        """A table filled with what the library found, as :func:`er3a.numerics.si_units.stated` fills a dataclass.
+
+        A single text or number that is given stands in every row.
+        """
         values = filled(cls, found, given)
         rows = max(len(value) for value in values.values() if np.ndim(value))
         return cls(**{name: value if np.ndim(value) else _repeated(value, rows) for name, value in values.items()})

@@ -23,7 +23,7 @@ from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
-from er3a.numerics.units import stated
+from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.collision.model import (

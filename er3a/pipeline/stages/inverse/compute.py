@@ -31,7 +31,7 @@ from er3a.kinematics.singularity import TYPES, characteristic_length, conditioni
 from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Method, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.units import stated
+from er3a.numerics.si_units import stated
 from er3a.pipeline.progress import shown_progress
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.settings import TrajectorySettings

@@ -21,7 +21,7 @@ from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import closed_form_missing
-from er3a.numerics.units import stated
+from er3a.numerics.si_units import stated
 from er3a.pipeline.stages.validation.checks import checks_of_set, round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.model import (

@@ -22,7 +22,7 @@ from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.units import from_si, stated
+from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations

@@ -12,7 +12,7 @@ from er3a.files.reference_sets import check_reference_file, reference_folder
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.units import stated
+from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings

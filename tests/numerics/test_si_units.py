@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from er3a.numerics.units import in_si, split_unit, stated, unit_text
+from er3a.numerics.si_units import in_si, split_unit, stated, unit_text
 
 
 @dataclass(frozen=True)
