@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from hypothesis import settings
 
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import main
@@ -28,6 +29,9 @@ from testing.small_study import STUDY, fresh
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 ROBOT = "er3_600"  # the one of those tests for which one is enough
 LONGEST_S = 900
+
+settings.register_profile("no test asserts on time", deadline=None)
+settings.load_profile("no test asserts on time")
 
 
 @pytest.hookimpl(tryfirst=True)

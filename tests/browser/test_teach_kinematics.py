@@ -126,7 +126,7 @@ def test_iteration_reaches_poses_of_any_arm_and_stays_within_the_limits(page, ra
 
 
 @given(robot=arms(), data=st.data())
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow])
 def test_any_table_of_the_class_is_solved(page, robot, data):
     seed = data.draw(st.integers(0, 2**32 - 1))
     q = joints_at_random(robot, np.random.default_rng(seed), 10)

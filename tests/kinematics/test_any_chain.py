@@ -42,7 +42,7 @@ def stanford() -> Robot:
     )
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(data=st.data(), robot=chains())
 def test_any_chain_agrees_with_pinocchio(data, robot):
     q, peer = data.draw(joints_within(robot))[None], PinocchioArm(robot)
@@ -56,7 +56,7 @@ def test_any_chain_agrees_with_pinocchio(data, robot):
         np.testing.assert_allclose(forward(same, q), forward(robot, q), rtol=0, atol=1e-11)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data(), robot=chains(coupled=False))
 def test_many_tables_have_the_frames_of_one(data, robot):
     q = np.stack([data.draw(joints_within(robot)) for _ in range(2)])
@@ -64,7 +64,7 @@ def test_many_tables_have_the_frames_of_one(data, robot):
     np.testing.assert_allclose(T[0], frames(robot.without_tool(), q), rtol=0, atol=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(robot=chains())
 def test_no_sample_leaves_the_bound_and_single_precision_follows_double(robot):
     grid, draw = make_grid(robot, 16), Draw(7, 600, 2)
@@ -140,7 +140,7 @@ def test_the_sums_limit_is_named():
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore::er3a.errors.InputWarning")
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(robot=chains())
 def test_any_chain_is_written_and_read_back(robot, tmp_path_factory):
     robot = robot.replace(

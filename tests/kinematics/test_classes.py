@@ -137,7 +137,7 @@ def test_multistart_finds_nothing_more(name):
         assert all(nearest(found.q[n], row) < 1e-6 for row in peers)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**31), st.sampled_from(["puma", "ur5", "crx"]), st.sampled_from([1e-8, 1e-6, 1e-4, 1e-2]))
 @example(2536, "puma", 1e-8)  # no more than noise in four of ten readings
 @example(1021, "puma", 1e-3)  # ten zeros within five degrees
@@ -325,7 +325,7 @@ def test_what_an_arm_has_nearly():
     assert arm_class(links("ur5")).nearly_parallel == ()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(-3.1, 3.1), min_size=1, max_size=8, unique=True), st.integers(0, 1000))
 def test_zeros_on_a_circle(angles, seed):
     random = np.random.default_rng(seed)

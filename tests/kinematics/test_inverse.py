@@ -70,7 +70,7 @@ def test_all_slots_of_a_large_batch_reproduce_their_poses(robot, random):
 
 
 @pytest.mark.long
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(data=st.data(), robot=arms())
 def test_random_arms_are_solved(data, robot):
     q = data.draw(joints_within(robot))
@@ -84,7 +84,7 @@ def test_random_arms_are_solved(data, robot):
         assert solution.within_limits[found].all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(data=st.data(), robot=arms(orthogonal_wrist=True))
 def test_each_branch_finds_all_branches_again(data, robot):
     """With an orthogonal wrist, a shoulder branch has all four roots or none."""
@@ -156,7 +156,7 @@ def test_rows_outside_use_the_turn_nearest_to_the_range():
     assert below[3] == pytest.approx(215)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(data=st.data(), robot=arms())
 def test_nearest_equivalents_are_the_best_of_all_turns(data, robot):
     q, q_ref = data.draw(joints_within(robot)), data.draw(joints_within(robot))

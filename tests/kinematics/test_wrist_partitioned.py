@@ -65,7 +65,7 @@ def test_too_far_says_by_how_much(robot, outside):
         assert "e+" not in say(found)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     lengths_m=st.tuples(number(0, 0.3), number(0.1, 1), number(-0.15, 0.15), number(0.2, 1)),
     angle=number(-1.2, 1.2),
@@ -86,7 +86,7 @@ def test_boundary_of_the_reach(lengths_m, angle, outside):
         assert gap.min() == pytest.approx(outside, abs=1e-12)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     lengths_m=st.tuples(number(0, 0.3), number(0.5, 1), number(-0.1, 0.1), number(0.2, 0.3)),
     angle=number(-1.2, 1.2),

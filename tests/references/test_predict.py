@@ -190,7 +190,7 @@ def test_the_manufacturers_two_radii_conflict_and_nothing_else():
     assert not conflicts(load_references("er3a_c60").checkable)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(0.01, 50), st.floats(0.01, 50))
 def test_a_conflict_is_what_no_value_can_meet(first, second, u1, u2):
     pair = tuple(

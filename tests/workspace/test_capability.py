@@ -34,7 +34,7 @@ def joint_1_free(robot: Robot) -> Robot:
 # --- neighbourhoods of poses ---
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 @given(st.data())
 def test_what_holds_for_a_neighbourhood_holds_for_every_pose_in_it(data):
     robot = data.draw(arms())
@@ -69,7 +69,7 @@ def test_a_pose_alone_is_decided(robot, random):
         assert np.array_equal(state == NEVER, ~expected)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40, derandomize=True)
 @given(st.data())
 def test_manipulability_is_the_jacobians_determinant(data):
     robot = data.draw(arms())

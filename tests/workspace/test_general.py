@@ -180,7 +180,7 @@ slides = st.tuples(st.just(False), *[st.booleans()] * 5)
 
 
 @pytest.mark.long
-@settings(max_examples=4, deadline=None, phases=[Phase.generate])
+@settings(max_examples=4, phases=[Phase.generate])
 @given(
     lengths,
     lengths,

@@ -241,7 +241,7 @@ small = st.floats(-0.15, 0.15)
 
 
 @pytest.mark.long
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(
     st.lists(st.tuples(angles, st.floats(0, 7)), min_size=6, max_size=6),
     st.tuples(small, small, small, angles, angles, angles),
@@ -310,7 +310,7 @@ def test_the_zone_holds_all_samples_and_is_reached(random):
 # --- parts ---
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(st.floats(-20, 20), st.floats(0, 7)), max_size=8), st.booleans())
 def test_arcs_agree_with_a_fine_grid(cuts, more):
     arcs = np.full((MOST_ARCS, 2), np.nan)
