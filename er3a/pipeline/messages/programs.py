@@ -6,7 +6,6 @@ import er3a.pipeline.messages.program_check  # noqa: F401
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import counted, joined
 from er3a.pipeline.stages.programs.model import ProgramSummary
-from er3a.programs.syntax import Language
 
 FIGURES = {
     "programs_passed": N_("Programs that pass"),
@@ -14,13 +13,6 @@ FIGURES = {
     "instructions_caution": N_("Motion instructions with caution"),
     "instructions_failed": N_("Motion instructions that fail"),
     "least_clearance": N_("Least clearance of programs meant to pass"),
-}
-LANGUAGES: dict[Language, str] = {
-    "krl": "KRL",
-    "urscript": "URScript",
-    "rpl": "RPL",
-    "xpl": "RPL (XPL)",
-    "csv": "CSV",
 }
 
 
