@@ -50,6 +50,7 @@ class Column:
     pattern : name in the file; with ``{}`` for a group: what stands there is in ``parts``, or counts from 1
     kind : of a column of findings, which ones they can be
     lists : whether each row holds a list of real numbers
+    heading : what it is called at an axis or over a table, in few words; empty where the meaning serves
     """
 
     pattern: str
@@ -59,6 +60,7 @@ class Column:
     parts: tuple[str, ...] | None = None
     kind: Any = None
     lists: bool = False
+    heading: str = ""
 
     @property
     def arrow_type(self) -> pa.DataType:
@@ -96,9 +98,9 @@ class Column:
         return [numbered[number] for number in sorted(numbered)]
 
 
-def column(meaning: str, unit: str = "", *, name: str = "", dtype: Any = np.float64) -> Any:
+def column(meaning: str, unit: str = "", *, name: str = "", dtype: Any = np.float64, heading: str = "") -> Any:
     """A column (rows,); ``name`` in the file is the attribute's where it is left out."""
-    return _declared(name, meaning, unit, dtype, None)
+    return _declared(name, meaning, unit, dtype, None, heading)
 
 
 def findings(meaning: str, kind: Any) -> Any:
@@ -106,9 +108,9 @@ def findings(meaning: str, kind: Any) -> Any:
     return field(metadata={"column": Column("", meaning, "", np.dtype(object), None, kind)})
 
 
-def per_joint(pattern: str, meaning: str, unit: str = "", *, dtype: Any = np.float64) -> Any:
+def per_joint(pattern: str, meaning: str, unit: str = "", *, dtype: Any = np.float64, heading: str = "") -> Any:
     """One column for each joint, (rows, n): ``"q{}_deg"`` is written as ``q1_deg ... qn_deg``."""
-    return _declared(pattern, meaning, unit, dtype, None)
+    return _declared(pattern, meaning, unit, dtype, None, heading)
 
 
 def vector(pattern: str, meaning: str, unit: str = "", *, parts: Iterable[str] = "xyz", dtype: Any = np.float64) -> Any:
@@ -121,8 +123,10 @@ def lists(meaning: str, unit: str = "") -> Any:
     return field(metadata={"column": Column("", meaning, unit, np.dtype(object), lists=True)})
 
 
-def _declared(pattern: str, meaning: str, unit: str, dtype: Any, parts: tuple[str, ...] | None) -> Any:
-    return field(metadata={"column": Column(pattern, meaning, unit, np.dtype(dtype), parts)})
+def _declared(
+    pattern: str, meaning: str, unit: str, dtype: Any, parts: tuple[str, ...] | None, heading: str = ""
+) -> Any:
+    return field(metadata={"column": Column(pattern, meaning, unit, np.dtype(dtype), parts, heading=heading)})
 
 
 @dataclass(frozen=True, eq=False)
