@@ -12,9 +12,10 @@ from collections.abc import Mapping
 from numbers import Real
 from pathlib import Path
 from string import Formatter
-from typing import Any
+from typing import Any, Literal, get_args
 
-LANGUAGES = ("en", "zh")
+LanguageCode = Literal["en", "zh"]
+LANGUAGES = get_args(LanguageCode)
 CATALOGUES = Path(__file__).with_name("locale")
 
 _catalogue: gettext.NullTranslations = gettext.NullTranslations()
