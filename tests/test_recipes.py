@@ -9,9 +9,15 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from typing import get_args
 
 import pytest
 
+from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ArmClassCode
+from er3a.programs.languages import LANGUAGES
+from er3a.programs.syntax import LanguageName
+from er3a.selection.rule_names import RuleName
+from er3a.selection.select import RULES
 from testing.small_study import ROOT, environment, fresh
 
 Edit = str | tuple[tuple[str, str], ...]
@@ -72,6 +78,12 @@ def test_a_stage_is_made_of_files_that_its_recipe_names():
         inside = "er3a/pipeline/stages/toy/"
         file = path.removeprefix(inside)
         assert f"`{file}`" in recipe("A stage.") if path.startswith(inside) else names("A stage.", path)
+
+
+def test_each_name_has_its_entry():
+    assert list(LANGUAGES) == list(get_args(LanguageName))
+    assert list(RULES) == list(get_args(RuleName))
+    assert set(ARM_CLASSES) == set(get_args(ArmClassCode))
 
 
 @pytest.mark.long
