@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from er3a.kinematics.numerical import solve as solve
     from er3a.program_check.check_program import CheckOptions as CheckOptions
     from er3a.program_check.check_program import check_program as check_program
+    from er3a.programs.languages import read_program as read_program
+    from er3a.programs.languages import write_program as write_program
     from er3a.programs.machine import execute as execute
-    from er3a.programs.read_program import read_program as read_program
-    from er3a.programs.write_program import write_program as write_program
     from er3a.programs.writing import WriteOptions as WriteOptions
     from er3a.robots.conventions import to_modified as to_modified
     from er3a.robots.conventions import to_standard as to_standard
@@ -75,11 +75,11 @@ _PUBLIC = {
     "to_standard": "er3a.robots.conventions",
     "import_urdf": "er3a.formats.urdf",
     "export_urdf": "er3a.formats.urdf",
-    "read_program": "er3a.programs.read_program",
+    "read_program": "er3a.programs.languages",
     "execute": "er3a.programs.machine",
     "check_program": "er3a.program_check.check_program",
     "CheckOptions": "er3a.program_check.check_program",
-    "write_program": "er3a.programs.write_program",
+    "write_program": "er3a.programs.languages",
     "WriteOptions": "er3a.programs.writing",
     "Er3aError": "er3a.errors",
     "InputWarning": "er3a.errors",

@@ -21,7 +21,15 @@ from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
 from er3a.kinematics.classes.arm_angle import is_out_of_reach
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
-from er3a.kinematics.classes.class_solvers import ArmAngle, ArmClassCode, ChainSolver, LinkedRows, Redundancy
+from er3a.kinematics.classes.class_solvers import (
+    ALL_OF_POSE,
+    ARM_CLASSES,
+    ArmAngle,
+    ArmClassCode,
+    ChainSolver,
+    LinkedRows,
+    Redundancy,
+)
 from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
@@ -42,16 +50,6 @@ SPREAD = 1e-11
 MOST_CURVES, MOST_ON_SURFACE = 24, 2
 MOVES_BELOW = 3e-8  # smallest singular value above which rows of three parallel axes, known to rounding, can't move
 STARTS, FEW_STARTS = 240, 32
-SEARCHED: tuple[ArmClassCode, ...] = (
-    "general_six",
-    "six_one_prismatic",
-    "six_two_prismatic",
-    "planar_wrist",
-    "gantry",
-    "free_roll",
-    "position",
-    "scara",
-)
 TRACED: dict[ArmClassCode, int] = {"free_roll": OPEN_ROLL, "position": POSITION}
 SMALLEST_PART = 64
 SCANNED = 16  # values of a redundancy parameter from which self-motions are collected
@@ -110,7 +108,7 @@ def arm_solver(robot: Robot) -> ArmSolver:
 
 def _linked(robot: Robot, chain: ChainSolver, uncouple: Reals) -> ChainSolver:
     """The solver of a chain with more rows than joints, of those rows alone that the joints can make."""
-    if chain.parameters or isinstance(chain, Unsolved) or chain.code in TASKS:
+    if chain.parameters or isinstance(chain, Unsolved) or ARM_CLASSES[chain.code].task != ALL_OF_POSE:
         return Unsolved(robot.joints)
     apart = np.eye(robot.rows) - np.asarray(robot.coupling) @ uncouple
     return LinkedRows(chain, apart * robot.direction, joint_starts(robot), robot.sliding, chain.code, chain.slots)
@@ -178,7 +176,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
     in_doubt = certainty == CONTINUUM or (certainty == UNCERTAIN and solver.sliding.any())
-    if in_doubt and solver.chain.code in SEARCHED:
+    if in_doubt and ARM_CLASSES[solver.chain.code].searched:
         few = certainty == UNCERTAIN and robot.joints < 6
         found.append(chain.roots(_starts(robot, FEW_STARTS if few else STARTS)))
     candidates = np.concatenate(found)
@@ -445,13 +443,6 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
     return int(far.argmin()) if far.min() < SAME_ROW else 0
 
 
-TASKS: dict[ArmClassCode, tuple[int, ...]] = {
-    "free_roll": (1, 1, 1, 1, 1, 0),
-    "position": (1, 1, 1, 0, 0, 0),
-    "scara": (1, 1, 1, 0, 0, 1),
-}
-
-
 @derived
 def task_mask(robot: Robot) -> Reals:
     """Which of x, y, z and the rotations about x, y, z of the tool's frame the arm's solutions meet, six of 1 or 0.
@@ -459,6 +450,6 @@ def task_mask(robot: Robot) -> Reals:
     All, but for arms with fewer than six joints: five leave the turn about the tool's axis (if they can't do it
     themselves), a SCARA the tool's tilt, three joints the orientation.
     """
-    mask = np.array(TASKS.get(arm_solver(robot).chain.code, (1,) * 6), dtype=float)
+    mask = np.array(ARM_CLASSES[arm_solver(robot).chain.code].task, dtype=float)
     mask.setflags(write=False)
     return mask

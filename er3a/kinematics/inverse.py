@@ -20,7 +20,7 @@ from er3a.kinematics.by_class import (
     task_mask,
 )
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
-from er3a.kinematics.classes.class_solvers import ArmClassCode, LinkedRows
+from er3a.kinematics.classes.class_solvers import ARM_CLASSES, LinkedRows
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.configuration import side_of, slot_labels
@@ -57,15 +57,6 @@ MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
 MISS_RESTARTS = 20
-BY_ELIMINATION: tuple[ArmClassCode, ...] = (
-    "general_six",
-    "six_one_prismatic",
-    "six_two_prismatic",
-    "redundant",
-    "free_roll",
-    "planar_wrist",
-    "position",
-)
 
 
 def inverse(
@@ -204,7 +195,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
 def all_told(robot: Robot, certainty: Integers) -> Flags:
     """Whether the class has told all solutions of poses (N,) in so far as it is certain of them (N,)."""
     solver = arm_solver(robot).chain
-    closed = solver.code not in BY_ELIMINATION and not isinstance(solver, LinkedRows)
+    closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
     return np.asarray((certainty == CERTAIN) | closed)
 
 

@@ -37,7 +37,7 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.class_follow import follows_tool_paths
-from er3a.programs.read_program import SUFFIXES, read_program
+from er3a.programs.languages import SUFFIXES, read_program
 from er3a.robots.robot import Robot
 
 SCHEMAS: dict[str, type[BaseModel]] = {

@@ -41,10 +41,10 @@ from er3a.program_check.check_program import (
 )
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.instructions import Place
+from er3a.programs.languages import WITHOUT_JOINTS, not_written
 from er3a.programs.program_findings import WriteFinding
-from er3a.programs.syntax import Language
-from er3a.programs.write_program import WITHOUT_JOINTS
-from er3a.programs.writing import not_written, program_name
+from er3a.programs.syntax import LanguageName
+from er3a.programs.writing import program_name
 from er3a.robots.robot import Robot
 from er3a.version import __version__
 
@@ -351,7 +351,7 @@ class PathProgram:
 
 
 def programs_of(
-    file: Path, robot: Robot, language: Language, scene: Scene | None, only: Sequence[str] | None, unsafe: bool
+    file: Path, robot: Robot, language: LanguageName, scene: Scene | None, only: Sequence[str] | None, unsafe: bool
 ) -> Iterator[PathProgram]:
     """The paths of a file one after another, by the thresholds of a check of programs.
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.programs.syntax import Language
+from er3a.programs.syntax import LanguageName
 from er3a.robots.robot import MOST_JOINTS
 
 
@@ -39,5 +39,5 @@ class TrajectorySettings(StrictModel):
     jerk_deg_s3: Annotated[list[Annotated[float, Field(gt=0, le=1e9)]], Field(min_length=1)] | None = None
     scene: Text | None = None
     penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
-    programs: list[Language] = ["krl", "urscript", "rpl", "xpl", "csv"]
+    programs: list[LanguageName] = ["krl", "urscript", "rpl", "xpl", "csv"]
     write_unsafe: bool = False

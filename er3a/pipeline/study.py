@@ -14,6 +14,7 @@ from er3a.files.annotations import translations_in
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.yaml_file import StrictModel, load, read_yaml
+from er3a.pipeline.messages.language import LanguageCode
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.sweeps import Sweep, Variant
 from er3a.robots.robot import Robot
@@ -76,7 +77,7 @@ class RobotEntry(StrictModel):
 class ReportSettings(StrictModel):
     """How pages and recordings are written; no number depends on it."""
 
-    language: Literal["en", "zh"] = "en"
+    language: LanguageCode = "en"
 
 
 class StudyBase(StrictModel):

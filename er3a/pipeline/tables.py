@@ -52,6 +52,7 @@ class Column:
     pattern : name in the file; with ``{}`` for a group: what stands there is in ``parts``, or counts from 1
     kind : of a column of findings, which ones they can be
     lists : whether each row holds a list of real numbers
+    heading : what it is called at an axis or over a table, in few words; empty where the meaning serves
     """
 
     pattern: str
@@ -61,6 +62,7 @@ class Column:
     parts: tuple[str, ...] | None = None
     kind: Any = None
     lists: bool = False
+    heading: str = ""
 
     @property
     def arrow_type(self) -> pa.DataType:
@@ -98,9 +100,9 @@ class Column:
         return [numbered[number] for number in sorted(numbered)]
 
 
-def column(meaning: str, unit: str = "", *, name: str = "") -> Any:
+def column(meaning: str, unit: str = "", *, name: str = "", heading: str = "") -> Any:
     """A column (rows,); ``name`` in the file is the attribute's where it is left out."""
-    return _declared(name, meaning, unit)
+    return _declared(name, meaning, unit, heading=heading)
 
 
 def findings(meaning: str, kind: Any) -> Any:
@@ -108,9 +110,9 @@ def findings(meaning: str, kind: Any) -> Any:
     return _declared("", meaning, kind=kind)
 
 
-def per_joint(meaning: str, unit: str = "", *, name: str = "") -> Any:
+def per_joint(meaning: str, unit: str = "", *, name: str = "", heading: str = "") -> Any:
     """One column for each joint, (rows, n): ``q_deg`` is written as ``q1_deg ... qn_deg``."""
-    return _declared(_numbered(name) if name else PER_JOINT, meaning, unit)
+    return _declared(_numbered(name) if name else PER_JOINT, meaning, unit, heading=heading)
 
 
 def vector(pattern: str, meaning: str, unit: str = "", *, parts: Iterable[str] = "xyz") -> Any:

@@ -16,16 +16,18 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.numerics.arrays import Reals
-from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget, arc_end
+from er3a.programs.instructions import ArmMotion, Instruction, JointTarget, NamedFrame, PoseTarget, arc_end
 from er3a.programs.syntax import (
     Aggregate,
     Binary,
     Constant,
+    Doing,
     Element,
     Expression,
     Invocation,
     Listed,
     Member,
+    Move,
     Opaque,
     Record,
     Solved,
@@ -35,9 +37,9 @@ from er3a.programs.syntax import (
     Variable,
     number,
 )
-from er3a.programs.writing import MOST_ROBOT_AXES
 
 NO_FRAME = NamedFrame()
+MOST_ROBOT_AXES = 6
 
 Flange = Callable[[Reals], Reals]
 """T_robot_flange (4, 4) of joint angles (n,) in rad."""
@@ -425,3 +427,34 @@ def _unary(sign: str, value: Value) -> Value:
         return Unclear(f"{sign} ...")
     assert isinstance(value, (int, float))
     return -value if sign == "-" else value
+
+
+class Dialect(Functions, Protocol):
+    """A language, as a run needs it.
+
+    Attributes
+    ----------
+    modal : variables that motions depend on without naming them
+    local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
+    """
+
+    modal: frozenset[str]
+    local_by_default: bool
+
+    def begin(self, memory: ProgramMemory) -> None:
+        """Variables that are there from the start."""
+
+    def is_signal(self, name: str) -> bool:
+        """Whether an assignment to this name sets an output."""
+
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
+        """The motion, from where the arm stands."""
+
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
+        """A call of a function that is not in the program; None if it only sets variables."""
+
+    def harmless(self, call: Invocation) -> bool:
+        """Whether a function that is not in the program neither moves the arm nor sets what motions depend on."""
+
+    def named(self, name: str) -> bool:
+        """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""

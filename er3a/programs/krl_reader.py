@@ -9,12 +9,12 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, not_understood, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
+from er3a.programs.program_files import data_file_of, modules_of, shared_data_of
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
 from er3a.programs.syntax import (
     Aggregate,
@@ -411,28 +411,8 @@ def _spline(reading: _Statement) -> None:
     reading.builder.add(Doing(reading.place, call, reading.text))
 
 
-CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
 GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
 GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
-MOST_MODULES = 200
-
-
-def modules_of(path: Path) -> tuple[Path, ...]:
-    """The modules that a .src file calls, and those that these call, in the order in which they are met."""
-    beside = {
-        each.stem.upper(): each
-        for each in sorted(path.parent.iterdir())
-        if each.suffix.lower() == ".src" and each.is_file()
-    }
-    beside.pop(path.stem.upper(), None)
-    found: list[Path] = []
-    waiting = [path]
-    while beside and waiting and len(found) < MOST_MODULES:
-        called = dict.fromkeys(name.upper() for name in CALL.findall(read_program_text(waiting.pop(0)).text))
-        new = [beside.pop(name) for name in called if name in beside]
-        found += new
-        waiting += new
-    return tuple(found)
 
 
 def apart(
@@ -521,24 +501,6 @@ def _module(source: ProgramText) -> tuple[list[Routine], list[Assign], list[Prog
     if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
     return (*apart(source, reader.read_routines(), reader.data), findings)
-
-
-def data_file_of(path: Path, suffix: str) -> Path | None:
-    """The file with the same name and another suffix beside a file, however its letters are written."""
-    for name in (path.stem + suffix, path.stem + suffix.upper(), path.stem + suffix.capitalize()):
-        beside = path.with_name(name)
-        if beside.is_file():
-            return beside
-    return None
-
-
-def shared_data_of(path: Path) -> Path | None:
-    """The controller's own $config.dat, with its tools, bases and points: beside a program, or as in an archive."""
-    for folder in (path.parent, path.parent.parent / "System"):
-        for name in ("$config.dat", "$CONFIG.DAT", "$Config.dat"):
-            if (folder / name).is_file():
-                return folder / name
-    return None
 
 
 class _KrlReader:

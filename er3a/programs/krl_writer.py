@@ -41,7 +41,7 @@ KNOWN_FRAMES = ("TOOL_DATA[", "BASE_DATA[", "$NULLFRAME", "$WORLD", "$ROBROOT")
 class KrlWriter(Writer):
     """Writes KRL."""
 
-    language = "krl"
+    languages = ("krl",)
 
     def __init__(self, listing: Listing, options: WriteOptions):
         super().__init__(listing, options)

@@ -21,7 +21,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -29,11 +28,10 @@ from er3a.errors import InputError, ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.programs.evaluation import Cell, Functions, Position, ProgramMemory, root
+from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, root
 from er3a.programs.execution import Ending, EndKind, Execution, KeepOn, RunLimits, Step
 from er3a.programs.instructions import ArmMotion, Decision, Instruction, Output, Pause, Place, Unknown
-from er3a.programs.krl_dialect import KrlDialect
-from er3a.programs.rpl_dialect import RplDialect
+from er3a.programs.languages import LANGUAGES, not_written
 from er3a.programs.syntax import (
     START,
     Assign,
@@ -46,7 +44,6 @@ from er3a.programs.syntax import (
     GoTo,
     Halt,
     Invocation,
-    Language,
     Member,
     Move,
     Operation,
@@ -62,8 +59,6 @@ from er3a.programs.syntax import (
     number,
     shown,
 )
-from er3a.programs.urscript_dialect import UrScriptDialect
-from er3a.programs.writing import not_expressed
 from er3a.robots.robot import Robot
 
 
@@ -117,37 +112,6 @@ def changed_by_threads(program: Program) -> frozenset[str]:
     threads = (routine for routine in program.routines.values() if routine.thread)
     changes = (each for routine in threads for each in routine.code if isinstance(each, Assign) and not each.local)
     return frozenset(target_name(each.target) for each in changes)
-
-
-class Dialect(Functions, Protocol):
-    """A language, as a run needs it.
-
-    Attributes
-    ----------
-    modal : variables that motions depend on without naming them
-    local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
-    """
-
-    modal: frozenset[str]
-    local_by_default: bool
-
-    def begin(self, memory: ProgramMemory) -> None:
-        """Variables that are there from the start."""
-
-    def is_signal(self, name: str) -> bool:
-        """Whether an assignment to this name sets an output."""
-
-    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
-        """The motion, from where the arm stands."""
-
-    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
-        """A call of a function that is not in the program; None if it only sets variables."""
-
-    def harmless(self, call: Invocation) -> bool:
-        """Whether a function that is not in the program neither moves the arm nor sets what motions depend on."""
-
-    def named(self, name: str) -> bool:
-        """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -706,15 +670,6 @@ def _loops(routine: Routine) -> frozenset[int]:
     return frozenset(at for at, end in branches if any(to <= at < i < end for i, to in jumps))
 
 
-DIALECTS: Mapping[Language, type[Dialect]] = {
-    "krl": KrlDialect,
-    "urscript": UrScriptDialect,
-    "rpl": RplDialect,
-    "xpl": RplDialect,
-    "csv": RplDialect,
-}
-
-
 def execute(
     program: Program,
     robot: Robot | None = None,
@@ -754,13 +709,13 @@ def execute(
     cell = Cell(flange, start, frames=known)
     if robot is not None:
         cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4))
-    return Machine(program, DIALECTS[program.language](), cell, limits or RunLimits(), keep_on).run()
+    return Machine(program, LANGUAGES[program.language].dialect(), cell, limits or RunLimits(), keep_on).run()
 
 
 def _not_meant(program: Program, robot: Robot) -> str:
     """Why a program is none of an arm's; empty if it is."""
-    if program.language != "csv":
-        return not_expressed(program.language, robot)
+    if not program.slides:
+        return not_written(program.language, robot)
     if len(program.slides) != robot.joints:
         return f"the table has {len(program.slides)} joints, and this arm has {robot.joints}"
     for joint, (slides, own) in enumerate(zip(program.slides, robot.slides.tolist()), 1):

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Place
-from er3a.programs.krl_reader import data_file_of
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
+from er3a.programs.program_files import data_file_of
 from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
 from er3a.programs.syntax import (
     Assign,

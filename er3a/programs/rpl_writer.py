@@ -43,7 +43,7 @@ class RplItem:
 class RplWriter(Writer):
     """Writes RPL as text."""
 
-    language = "rpl"
+    languages = ("rpl", "xpl")
     longest_name = 31
 
     def __init__(self, listing: Listing, options: WriteOptions):
@@ -191,8 +191,6 @@ class RplWriter(Writer):
 
 class XplWriter(RplWriter):
     """Writes RPL as the controller's XML."""
-
-    language = "xpl"
 
     def files(self, head: list[str]) -> dict[str, str]:
         """The .XPL file."""

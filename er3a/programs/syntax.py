@@ -104,7 +104,7 @@ def shown(value: Value) -> str:
 START = "%start"
 """Result of the call with which a program begins whose variables are those of its first routine."""
 
-Language = Literal["krl", "urscript", "rpl", "xpl", "csv"]
+LanguageName = Literal["krl", "urscript", "rpl", "xpl", "csv"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +333,7 @@ class Program(ByValue):
     slides : whether each joint of a table slides, its targets in m; empty of other programs
     """
 
-    language: Language
+    language: LanguageName
     name: str
     file: Path | None
     routines: Mapping[str, Routine]

@@ -15,7 +15,7 @@ DIGITS = 9
 class UrScriptWriter(Writer):
     """Writes URScript."""
 
-    language = "urscript"
+    languages = ("urscript",)
     longest_name = 40
     indent = "  "
     tcp = ""

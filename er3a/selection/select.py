@@ -29,8 +29,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import Refusal, WhyNone, nearest, why_none
-
-RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
+from er3a.selection.rule_names import RuleName
 
 
 @dataclass(frozen=True)

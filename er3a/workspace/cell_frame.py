@@ -12,7 +12,7 @@ import numpy as np
 
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import LockedJoint
-from er3a.kinematics.classes.class_solvers import ArmClassCode, ChainSolver, Completed
+from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, Completed
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot, derived
@@ -27,7 +27,6 @@ masks."""
 _FEW_SECTORS = 16
 """The same of arms whose inverse takes long."""
 _TURN = 2 * np.pi
-CLOSED_FORMS: tuple[ArmClassCode, ...] = ("spherical_wrist", "three_parallel", "arm_angle", "gantry", "scara")
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +106,7 @@ def is_quick(robot: Robot) -> bool:
     chain: ChainSolver | None = arm_solver(robot).chain
     while isinstance(chain, LockedJoint | Completed):
         chain = chain.rest
-    return chain is not None and chain.code in CLOSED_FORMS
+    return chain is not None and ARM_CLASSES[chain.code].closed_form
 
 
 def joint_1_alone(robot: Robot) -> bool:

@@ -22,7 +22,7 @@ from er3a.kinematics.by_class import (
     task_mask,
 )
 from er3a.kinematics.classes.chain_solvers import LockedJoint, Unsolved
-from er3a.kinematics.classes.class_solvers import ChainSolver, Completed
+from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, Completed
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.wrist_partitioned import closed_form_missing
@@ -30,7 +30,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import row_limits
 from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import whole_turns
-from er3a.workspace.cell_frame import CLOSED_FORMS, is_quick, joint_1_alone
+from er3a.workspace.cell_frame import is_quick, joint_1_alone
 from er3a.workspace.general_arm import coupled
 from er3a.workspace.orientations import asked_of
 
@@ -95,7 +95,7 @@ def pose_cost(robot: Robot) -> float:
         chain = chain.rest
     if chain is None:
         return cost + CERTAIN_S + INNER_S
-    if chain.code in CLOSED_FORMS:
+    if ARM_CLASSES[chain.code].closed_form:
         return cost + QUICK_S
     random = np.random.default_rng(_PROBED)
     q = robot.lower + random.random((_PROBED, robot.joints)) * (robot.upper - robot.lower)

@@ -20,7 +20,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.program_check.motion_checks import _slot
 from er3a.programs.instructions import numbers_of
-from er3a.programs.read_program import read_program
+from er3a.programs.languages import read_program
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = ROOT / "data/programs/faults"

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from er3a.pipeline import cli  # noqa: F401
 from er3a.pipeline.commands.options import app
-from er3a.programs.read_program import read_program
+from er3a.programs.languages import read_program
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = "data/programs/faults"

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from er3a.errors import InputError
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import ArmMotion, Remark
+from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NothingMoves, OtherEncoding
-from er3a.programs.read_program import read_program
 from tests.programs.test_examples import EXAMPLES
 from tests.programs.test_other_readers import XPL
 

@@ -9,8 +9,8 @@ from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Decision, JointTarget
+from er3a.programs.languages import read_program
 from er3a.programs.machine import Machine, execute
-from er3a.programs.read_program import read_program
 from tests.programs.test_round_trips import ROBOT
 
 GRIPPER = """def work():

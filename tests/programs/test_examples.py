@@ -9,10 +9,9 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NothingMoves
-from er3a.programs.read_program import read_program
-from er3a.programs.write_program import write_program
 from er3a.programs.writing import Resolver, WriteOptions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "data/programs"

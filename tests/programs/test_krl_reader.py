@@ -9,9 +9,9 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.programs.instructions import Aside, Decision, JointTarget, Output, Pause, PoseTarget, Unknown
+from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood
-from er3a.programs.read_program import read_program
 
 DATA = """&ACCESS RVP
 DEFDAT weld PUBLIC

@@ -18,9 +18,8 @@ from er3a.planning.commands import JointSequenceCommand
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
+from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
-from er3a.programs.read_program import read_program
-from er3a.programs.write_program import write_program
 from er3a.programs.writing import WriteOptions
 from er3a.robots.joint_limits import joint_columns, shown
 from er3a.robots.robot import Robot

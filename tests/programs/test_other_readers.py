@@ -20,8 +20,8 @@ from er3a.programs.instructions import (
     Unknown,
     UnresolvedTarget,
 )
+from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
-from er3a.programs.read_program import read_program
 from er3a.robots.robot import Robot
 from tests.programs.test_round_trips import ROBOT
 

@@ -19,6 +19,7 @@ from er3a.planning.commands import (
 from er3a.planning.profiles import Times
 from er3a.programs.from_commands import listing_of
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Output, Pause, PoseTarget, Rate, Remark, Zone
+from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import (
     ArcsSplit,
@@ -31,8 +32,6 @@ from er3a.programs.program_findings import (
     ValuesRounded,
     ZonesDropped,
 )
-from er3a.programs.read_program import read_program
-from er3a.programs.write_program import write_program
 from er3a.programs.writing import WriteOptions
 
 LANGUAGES = ("krl", "urscript", "rpl", "xpl")

@@ -22,7 +22,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach.panel import write_teach_page
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.read_program import read_program
+from er3a.programs.languages import read_program
 
 NAME = "er3_600"
 HOME = [0, -10, -10, 0, -70, 0]  # deg

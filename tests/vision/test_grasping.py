@@ -20,7 +20,7 @@ from er3a.pipeline.stages.vision.compute import grasp_programs
 from er3a.planning.timing import joint_limits
 from er3a.planning.way_around import EndOutsideLimits, PlannerMissing
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.read_program import read_program
+from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import within
 from er3a.vision.calibration_set import moved, step_between
 from er3a.vision.grasp_motion import PARTS

@@ -8,6 +8,7 @@ they lack, and of what those turn it is told.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from er3a.kinematics.classes.arm_angle import about_x, about_z, arm_angle_arm, frame_along
 from er3a.kinematics.classes.class_solvers import (
+    ARM_CLASSES,
     ArmAngle,
     ArmClassCode,
     ChainSolver,
@@ -38,15 +40,7 @@ from er3a.kinematics.wrist_partitioned import WristPartitionedArm, constants_of,
 from er3a.numerics.arrays import Flags, Integers, Reals
 
 FULL_RANK = 1e-7
-PREFERENCE: tuple[ArmClassCode, ...] = (
-    "spherical_wrist",
-    "three_parallel",
-    "arm_angle",
-    "gantry",
-    "general_six",
-    "six_two_prismatic",
-    "six_one_prismatic",
-)
+PREFERENCE = tuple(ARM_CLASSES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,44 +110,70 @@ class Unsolved(WithoutParameters):
 def chain_solver(links: Reals, sliding: Flags) -> ChainSolver:
     """The solver of a chain with constant links (n + 1, 4, 4), m, whose joints slide where ``sliding`` (n,) says so."""
     links, sliding = np.ascontiguousarray(links, dtype=float), np.asarray(sliding, dtype=bool)
+    for recognised_as in CLOSED_FORMS:
+        if (solver := recognised_as(links, sliding)) is not None:
+            return solver
     n = len(sliding)
     if n == 6:
-        return _of_six(links, sliding)
-    if n == 7 and not sliding.any():
-        arm, spare = arm_angle_arm(links), arm_angle_arm(links, frame_along(axes_of(links)[0][0])[0])
-        if arm is not None and spare is not None:
-            return ArmAngle(arm, spare)
-    if n > 6:
-        return _locked(links, sliding)
-    if n == 4 and (planar := scara(links, sliding)) is not None:
-        return PlanarFour(planar)
-    return _completed(links, sliding)
+        return _by_elimination(links, sliding)
+    return _locked(links, sliding) if n > 6 else _completed(links, sliding)
 
 
-def _of_six(links: Reals, sliding: Flags) -> ChainSolver:
-    if not sliding.any():
-        axes, points = axes_of(links)
-        wrist = recognised(axes, points, poses_of(links, np.zeros(6)))
-        if isinstance(wrist, WristPartitionedArm):
-            return SphericalWristSolver(links, constants_of(wrist))
-        parallel = three_parallel(links)
-        if parallel is not None:
-            return ParallelAxes(parallel)
-    if full_rank(links, sliding):
-        three = gantry(links, sliding)
-        if three is not None:
-            return ThreeSliding(three)
-        if sliding.sum() == 2:
-            two = two_slides(links, sliding)
-            return Unsolved(6) if two is None else General(partial(solve_two_slides, two), "six_two_prismatic")
-        arm = prepared(links, sliding)
-        if arm.readings:
-            by_elimination = partial(solve_six_revolute, arm)
-            if not arm.clear and (with_wrist := slide_and_wrist(links, sliding)) is not None:
-                return General(partial(solve_slide_and_wrist, with_wrist, by_elimination), "six_one_prismatic")
-            return General(by_elimination, "six_one_prismatic" if sliding.any() else "general_six")
+def _with_spherical_wrist(links: Reals, sliding: Flags) -> ChainSolver | None:
+    if len(sliding) != 6 or sliding.any():
+        return None
+    wrist = recognised(*axes_of(links), poses_of(links, np.zeros(6)))
+    return SphericalWristSolver(links, constants_of(wrist)) if isinstance(wrist, WristPartitionedArm) else None
+
+
+def _with_parallel_axes(links: Reals, sliding: Flags) -> ChainSolver | None:
+    parallel = three_parallel(links) if len(sliding) == 6 and not sliding.any() else None
+    return None if parallel is None else ParallelAxes(parallel)
+
+
+def _with_three_slides(links: Reals, sliding: Flags) -> ChainSolver | None:
+    if len(sliding) != 6 or sliding.sum() != 3 or not full_rank(links, sliding):
+        return None
+    three = gantry(links, sliding)
+    return None if three is None else ThreeSliding(three)
+
+
+def _with_arm_angle(links: Reals, sliding: Flags) -> ChainSolver | None:
+    if len(sliding) != 7 or sliding.any():
+        return None
+    arm, spare = arm_angle_arm(links), arm_angle_arm(links, frame_along(axes_of(links)[0][0])[0])
+    return None if arm is None or spare is None else ArmAngle(arm, spare)
+
+
+def _as_scara(links: Reals, sliding: Flags) -> ChainSolver | None:
+    planar = scara(links, sliding) if len(sliding) == 4 else None
+    return None if planar is None else PlanarFour(planar)
+
+
+CLOSED_FORMS: tuple[Callable[[Reals, Flags], ChainSolver | None], ...] = (
+    _with_spherical_wrist,
+    _with_parallel_axes,
+    _with_three_slides,
+    _with_arm_angle,
+    _as_scara,
+)
+"""For each class in closed form what recognises it: links (n + 1, 4, 4) and sliding (n,) to a solver or None. The first
+that does is taken; what none recognises is solved by elimination, with joints held, or with joints added."""
+
+
+def _by_elimination(links: Reals, sliding: Flags) -> ChainSolver:
+    if not full_rank(links, sliding):
+        return Unsolved(6, "dependent")
+    if sliding.sum() == 2:
+        two = two_slides(links, sliding)
+        return Unsolved(6) if two is None else General(partial(solve_two_slides, two), "six_two_prismatic")
+    arm = prepared(links, sliding)
+    if not arm.readings:
         return Unsolved(6)
-    return Unsolved(6, "dependent")
+    by_elimination = partial(solve_six_revolute, arm)
+    if not arm.clear and (with_wrist := slide_and_wrist(links, sliding)) is not None:
+        return General(partial(solve_slide_and_wrist, with_wrist, by_elimination), "six_one_prismatic")
+    return General(by_elimination, "six_one_prismatic" if sliding.any() else "general_six")
 
 
 def full_rank(links: Reals, sliding: Flags, at_rest: tuple[int, ...] = ()) -> bool:
@@ -204,8 +224,7 @@ def _locked(links: Reals, sliding: Flags) -> ChainSolver:
             continue
         rest = chain_solver(rest_links, rest_sliding)
         code = rest.code if not isinstance(rest, LockedJoint) else "redundant"
-        place = PREFERENCE.index(code) if code in PREFERENCE else len(PREFERENCE)
-        rating = (isinstance(rest, Unsolved), not bool(sliding[joint]), place)
+        rating = (isinstance(rest, Unsolved), not bool(sliding[joint]), PREFERENCE.index(code))
         if best is None or rating < best[0]:
             best = (rating, joint, rest)  # type: ignore[assignment]
     if best is None or isinstance(best[2], Unsolved):

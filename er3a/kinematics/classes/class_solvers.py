@@ -39,6 +39,45 @@ ArmClassCode = Literal[
     "dependent",
     "unsolved",
 ]
+
+
+@dataclass(frozen=True)
+class ArmClassTraits:
+    """What is known of a class beside its solver.
+
+    Attributes
+    ----------
+    closed_form : whether its solutions come without elimination or search
+    eliminates : whether they come by elimination, where rounding may lose some
+    searched : whether a pose in doubt is searched for self-motions from many starts
+    task : which of x, y, z and the rotations about x, y, z of the tool's frame its solutions meet
+    """
+
+    closed_form: bool = False
+    eliminates: bool = False
+    searched: bool = False
+    task: tuple[int, int, int, int, int, int] = (1, 1, 1, 1, 1, 1)
+
+
+ARM_CLASSES: dict[ArmClassCode, ArmClassTraits] = {
+    "spherical_wrist": ArmClassTraits(closed_form=True),
+    "three_parallel": ArmClassTraits(closed_form=True),
+    "arm_angle": ArmClassTraits(closed_form=True),
+    "gantry": ArmClassTraits(closed_form=True, searched=True),
+    "general_six": ArmClassTraits(eliminates=True, searched=True),
+    "six_two_prismatic": ArmClassTraits(eliminates=True, searched=True),
+    "six_one_prismatic": ArmClassTraits(eliminates=True, searched=True),
+    "scara": ArmClassTraits(closed_form=True, searched=True, task=(1, 1, 1, 0, 0, 1)),
+    "redundant": ArmClassTraits(eliminates=True),
+    "free_roll": ArmClassTraits(eliminates=True, searched=True, task=(1, 1, 1, 1, 1, 0)),
+    "planar_wrist": ArmClassTraits(eliminates=True, searched=True),
+    "position": ArmClassTraits(eliminates=True, searched=True, task=(1, 1, 1, 0, 0, 0)),
+    "dependent": ArmClassTraits(),
+    "unsolved": ArmClassTraits(),
+}
+"""All classes; where a chain can be taken as one of several, the first is preferred."""
+ALL_OF_POSE = ArmClassTraits().task
+
 BranchLabel = Literal[
     "front_elbow_up_no_flip",
     "front_elbow_up_flip",

@@ -6,7 +6,6 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +15,7 @@ import typer
 from er3a.errors import Er3aError, InputError
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, given_files, print_json, print_note
+from er3a.programs.syntax import LanguageName
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -26,16 +26,6 @@ if TYPE_CHECKING:
     from er3a.programs.execution import KeepOn, Phase
 
 SHARE_OF_FOLLOWING = 0.5  # of the time; the rest is for checking what was followed
-
-
-class ProgramLanguage(StrEnum):
-    """A language that programs are written in."""
-
-    krl = "krl"
-    urscript = "urscript"
-    rpl = "rpl"
-    xpl = "xpl"
-    csv = "csv"
 
 
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
@@ -125,7 +115,7 @@ def write(
     paths: Annotated[Path, typer.Argument(callback=given_files, help="a path file")],
     *,
     robot: RobotOption,
-    language: Annotated[ProgramLanguage, typer.Option(help="the controller's language, or a table over time")],
+    language: Annotated[LanguageName, typer.Option(help="the controller's language, or a table over time")],
     output: Annotated[Path, typer.Option(help="the folder that the programs are written to")] = Path("programs"),
     only: Annotated[list[str] | None, typer.Option(help="name of a path; all if absent")] = None,
     scene: SceneFile = None,
@@ -144,7 +134,7 @@ def write(
     arm = load_robot(robot)
     refused = 0
     with shown_work(f"{paths}: each path is judged"):
-        programs = list(programs_of(paths, arm, language.value, load_scene(scene) if scene else None, only, unsafe))
+        programs = list(programs_of(paths, arm, language, load_scene(scene) if scene else None, only, unsafe))
     for made in programs:
         if made.files is None:
             refused += 1
@@ -169,7 +159,7 @@ def _write(file: Path, text: str) -> None:
 def _checked(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
     from er3a.pipeline.program_reports import CheckedFile
     from er3a.program_check.check_program import check_program as check
-    from er3a.programs.read_program import read_program
+    from er3a.programs.languages import read_program
 
     try:
         return CheckedFile(file, check(read_program(file), robot, options))

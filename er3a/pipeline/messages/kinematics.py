@@ -309,7 +309,8 @@ def _(found: AllOutsideLimits) -> str:
 
 @say.register
 def _(found: Measure) -> str:
-    return f"{RULE_NAMES[found.rule]} {as_text(found.value, '.3g')} {RULES[found.rule].unit}".removesuffix(" 1")
+    rule = word("rule", RULE_NAMES, found.rule)
+    return f"{rule} {as_text(found.value, '.3g')} {RULES[found.rule].unit}".removesuffix(" 1")
 
 
 @say.register

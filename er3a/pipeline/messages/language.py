@@ -14,9 +14,10 @@ from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 from string import Formatter
-from typing import Any
+from typing import Any, Literal, get_args
 
-LANGUAGES = ("en", "zh")
+LanguageCode = Literal["en", "zh"]
+LANGUAGES = get_args(LanguageCode)
 KEYED = "key"  # the context of texts whose key, not whose English, is their entry in a catalogue
 CATALOGUES = Path(__file__).with_name("locale")
 

@@ -29,7 +29,7 @@ from er3a.program_check.program_check_findings import (
 from er3a.programs import program_findings as text
 from er3a.programs.execution import EndKind
 from er3a.programs.instructions import Unresolved
-from er3a.programs.syntax import Language, ProgramOutcome
+from er3a.programs.syntax import ProgramOutcome
 
 LEVELS: dict[Level, str] = {
     "pass": N_("pass"),
@@ -120,13 +120,6 @@ FIGURES = {
     "instructions_caution": N_("Motion instructions with caution"),
     "instructions_failed": N_("Motion instructions that fail"),
     "least_clearance": N_("Least clearance of programs meant to pass"),
-}
-LANGUAGES: dict[Language, str] = {
-    "krl": "KRL",
-    "urscript": "URScript",
-    "rpl": "RPL",
-    "xpl": "RPL (XPL)",
-    "csv": "CSV",
 }
 
 

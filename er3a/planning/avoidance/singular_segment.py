@@ -23,10 +23,17 @@ POINTS = 501
 
 @dataclass(frozen=True, eq=False)
 class Avoidance:
-    """A strategy, carried out: its motion, and the share of the path (0..1) that is done."""
+    """A strategy, carried out.
+
+    Attributes
+    ----------
+    done : share of the path (0..1) that is done
+    crosses_by_joints : whether it comes near singular sets in joint moves alone, which they do not affect
+    """
 
     motion: Timed
     done: float = 1.0
+    crosses_by_joints: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -175,7 +175,7 @@ def detour(segment: SingularSegment) -> Avoidance | NotPossible:
         at = after
     if at < count - 1:
         parts.append(segment.along(at, count - 1))
-    return Avoidance(joined(parts))
+    return Avoidance(joined(parts), crosses_by_joints=True)
 
 
 COARSE = 201
@@ -229,7 +229,7 @@ def _changed(segment: SingularSegment, followed: Followed, index: int, leave: Re
     before = [*segment.begin(), segment.along(0, index)] if index > 0 else []
     waits = index == 0 and not segment.fixed_start
     change = [] if waits else [straight(leave, other.q[at], segment.limits)]
-    return Avoidance(joined([*before, *change, other.along(at, len(other.t) - 1)]))
+    return Avoidance(joined([*before, *change, other.along(at, len(other.t) - 1)]), crosses_by_joints=True)
 
 
 def slow(segment: SingularSegment) -> Avoidance | NotPossible:
@@ -250,7 +250,8 @@ def stop(segment: SingularSegment) -> Avoidance | NotPossible:
     if last < 1:
         return BeginsInRegion()
     motion = joined([*segment.begin(), segment.along(0, last)])
-    return Avoidance(motion, done=float(segment.followed.line.progress(segment.t[last])[0]))
+    done = float(segment.followed.line.progress(segment.t[last])[0])
+    return Avoidance(motion, done, crosses_by_joints=True)
 
 
 POINTS = 2001
@@ -387,7 +388,7 @@ def _tried(segment: SingularSegment, name: StrategyName) -> StrategyResult:
     last = line.poses(np.array(1.0))
     left = float(np.linalg.norm(T[-1, :3, 3] - last[:3, 3]))
     twisted = 2 * np.arcsin(min(1.0, float(np.linalg.norm(T[-1, :3, :3] - last[:3, :3])) / np.sqrt(8.0)))
-    if name == "stop":
+    if found.done < 1.0:
         reasons.append(PathNotFinished(found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
         reasons.append(EndsOffPath(left * 1000, float(np.degrees(twisted))))
@@ -398,6 +399,6 @@ def _tried(segment: SingularSegment, name: StrategyName) -> StrategyResult:
         reasons.append(SpeedExceeded(speed))
     if acceleration > 1 + OVER:
         reasons.append(AccelerationExceeded(acceleration))
-    keeps = name in ("stop", "detour", "branch") or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
+    keeps = found.crosses_by_joints or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
     cost = StrategyCost(motion, found.done, distance, angle, speed, acceleration, keeps)
     return StrategyResult(name, cost, tuple(reasons))

@@ -13,6 +13,7 @@ from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import MassFinding
 from er3a.dynamics.wrist import WristQuantity
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, per_joint
 from er3a.planning.timing import NoTimeLaw
@@ -332,7 +333,7 @@ class TorqueRows(Table):
     velocity: Reals = per_joint("centrifugal and Coriolis part", "N m or N")
     friction: Reals = per_joint("part against friction, as far as known", "N m or N")
     tool: Reals = per_joint("part against forces at the tool", "N m or N")
-    power_w: Reals = per_joint("power of the drive")
+    power_w: Reals = per_joint("power of the drive", heading=N_("drive power"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ from er3a.pipeline.stages.dynamics.model import (
     hardest_held,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.figures import new_figure, row_of_panels
+from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
@@ -81,7 +81,7 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
     parts.legend(fontsize=8)
     parts.set_ylabel(tr("contributions at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
-    power.set_ylabel(tr("drive power (W)"))
+    power.set_ylabel(axis_label(rows, "power_w"))
     for ax in (torque, parts, power):
         ax.set_xlabel(tr("time (s)"))
     most = max(PARTS, key=lambda part: getattr(load, part))

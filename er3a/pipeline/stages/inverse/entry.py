@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
@@ -12,8 +12,7 @@ from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
-
-RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
+from er3a.selection.rule_names import RuleName
 
 
 class InverseSettings(StrictModel):

@@ -14,7 +14,7 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
-from er3a.selection.select import RuleName
+from er3a.selection.rule_names import RuleName
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,8 @@ from er3a.program_check.motion_checks import AssumedRates
 from er3a.program_check.program_check_findings import CheckFinding, Level, worst_of
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
+from er3a.programs.languages import read_program
 from er3a.programs.program_findings import NameTwice, NotUnderstood
-from er3a.programs.read_program import read_program
 from er3a.programs.syntax import ProgramOutcome
 from er3a.robots.robot import Robot
 

@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 
 from er3a.numerics.arrays import Integers
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.programs import LANGUAGES, cycle_text, level_word
+from er3a.pipeline.messages.programs import cycle_text, level_word
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
@@ -35,6 +35,7 @@ from er3a.pipeline.viewing.recording import (
 )
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.program_check.program_check_findings import Level
+from er3a.programs.languages import LANGUAGES
 from er3a.robots.robot import Robot
 
 STAGE = "programs"
@@ -147,7 +148,7 @@ def _stretches(rows: ProgramMotion) -> list[tuple[int, int]]:
 
 def _note(robot: Robot, results: ProgramsResults, starts: list[tuple[ProgramSummary, float]]) -> str:
     rows = [
-        f"| {start:.0f} s | {program.name} | {LANGUAGES[program.language]} | {outcome_word(program.outcome)} |"
+        f"| {start:.0f} s | {program.name} | {LANGUAGES[program.language].title} | {outcome_word(program.outcome)} |"
         for program, start in starts
     ]
     return "\n".join(

@@ -11,7 +11,7 @@ from markupsafe import Markup, escape
 
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.programs import FIGURES, LANGUAGES, cycle_text, level_word, remedies, remedy
+from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, remedies, remedy
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style, stretch
 from er3a.pipeline.results import Stored
@@ -27,6 +27,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import head_of, render, run_command
 from er3a.program_check.program_check_findings import RANKS, Level, worst_of
+from er3a.programs.languages import LANGUAGES
 from er3a.robots.robot import Robot
 
 MOST_LINES = 400  # of a listing that the page shows
@@ -103,7 +104,7 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     motion = results.motion.take(results.motion.program == program.name)
     lines = _listing(program.name, text, rows, motion, found)
     status = STATUSES[program.outcome]
-    told = LANGUAGES[program.language], cycle_text(program), _worst(program)
+    told = LANGUAGES[program.language].title, cycle_text(program), _worst(program)
     return ProgramSection(program, status, *told, lines, elsewhere)
 
 

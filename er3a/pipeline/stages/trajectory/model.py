@@ -14,6 +14,7 @@ from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals
+from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
@@ -323,9 +324,9 @@ class MotionRows(Table):
 
     path: Texts = column("name of the path")
     t_s: Reals = column("time since the motion's start")
-    q_deg: Reals = per_joint("joint angle")
-    q_deg_s: Reals = per_joint("joint velocity")
-    q_deg_s2: Reals = per_joint("joint acceleration")
+    q_deg: Reals = per_joint("joint angle", heading=N_("joint angle"))
+    q_deg_s: Reals = per_joint("joint velocity", heading=N_("velocity"))
+    q_deg_s2: Reals = per_joint("joint acceleration", heading=N_("acceleration"))
     xyz_mm: Reals = vector("{}_mm", "tool point in the base frame")
     speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
     condition_number: Reals = column("condition number of the scaled Jacobian")

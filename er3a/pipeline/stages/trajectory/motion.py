@@ -34,7 +34,7 @@ from er3a.planning.timing import JointLimits, joint_limits, standing, straight
 from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
 from er3a.program_check.check_program import CheckOptions, ProgramPart, check_program, parts_of
-from er3a.programs.read_program import read_program
+from er3a.programs.languages import read_program
 from er3a.robots.robot import Robot
 
 

@@ -21,7 +21,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import event_word, type_word
 from er3a.pipeline.stages.trajectory.model import (
@@ -34,7 +34,7 @@ from er3a.pipeline.stages.trajectory.model import (
     Stretch,
     TrajectoryResults,
 )
-from er3a.pipeline.viewing.figures import new_figure, svg_data_uri, turning_html
+from er3a.pipeline.viewing.figures import axis_label, new_figure, svg_data_uri, turning_html
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import (
@@ -200,16 +200,12 @@ def _clear(ax: Axes) -> None:
 
 
 def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: PathChecks) -> None:
-    curves = (
-        (rows.q_deg, N_("joint angle (deg)")),
-        (rows.q_deg_s, N_("velocity (deg/s)")),
-        (rows.q_deg_s2, N_("acceleration (deg/s²)")),
-    )
-    for ax, (values, label) in zip(axes, curves):
+    for ax, name in zip(axes, ("q_deg", "q_deg_s", "q_deg_s2")):
+        values = getattr(rows, name)
         for j in range(values.shape[1]):
             ax.plot(rows.t_s, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j])
-        ax.set_ylabel(tr(label), fontsize=FONT)
-        if values is rows.q_deg:
+        ax.set_ylabel(axis_label(rows, name), fontsize=FONT)
+        if name == "q_deg":
             _limits(ax, robot, values)
         elif not path.joint_speed_bounded:
             _cut(ax, values)

@@ -45,7 +45,7 @@ from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, render, run_command, text_address
 from er3a.planning.path_verdicts import PathVerdict
-from er3a.programs.writing import WORDS, not_written
+from er3a.programs.languages import titles_unwritten
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -128,7 +128,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         robot=robot,
         robot_pages=study.pages(stored.robot),
         sections=sections,
-        unwritten=[WORDS[each] for each in study.section(TrajectorySettings).programs if not_written(each, robot)],
+        unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results),
         assumed=assumed,
         turning=turning_figure(robot, results),

@@ -15,10 +15,10 @@ from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
+from er3a.programs.languages import not_written, write_program
 from er3a.programs.program_findings import WriteFinding, WrittenUnsafe
-from er3a.programs.syntax import Language
-from er3a.programs.write_program import write_program
-from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, not_written, program_name
+from er3a.programs.syntax import LanguageName
+from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown
 from er3a.robots.robot import Robot
 
@@ -28,7 +28,7 @@ STRAIGHT = 1e-4  # rad or m: by how much joints that move straight between writt
 
 
 def written(
-    robot: Robot, motion: Motion, verdict: PathVerdict, language: Language
+    robot: Robot, motion: Motion, verdict: PathVerdict, language: LanguageName
 ) -> tuple[Mapping[str, str], tuple[WriteFinding, ...]]:
     """The files of a path by suffix, and what is to be said of them.
 
@@ -73,7 +73,7 @@ def program_files(
     robot: Robot,
     motion: Motion,
     verdict: PathVerdict,
-    languages: Sequence[Language],
+    languages: Sequence[LanguageName],
     write_unsafe: bool,
     repaired: AvoidanceRows,
 ) -> ProgramFiles:
@@ -87,7 +87,7 @@ def program_files(
         files, _ = written(robot, motion, verdict, language)
         rows += [(language, name + suffix, text) for suffix, text in files.items()]
     for language in languages if len(repaired) else ():
-        if language == "csv" or not not_written(language, robot):
+        if not not_written(language, robot):
             files = _repair(robot, motion, repaired, language)
             rows += [(language, repair_name(motion.entry.name) + suffix, text) for suffix, text in files.items()]
     return ProgramFiles(
@@ -98,7 +98,7 @@ def program_files(
     )
 
 
-def _repair(robot: Robot, motion: Motion, rows: AvoidanceRows, language: Language) -> Mapping[str, str]:
+def _repair(robot: Robot, motion: Motion, rows: AvoidanceRows, language: LanguageName) -> Mapping[str, str]:
     """The motion that repairs a path by suffix: all rows with their times as a table, else as joint moves."""
     told = f"path {motion.entry.name} for {ascii_text(robot.title)}, repaired: {rows.strategy[0]}"
     q = meant(robot, rows.q_deg)

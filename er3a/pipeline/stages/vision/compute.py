@@ -71,9 +71,9 @@ from er3a.programs.instructions import (
     Rate,
     Remark,
 )
-from er3a.programs.syntax import Language
-from er3a.programs.write_program import write_program
-from er3a.programs.writing import HEAD, WriteOptions, ascii_text, not_written, program_name
+from er3a.programs.languages import not_written, write_program
+from er3a.programs.syntax import LanguageName
+from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
 from er3a.robots.joint_limits import joint_columns, shown
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
@@ -156,7 +156,7 @@ CSV_POINTS = 41
 
 
 def grasp_programs(
-    robot: Robot, name: str, home: Reals, chosen: ChosenGrasp, languages: Sequence[Language]
+    robot: Robot, name: str, home: Reals, chosen: ChosenGrasp, languages: Sequence[LanguageName]
 ) -> GraspPrograms:
     """A grasp in each language that has this arm's joints."""
     own = program_name(f"grasp_{name}", LONGEST_NAME)

@@ -36,7 +36,7 @@ from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command, text_address
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
-from er3a.programs.writing import WORDS, not_written
+from er3a.programs.languages import titles_unwritten
 from er3a.vision.table_corrections import NoCorrections
 
 LEAST_RANGE = 0.02  # of the greatest value, by which a map's colours go beyond its values
@@ -217,7 +217,7 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         overview=[_overview(each) for each in summary.objects],
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
         programs=_programs(results.programs),
-        unwritten=[WORDS[each] for each in study.section(TrajectorySettings).programs if not_written(each, robot)],
+        unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
         player=player(robot, _motions(results), load_scene(scene) if scene else None),

@@ -1,0 +1,179 @@
+"""The languages of robot programs, and programs read and written in them: one record for each language.
+
+:func:`read_program` tells a file's language and reads it; :func:`write_program` writes a sequence;
+:func:`er3a.programs.machine.execute` runs what was read, by the language's dialect.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from er3a.errors import InputError
+from er3a.programs.csv_program import read_csv_program
+from er3a.programs.evaluation import MOST_ROBOT_AXES, Dialect
+from er3a.programs.instructions import ArmMotion, JointTarget, Listing
+from er3a.programs.krl_dialect import KrlDialect
+from er3a.programs.krl_reader import read_krl
+from er3a.programs.krl_writer import KrlWriter
+from er3a.programs.lexing import ProgramText, read_program_text
+from er3a.programs.program_files import POINTS
+from er3a.programs.program_findings import NothingMoves
+from er3a.programs.rpl_dialect import RplDialect
+from er3a.programs.rpl_reader import read_rpl
+from er3a.programs.rpl_writer import RplWriter, XplWriter
+from er3a.programs.syntax import Fixed, LanguageName, Move, Program
+from er3a.programs.urscript_dialect import UrScriptDialect
+from er3a.programs.urscript_reader import read_urscript
+from er3a.programs.urscript_writer import UrScriptWriter
+from er3a.programs.writing import WriteOptions, Writer, WrittenProgram
+from er3a.programs.xpl_reader import read_xpl
+from er3a.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language of robot programs.
+
+    Attributes
+    ----------
+    title : what it is called
+    suffixes : of its files, the usual one first, in small letters
+    sign : what texts of the language have; None where the opening alone tells
+    opening : with what all its texts begin, and those of no other language
+    dialect : how its expressions, motions and functions are meant when a program runs
+    writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
+    joints : how many joint angles a target can have; None for any number, of joints that slide too
+    """
+
+    title: str
+    suffixes: tuple[str, ...]
+    sign: re.Pattern[str] | None
+    reader: Callable[[ProgramText], Program]
+    dialect: Callable[[], Dialect]
+    writer: Callable[[Listing, WriteOptions], Writer] | None
+    joints: range | None
+    opening: str = ""
+
+
+SIX_ANGLES = range(6, 7)
+ROBOT_AXES = range(1, MOST_ROBOT_AXES + 1)  # A1 to A6 of KRL; E1 to E6 are axes beside the arm
+KRL_SIGN = r"(?im)^\s*(?:&ACCESS|(?:GLOBAL\s+)?DEF(?:FCT)?\s+[\w$\[\]\s]*\([^)]*\)\s*(?:;.*)?$|(?:S?PTP|S?LIN)\s+[{X])"
+URSCRIPT_SIGN = r"(?m)^\s*(?:def\s+\w+\(.*\)\s*:|move[jlpc]\(|set_tcp\()"
+RPL_SIGN = r"(?m)\bM(?:JOINT|LIN)\s*\(|:=|^\s*END_\w+\s*;"
+CSV_SIGN = r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*,"
+LANGUAGES: dict[LanguageName, Language] = {
+    "krl": Language("KRL", (".src", ".sub"), re.compile(KRL_SIGN), read_krl, KrlDialect, KrlWriter, ROBOT_AXES),
+    "urscript": Language(
+        title="URScript",
+        suffixes=(".script", ".urscript"),
+        sign=re.compile(URSCRIPT_SIGN),
+        reader=read_urscript,
+        dialect=UrScriptDialect,
+        writer=UrScriptWriter,
+        joints=SIX_ANGLES,
+    ),
+    "rpl": Language("RPL", (".pgm",), re.compile(RPL_SIGN), read_rpl, RplDialect, RplWriter, SIX_ANGLES),
+    "xpl": Language("XPL", (".xpl",), None, read_xpl, RplDialect, XplWriter, SIX_ANGLES, opening="<"),
+    "csv": Language("CSV", (".csv",), re.compile(CSV_SIGN), read_csv_program, RplDialect, None, None),
+}
+"""Languages by name, in the order in which their signs are looked for."""
+SUFFIXES: dict[str, LanguageName] = {suffix: name for name, each in LANGUAGES.items() for suffix in each.suffixes}
+KNOWN = ", ".join(f"{each.title} ({each.suffixes[0]})" for each in LANGUAGES.values())
+WITHOUT_JOINTS = "Write a table (csv), or a language that has these joints"
+
+
+def read_program(path: str | Path) -> Program:
+    """Read a robot program: KUKA KRL, URScript, EFORT RPL as text or XML, or a CSV table of joints.
+
+    Raises
+    ------
+    InputError
+        for a file that is none of these, or whose blocks, texts or comments have no end
+    """
+    path = Path(path)
+    owner = next((program for program, points in POINTS.items() if points == path.suffix.lower()), None)
+    if owner is not None:
+        raise InputError(path, None, "holds the points of a program, not the program", f"Give its {owner} file")
+    source = read_program_text(path)
+    program = LANGUAGES[language_of(source)].reader(source)
+    if not _moves(program) and not any(isinstance(each, NothingMoves) for each in program.findings):
+        program = replace(program, findings=(*program.findings, NothingMoves()))
+    return program
+
+
+def language_of(source: ProgramText) -> LanguageName:
+    """The language of a text by what it holds; where that decides nothing, by the name of its file.
+
+    Raises
+    ------
+    InputError
+        if neither tells
+    """
+    if not source.text.strip():
+        raise InputError(source.path, None, "is empty", f"Give a program in {KNOWN}")
+    text, named = source.text.lstrip(), SUFFIXES.get(source.path.suffix.lower())
+    opened = next((name for name, each in LANGUAGES.items() if each.opening and text.startswith(each.opening)), None)
+    if opened is not None:
+        return opened
+    shown = [name for name, each in LANGUAGES.items() if each.sign and each.sign.search(source.text)]
+    if named is not None and (named in shown or not shown or LANGUAGES[named].sign is None):
+        return named
+    if not shown:
+        raise InputError(source.path, None, "is no program that is known", f"Give one in {KNOWN}")
+    return shown[0]
+
+
+def _moves(program: Program) -> bool:
+    return any(
+        isinstance(each, Move) or (isinstance(each, Fixed) and isinstance(each.instruction, ArmMotion))
+        for each in program.operations()
+    )
+
+
+def write_program(listing: Listing, language: LanguageName, options: WriteOptions | None = None) -> WrittenProgram:
+    """A sequence as the files of a language; tables over time are written by
+    :func:`er3a.programs.csv_program.write_csv`.
+
+    Raises
+    ------
+    ValueError
+        for a language that has no writer
+    InputError
+        for an arm that the language has no joint targets for
+    """
+    writer = LANGUAGES[language].writer if language in LANGUAGES else None
+    if writer is None:
+        known = ", ".join(name for name, each in LANGUAGES.items() if each.writer)
+        raise ValueError(f"no writer for {language!r}; known: {known}")
+    options = options or WriteOptions()
+    counts = {len(each.target.joints) for each in listing.motions if isinstance(each.target, JointTarget)}
+    reasons = [not_written(language, options.robot)] if options.robot is not None else []
+    for reason in (*reasons, *(_other_count(LANGUAGES[language], count) for count in sorted(counts))):
+        if reason:
+            raise InputError(None, None, reason, WITHOUT_JOINTS)
+    return writer(listing, options).write()
+
+
+def not_written(language: LanguageName, robot: Robot) -> str:
+    """Why a language has no joint targets for an arm; empty if it has. A table holds any joints."""
+    if LANGUAGES[language].joints is not None and robot.slides.any():
+        slide = int(robot.slides.argmax()) + 1
+        return f"joint {slide} of this arm slides, and joint targets are read and written as angles"
+    return _other_count(LANGUAGES[language], robot.joints)
+
+
+def titles_unwritten(languages: Iterable[LanguageName], robot: Robot) -> list[str]:
+    """Titles of those languages that have no joint targets for an arm."""
+    return [LANGUAGES[each].title for each in languages if not_written(each, robot)]
+
+
+def _other_count(language: Language, joints: int) -> str:
+    """Why a language has no joint targets of so many angles; empty if it has."""
+    known = language.joints
+    if known is None or joints in known:
+        return ""
+    has = f"{known[0]} to {known[-1]}" if len(known) > 1 else str(known[0])
+    return f"{language.title} gives an arm {has} joint angles, and this arm has {joints}"

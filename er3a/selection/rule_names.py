@@ -1,0 +1,7 @@
+"""The names of the rules that rank solutions, apart from what they measure, for settings and results."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+RuleName = Literal["nearest", "weighted", "time", "manipulability", "limits", "clearance"]
