@@ -14,7 +14,8 @@ harmless:
   so that an arm that folds onto itself is seen.
   A default shape that slides in a thicker one is joined to it likewise: of the guide only what lies along the sliding
   axis is left out, and of what slides nothing. Of links with several bodies those that lie beside two that a joint
-  holds are joined too, if what is left without that joint's region comes apart;
+  holds are joined too, if what is left without that joint's region comes apart; and so are all bodies of two links
+  that overlap always only as a whole;
 - *overlaps*: they overlap in all joint vectors drawn, none in which they don't was found in the boxes, and no joint
   explains it. No arm is built like that, so the shapes are wrong: what overlaps is left out, and has to be named
   wherever it is not examined;
@@ -239,7 +240,7 @@ def matrix_of(
         if rule:
             found = [JudgedPair("allowed")] if rule.rule == "allow" else [JudgedPair("watched", tuple(bodies))]
         else:
-            found = judged_pairs(robot, bodies, boxes)
+            found = _together(robot, judged_pairs(robot, bodies, boxes), boxes)
         rows.append(_row(*names, found, rule.reason if rule else ""))
         watched += [(pair, each.state == "joined") for each in found for pair in each.bodies]
     return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
@@ -323,6 +324,41 @@ def _beside(
                 joined = _joined(robot, pair, farthest[k], Held(other.hub, found[k].boxes), boxes, other.left_out)
                 found[k] = joined if joined.state == "joined" else found[k]
     return found
+
+
+def _together(robot: Robot, found: list[JudgedPair], boxes: int) -> list[JudgedPair]:
+    """Judgements of all bodies of two links, where no two bodies overlap always but the links do.
+
+    Pieces of a mesh, grown by their margins, fill the gap at a joint so. The region around the joint that holds two of
+    the bodies is left out of them all; where none does, the shapes are wrong.
+    """
+    watched = [pair for each in found for pair in each.bodies]
+    if len(watched) < 2 or any(each.state == "overlaps" for each in found) or not _always_meet(robot, watched):
+        return found
+    harmless, looked = [each for each in found if each.state == "never"], sum(each.boxes for each in found)
+    q = quasi_random_points(robot.lower, robot.upper, TRIED)[0]
+    joint = max((each for each in found if each.hub is not None), key=lambda each: each.left_out, default=None)
+    radius = joint.left_out if joint else np.inf
+    for _ in range(GROWTHS if joint else 0):
+        rest = []
+        for pair in watched:
+            first, second = map(trimmed, pair, _centres(robot, pair, q, joint.hub if joint else None), (radius, radius))
+            rest += list(product(first, second))
+        if not rest or not _always_meet(robot, rest):
+            judged = judged_pairs(robot, rest, boxes) if rest else []
+            bodies = tuple(pair for each in judged for pair in each.bodies)
+            witness = next((each.witness for each in judged if each.witness is not None), None)
+            looked += sum(each.boxes for each in judged)
+            return [*harmless, JudgedPair("joined", bodies, witness, left_out=radius, boxes=looked)]
+        radius *= GROWTH
+    return [*harmless, JudgedPair("overlaps", witness=q, boxes=looked)]
+
+
+def _always_meet(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> bool:
+    """Whether in each joint vector drawn some pair overlaps."""
+    flat = [body for pair in pairs for body in pair]
+    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
+    return bool(_sampled(robot, layout)[2].any(axis=1).all())
 
 
 def _neighbours(robot: Robot, pair: tuple[Body, Body]) -> bool:

@@ -23,6 +23,7 @@ from pydantic import Field, model_validator
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Name, Text
+from er3a.files.shipped import given_file
 from er3a.files.target_file import FORMS, POSITION, Orientation
 from er3a.files.units import JointsDeg, PositionMm, Triple, check_degrees, check_millimetres, joint_rates, joint_values
 from er3a.files.yaml_file import StrictModel, load
@@ -86,7 +87,7 @@ def read_path_table(path: str | Path) -> PathTable:
         naming row and column: no known columns, too few points, NaN, times that do not rise, wrong units, an
         orientation that is none
     """
-    path = Path(path)
+    path = given_file(Path(path))
     header = set(read_header(path))
     forms = [form for form, columns in FORMS.items() if header & set(columns)]
     own = _joint_columns(path, header)

@@ -46,6 +46,7 @@ from er3a.robots.robot import ConvexPiece, Envelope, Robot
 MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")
 SNAP_RAD = 1e-4
+ROUNDED_RAD = 2e-3  # an angle so near to a right one may be that, rounded: 1.57, 1.571, 3.14
 MOST_BYTES = 20_000_000
 ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rather than an arm
 FINGER_JOINTS = 4
@@ -341,6 +342,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     notes: list[str] = []
     if snap:
         rpy = _snapped(rpy, where, notes)
+    notes += _perhaps_rounded(rpy, where)
     if (np.abs(xyz) > FAR_APART_M).any():
         notes.append(f"{where} stands {np.abs(xyz).max():g} m from the one before it; a URDF's lengths are in metres")
     if (np.abs(rpy) > WHOLE_TURN).any():
@@ -395,9 +397,21 @@ def _numbers(
 def _snapped(rpy: Reals, where: str, notes: list[str]) -> Reals:
     right = np.round(rpy / (math.pi / 2)) * (math.pi / 2)
     near = (np.abs(rpy - right) <= SNAP_RAD) & (rpy != right)
-    for given, taken in zip(rpy[near], right[near]):
-        notes.append(f"{where}: angle {given:.10g} rad taken as {np.degrees(taken):g} deg")
+    for given, taken in dict(zip(rpy[near].tolist(), right[near].tolist())).items():
+        notes.append(f"{where}: angle {given:.10g} rad taken as {math.degrees(taken):g} deg")
     return np.where(near, right, rpy)
+
+
+def _perhaps_rounded(rpy: Reals, where: str) -> list[str]:
+    """Of angles that are kept but may be right ones, rounded: a note each."""
+    right = np.round(rpy / (math.pi / 2)) * (math.pi / 2)
+    off = np.abs(rpy - right)
+    near = (off > SNAP_RAD) & (off <= ROUNDED_RAD) & (right != 0)
+    return [
+        f"{where}: angle {given:.10g} rad is kept, {math.degrees(away):.2g} deg from a right angle; if one is meant, "
+        f"write {meant:.10g}: axes that meet or are parallel only nearly leave an arm without a closed form"
+        for given, meant, away in sorted(set(zip(rpy[near].tolist(), right[near].tolist(), off[near].tolist())))
+    ]
 
 
 class LinkPlaces(Protocol):

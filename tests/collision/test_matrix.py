@@ -270,6 +270,31 @@ def test_neighbours_with_little_play_are_joined_though_they_are_apart_in_some_po
         assert rows_of(robot)["base", "link_1"].state == state
 
 
+def test_links_that_overlap_always_only_as_a_whole_are_joined_or_in_error():
+    """A bar turns in a square frame: it is in one of the four sides always, in none of them always."""
+    sides = [
+        box_around(0, low, high)
+        for low, high in (
+            ((0.04, -0.06, 0.015), (0.06, 0.06, 0.04)),
+            ((-0.06, -0.06, 0.015), (-0.04, 0.06, 0.04)),
+            ((-0.06, 0.04, 0.015), (0.06, 0.06, 0.04)),
+            ((-0.06, -0.06, 0.015), (0.06, -0.04, 0.04)),
+        )
+    ]
+    bar = box_around(1, (0.0, -0.005, 0.02), (0.07, 0.005, 0.03))
+    bearing = (
+        box_around(0, (-0.02, -0.02, -0.02), (0.02, 0.02, 0.005)),
+        box_around(1, (-0.01, -0.01, 0), (0.01, 0.01, 0.03)),
+    )
+    arm = made_of([("R", 0, 0, 0, -180, 180)])
+    for more, state in ((bearing, "joined"), ((), "overlaps")):
+        robot = arm.replace(hulls=(*sides, bar, *more))
+        assert rows_of(robot)["base", "link_1"].state == state
+        assert Bodies(robot, None).unexamined == (() if state == "joined" else (LinkPair(0, 1),))
+    opened = arm.replace(hulls=(*sides[:3], bar, *bearing))
+    assert rows_of(opened)["base", "link_1"].state == "meets"
+
+
 def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes():
     """A base in the wrong unit, as a ball of 3 m: the rest of the arm is checked as before."""
     robot = load_robot("er3_600").replace(pair_rules=())

@@ -381,6 +381,13 @@ def test_a_mesh_that_can_t_be_read_is_a_note(xacro, monkeypatch, mesh, told):
     assert [note for note in arm.notes if re.search(told, note)]
 
 
+def test_a_urdf_without_shapes_is_said_to_have_guessed_ones(tmp_path):
+    for shapes, told in ((load_robot("er3a_c60").envelopes, False), ((), True)):
+        file = tmp_path / "arm.urdf"
+        file.write_text(export_urdf(load_robot("er3a_c60").replace(envelopes=shapes)), encoding="utf-8")
+        assert any("capsules are guessed" in note for note in arm_of(file, None, None).notes) == told
+
+
 @pytest.mark.long
 def test_meshes_are_split_where_that_is_asked_for(xacro):
     whole, parts = (arm_of(xacro, None, None, xacro=("mesh:=ring.stl",), split=split).robot for split in (False, True))

@@ -84,6 +84,16 @@ def test_import_agrees_with_pinocchio_and_survives_the_robot_file(random, tmp_pa
     np.testing.assert_allclose(forward(imported.robot, q), pinocchio_poses(path, q, "l6"), atol=1e-9)
 
 
+@pytest.mark.parametrize("angle", ["1.571", "1.57", "-1.571"])
+def test_an_angle_that_may_be_a_rounded_right_one_is_kept_and_named(tmp_path, angle):
+    text = urdf().replace('rpy="1.5708 -1.5708 0"', f'rpy="{angle} 0 {angle}"')
+    notes = import_urdf(written(tmp_path, text), snap=True).notes
+    (named,) = (note for note in notes if "is kept" in note)
+    assert f"joint j2: angle {angle} rad is kept, 0.0" in named
+    assert f"write {np.copysign(np.pi / 2, float(angle)):.10g}:" in named
+    assert not any("joint j2" in note and "taken as" in note for note in notes)
+
+
 def test_snapping_gives_the_real_arm_and_says_what_it_changed(tmp_path):
     imported = import_urdf(written(tmp_path, urdf()), snap=True)
     real, got = load_robot("er3a_c60"), imported.robot

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import jinja2
 
@@ -41,13 +41,13 @@ class Arm:
     ----------
     text : of the robot file
     notes : what was assumed about it, in words
-    of_hulls : whether links have the hulls of meshes as shapes, which pieces could take the place of
+    meshes : what links have as shapes of their meshes, if any
     """
 
     robot: Robot
     text: str
     notes: tuple[str, ...] = ()
-    of_hulls: bool = False
+    meshes: Literal["hulls", "pieces"] | None = None
 
 
 def arm_of(
@@ -102,7 +102,11 @@ def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None], split
     robot = imported.robot.replace(name=name)
     content = robot_file(robot, path)
     misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"
-    return Arm(robot_of(content), _text(content), (*imported.notes, misfit), bool(robot.hulls) and not split)
+    notes = [*imported.notes, misfit]
+    if not (robot.hulls or robot.envelopes):
+        notes.append("the URDF gives no collision shapes; capsules are guessed from the table's axes")
+    meshes: Literal["hulls", "pieces"] = "pieces" if split else "hulls"
+    return Arm(robot_of(content), _text(content), tuple(notes), meshes if robot.hulls else None)
 
 
 def _known(robot: str, name: str | None) -> Arm:
@@ -241,10 +245,15 @@ def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
 def _remedy(arm: Arm) -> str:
     """What to do about shapes that overlap always."""
     text = f"Correct the shapes, or allow the contact, in data/robots/{arm.robot.name}.yaml."
-    if arm.of_hulls:
+    if arm.meshes == "hulls":
         text += (
             " The links have the hulls of their meshes as shapes, which fill what is bent or hollow: --split takes "
             "convex pieces instead (minutes for fine meshes)."
+        )
+    if arm.meshes == "pieces":
+        text += (
+            " The links' meshes are split into convex pieces, taken larger by margins (see the notes) that may fill "
+            "the gap at a joint: without --split the hulls are taken, and what overlaps around a joint is left out."
         )
     return text
 
