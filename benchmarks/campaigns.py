@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stdout
 from importlib import import_module
 
 from testing.evidence import CAMPAIGNS, PAGES, SHARE, evidence, is_of_this_code, made_from, page_of
@@ -71,7 +72,9 @@ def main(words: Sequence[str]) -> int:
         print(f"error: no campaign '{unknown[0]}'; known: {', '.join(CAMPAIGNS)}", file=sys.stderr)
         return 2
     if asked.table:
-        print(import_module(f"benchmarks.campaign_{asked.table}").table())
+        with redirect_stdout(sys.stderr):  # rows as they come are progress; the page holds them once
+            text = import_module(f"benchmarks.campaign_{asked.table}").table()
+        print(text)
         return 0
     kept = {each.campaign for each in evidence() if is_of_this_code(each)} if asked.share == 1 else set()
     names = [name for name in asked.names or CAMPAIGNS if asked.again or name not in kept]
