@@ -3,24 +3,26 @@
 Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, where they are known, ``offset_deg`` and
 ``direction`` (theta = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. Where a joint slides,
 ``type`` says "prismatic" (else "revolute") and ``theta_deg`` where its theta stands; its limits and speed stand in
-``lower_mm``, ``upper_mm``, ``speed_mm_s``. A cell that does not apply to a joint is left empty.
+``lower_mm``, ``upper_mm``, ``speed_mm_s``. A cell that does not apply to a joint is left empty. A column ``convention``
+(standard or modified, the same in all rows) counts more than what the reader is asked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import RobotFile
 from er3a.files.yaml_file import parse
-from er3a.robots.robot import MOST_JOINTS, Grade
+from er3a.robots.robot import CONVENTIONS, MOST_JOINTS, Convention, Grade
 
 _NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
 NEEDED = {"joint": CsvColumn(int), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
 OPTIONAL = {
+    "convention": CsvColumn(str, choices=CONVENTIONS),
     "type": CsvColumn(str, choices=("revolute", "prismatic")),
     "theta_deg": _OF_KIND,
     "offset_deg": _OF_KIND,
@@ -37,7 +39,7 @@ ASSUMED_SLIDE_MM = 1000.0
 
 
 def read_dh_table(
-    path: str | Path, name: str, convention: Literal["standard", "modified"] = "standard"
+    path: str | Path, name: str, convention: Convention = "standard"
 ) -> tuple[RobotFile, tuple[str, ...]]:
     """A robot file made of a D-H table.
 
@@ -59,6 +61,9 @@ def read_dh_table(
     header = read_header(path)
     rows = read_csv(path, NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in header})
     given = set(header)
+    if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
+        raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
+    convention = next(iter(stated), convention)
     for unit in ("deg", "mm"):
         if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
             missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
@@ -70,7 +75,9 @@ def read_dh_table(
     for row in rows:
         _check_kind(path, row, given)
     kinds = {_unit(row) for row in rows}
-    notes = [] if convention == "modified" else ["the table was read as standard D-H; --modified if it is Craig's"]
+    notes = []
+    if convention == "standard" and "convention" not in given:
+        notes.append("the table was read as standard D-H; --modified if it is Craig's")
     if not given & {"offset_deg", "direction"}:
         notes.append("no column offset_deg or direction: joint angles are taken to be the table's own")
     if "deg" in kinds and "lower_deg" not in given:
