@@ -311,8 +311,7 @@ def _joint_zeros(robot: Robot, found: Match) -> Reals:
     rows = found.zeros * robot.direction
     if robot.coupling is None:
         return rows
-    joints: Reals = np.linalg.lstsq(robot.coupling, rows, rcond=None)[0]
-    return joints
+    return np.asarray(np.linalg.lstsq(robot.coupling, rows, rcond=None)[0])
 
 
 def _known(robot: Robot, group: str) -> bool:
@@ -362,7 +361,7 @@ def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
 
 
 def _distances(robot_a: Robot, robot_b: Robot, arms: tuple[Mechanism, Mechanism], found: Match) -> tuple[float, float]:
-    """Largest distances (m) of the flanges that were found, as printed and aligned: sampled, then climbed from there."""
+    """Largest distances (m) of the flanges that were found, as printed and aligned: sampled, then climbed."""
     a, b = arms
     own, other = (
         np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling for robot in (robot_a, robot_b)
@@ -372,13 +371,13 @@ def _distances(robot_a: Robot, robot_b: Robot, arms: tuple[Mechanism, Mechanism]
 
     def printed(q: Reals) -> Reals:
         gaps = poses(a, q @ own.T)[:, :3, 3] - poses(b, q @ other.T)[:, :3, 3]
-        return np.linalg.norm(gaps, axis=1)
+        return np.asarray(np.linalg.norm(gaps, axis=1))
 
     def aligned(q: Reals) -> Reals:
         u = q @ own.T
         there = signs * (u - found.zeros * a.direction)
         gaps = poses(a, u)[:, :3, 3] - (found.base @ poses(b, there) @ behind)[:, :3, 3]
-        return np.linalg.norm(gaps, axis=1)
+        return np.asarray(np.linalg.norm(gaps, axis=1))
 
     return _largest(printed, robot_a), _largest(aligned, robot_a)
 
@@ -494,27 +493,22 @@ def _corrected(
     if not is_identity(found.base, tolerances):
         before = np.linalg.inv(robot_a.base) @ np.linalg.inv(found.base) @ robot_a.base
         if robot_a.convention == "standard" and _about_z(before):
-            _put_on_axis(columns, robot_a, first, before)
+            _put_on_axis(columns, first, before)
         else:
             base = _rounded_pose(np.linalg.inv(found.base) @ robot_a.base)
     if not is_identity(found.flange, tolerances):
         behind = robot_a.flange @ found.flange @ np.linalg.inv(robot_a.flange)
-        plain = robot_a.convention == "modified" or not (columns["a"][last] or np.sin(columns["alpha"][last]))
-        if plain and _about_z(behind) and last > 0:
-            _put_on_axis(
-                columns,
-                robot_a,
-                last,
-                behind
-                if np.cos(columns["alpha"][last]) > 0 or robot_a.convention == "modified"
-                else np.linalg.inv(behind),
-            )
+        folded = robot_a.convention == "standard" and bool(columns["a"][last] or np.sin(columns["alpha"][last]))
+        if not folded and _about_z(behind) and last > 0:
+            turned_over = robot_a.convention == "standard" and np.cos(columns["alpha"][last]) < 0
+            _put_on_axis(columns, last, np.linalg.inv(behind) if turned_over else behind)
         else:
             flange = _rounded_pose(robot_a.flange @ found.flange)
-    ranges: dict[str, Reals] = {}
+    # Mended zeros and directions make A's joint values those of B.
+    ends = np.sort(np.stack([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)]), axis=0)
+    lower, upper, continuous = ends[0], ends[1], robot_a.continuous
     if limits.same is False or (_known(robot_b, "limits") and not _known(robot_a, "limits")):
-        lower, upper = _limits_there(robot_b, signs, joint_zeros)
-        ranges |= {"lower": lower, "upper": upper, "continuous": robot_b.continuous}
+        lower, upper, continuous = robot_b.lower, robot_b.upper, robot_b.continuous
     speed = np.where(np.isfinite(robot_b.speed), robot_b.speed, robot_a.speed)
     text = f"{robot_a.name}, corrected by {robot_b.name}"
     sources = {group: Source(text, source.grade) for group, source in robot_a.sources.items()}
@@ -528,9 +522,9 @@ def _corrected(
         name=robot_a.name,
         title=f"{robot_a.title}, corrected",
         convention=robot_a.convention,
-        lower=ranges.get("lower", robot_a.lower),
-        upper=ranges.get("upper", robot_a.upper),
-        continuous=ranges.get("continuous", robot_a.continuous),
+        lower=lower,
+        upper=upper,
+        continuous=continuous,
         speed=speed,
         base=base,
         flange=flange,
@@ -538,7 +532,12 @@ def _corrected(
         coupling=robot_a.coupling,
         zero_pose=robot_b.zero_pose,
         sources=sources,
-        **columns,
+        a=columns["a"],
+        alpha=columns["alpha"],
+        beta=columns["beta"],
+        d=columns["d"],
+        offset=columns["offset"],
+        direction=columns["direction"],
     )
 
 
@@ -559,7 +558,7 @@ def _about_z(T: Reals) -> bool:
     return bool(np.hypot(*T[:2, 3]) < 1e-6 and np.hypot(*T[:2, 2]) < 1e-6 and T[2, 2] > 0)
 
 
-def _put_on_axis(columns: dict[str, Reals], robot: Robot, row: int, T: Reals) -> None:
+def _put_on_axis(columns: dict[str, Reals], row: int, T: Reals) -> None:
     turn = float(np.arctan2(T[1, 0], T[0, 0]))
     columns["d"][row] = _rounded(columns["d"][row] + T[2, 3], False)
     columns["offset"][row] = _rounded(float(wrapped(np.array(columns["offset"][row] + turn))), True)

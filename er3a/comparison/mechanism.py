@@ -87,16 +87,17 @@ def mechanism_of(robot: Robot) -> Mechanism:
         d[0] = d[last] = 0.0
     else:
         flange, d[0] = translation(0, 0, d[0]) @ behind, 0.0
-    parts = [np.array(part[:last]) for part in (table.a, table.alpha, table.beta)]
-    return Mechanism(*parts, d, np.array(table.offset), np.array(table.direction), table.sliding, base, flange)
+    a, alpha, beta = (np.array(part[:last]) for part in (table.a, table.alpha, table.beta))
+    return Mechanism(a, alpha, beta, d, np.array(table.offset), np.array(table.direction), table.sliding, base, flange)
 
 
 def between(mechanism: Mechanism) -> Reals:
     """Angles (m - 1,), rad, 0 to pi/2, between neighbouring axes as lines."""
-    return np.arctan2(
+    angles: Reals = np.arctan2(
         np.hypot(np.sin(mechanism.beta), np.sin(mechanism.alpha) * np.cos(mechanism.beta)),
         np.abs(np.cos(mechanism.alpha) * np.cos(mechanism.beta)),
     )
+    return angles
 
 
 def poses(mechanism: Mechanism, u: Reals) -> Reals:
@@ -134,10 +135,7 @@ def _measured_at(mechanism: Mechanism, k: int, height: float | None) -> Mechanis
     R = (rot_x(alpha) @ rot_y(beta))[:3, :3]
     w, point = R[:, 2], np.array([a, 0.0, d])
     lean = math.hypot(w[0], w[1])
-    if height is None:
-        along = -(point[0] * w[0] + point[1] * w[1]) / lean**2
-    else:
-        along = (height - d) / w[2]
+    along = -(a * w[0]) / lean**2 if height is None else (height - d) / w[2]
     crossing = point + along * w
     radius = math.hypot(crossing[0], crossing[1])
     if height is None:
@@ -489,7 +487,7 @@ def _entries(
     -------
     entries; how many lengths can be told apart, and by how much those differ that agree; what is unexplained, m
     """
-    m, links = len(one.d), len(one.a)
+    links = len(one.a)
     if not links:
         return [], (0, []), 0.0
     names = [("a", k) for k in range(links)] + [("d", k) for k in range(1, links)]
@@ -534,15 +532,17 @@ def _fewest(columns: Reals, wanted: Reals, printed: Reals, tolerances: Tolerance
     count = columns.shape[1]
     if not count:
         return np.empty(0), float(np.abs(wanted).max(initial=0.0)), 0
-    amounts, _, rank, _ = np.linalg.lstsq(columns, wanted, rcond=1e-7)
+    solved = np.linalg.lstsq(columns, wanted, rcond=1e-7)
+    amounts = np.asarray(solved[0], float)
+    rank = int(solved[2])
     if rank == count or np.linalg.norm(amounts) < 0.2 * tolerances.length:
-        return amounts, float(np.abs(wanted - columns @ amounts).max(initial=0.0)), int(rank)
+        return amounts, float(np.abs(wanted - columns @ amounts).max(initial=0.0)), rank
     fit = float(np.abs(wanted - columns @ amounts).max()) + 0.1 * tolerances.length
     for size in range(1, min(rank, MOST_ENTRIES) + 1):
         best: tuple[float, Reals] | None = None
         for chosen in itertools.combinations(range(count), size):
             some = columns[:, chosen]
-            values = np.linalg.lstsq(some, wanted, rcond=1e-7)[0]
+            values = np.asarray(np.linalg.lstsq(some, wanted, rcond=1e-7)[0], float)
             if np.abs(wanted - some @ values).max() <= fit:
                 strange = float(np.sum(printed) - printed[list(chosen)].sum() + 1e-6 * np.abs(values).sum())
                 if best is None or strange < best[0]:
@@ -550,8 +550,8 @@ def _fewest(columns: Reals, wanted: Reals, printed: Reals, tolerances: Tolerance
                     full[list(chosen)] = values
                     best = strange, full
         if best is not None:
-            return best[1], float(np.abs(wanted - columns @ best[1]).max()), int(rank)
-    return amounts, float(np.abs(wanted - columns @ amounts).max()), int(rank)
+            return best[1], float(np.abs(wanted - columns @ best[1]).max()), rank
+    return amounts, float(np.abs(wanted - columns @ amounts).max()), rank
 
 
 def _shifts_chosen(

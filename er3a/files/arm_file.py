@@ -53,7 +53,7 @@ def read_arm(
     if path.suffix in (".urdf", ".xacro", ".xml"):
         with plain_urdf(path, xacro) as plain:
             return ReadArm(urdf_table(plain, base=base, tip=tip).replace(name=robot_name(path)), False)
-    if path.suffix in (".yaml", ".yml") or not path.suffix and not path.exists():
+    if path.suffix in (".yaml", ".yml") or (not path.suffix and not path.exists()):
         robot = load_robot(source)
         return ReadArm(robot, True)
     raise InputError(path, None, "is no kind of file that describes an arm", f"Give one that ends in {', '.join(READ)}")

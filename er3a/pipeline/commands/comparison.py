@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from er3a.errors import Er3aError
 from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Xacro, app, print_json, print_note
+
+if TYPE_CHECKING:
+    from er3a.comparison.compare import Comparison
 
 _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
@@ -68,7 +71,8 @@ def compare(
     if html is not None:
         from er3a.pipeline.viewing.comparison import write_comparison
 
-        write_comparison((a, arm), (name, others[name].robot), found, html, a, b)
+        where = str(folder / name) if folder.is_dir() else name
+        write_comparison((a, arm), (where, others[name].robot), found, html, (tolerance_mm, tolerance_deg))
     if as_json:
         print_json(_record(ranked, folder.is_dir()))
     else:
@@ -79,35 +83,24 @@ def compare(
         print(headline(found))
         for layer, state, detail in layer_rows(found):
             print(f"  {layer:<11} {state:<8} {detail}".rstrip())
-        for file in (output, html):
-            if file is not None and found.corrected is not None:
-                print(f"{file}: written")
+        if output is not None and found.corrected is not None:
+            print(f"{output}: written")
+        if html is not None:
+            print(f"{html}: written")
     if found.verdict != "equal":
         raise typer.Exit(1)
 
 
-def _record(ranked: list[tuple[str, Any]], folder: bool) -> dict[str, Any]:
+def _record(ranked: list[tuple[str, Comparison]], folder: bool) -> dict[str, Any]:
     """A comparison as JSON; of a folder the best one's with a ranking of all."""
     name, found = ranked[0]
-    record = {key: value for key, value in _plain(found).items()}
-    if folder:
-        record["best"] = name
-        record["ranking"] = [
-            {
-                "arm": other,
-                "verdict": each.verdict,
-                "different_entries": each.different_entries,
-                "as_printed_mm": each.as_printed_mm,
-                "aligned_mm": each.aligned_mm,
-            }
-            for other, each in ranked
-        ]
-    return record
-
-
-def _plain(found: Any) -> dict[str, Any]:
-    kept = (key for key in vars(found) if key != "corrected")
-    return {
-        key: value if not hasattr(value, "__dataclass_fields__") else asdict(value)
-        for key, value in ((key, getattr(found, key)) for key in kept)
+    record = {
+        key: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+        for key, value in vars(found).items()
     }
+    del record["corrected"]
+    if not folder:
+        return record
+    keys = "verdict", "different_entries", "as_printed_mm", "aligned_mm"
+    ranking = [{"arm": other} | {key: getattr(each, key) for key in keys} for other, each in ranked]
+    return record | {"best": name, "ranking": ranking}
