@@ -190,19 +190,22 @@ def compare(robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = 0.5, tolera
         if a tolerance is not positive
     """
     if not (tolerance_mm > 0 and tolerance_deg > 0):
-        raise RobotError(
-            robot_a.name, f"the tolerances are {tolerance_mm} mm and {tolerance_deg} deg; both are above 0"
-        )
+        problem = f"the tolerances are {tolerance_mm} mm and {tolerance_deg} deg; both have to be above 0"
+        raise RobotError(robot_a.name, problem)
+    return _compared(robot_a, robot_b, Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg)))
+
+
+def _compared(robot_a: Robot, robot_b: Robot, tolerances: Tolerances, explain: bool = True) -> Comparison:
+    """What :func:`compare` finds; without causes if they are not to be explained."""
     counts = robot_a.joints, robot_b.joints
     if counts[0] != counts[1] or robot_a.rows != robot_b.rows:
         return Comparison("other_joint_count", joints=counts)
-    tolerances = Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
     if (kinds := robot_a.sliding != robot_b.sliding).any():
         return Comparison("other_arm", _other_kinds(robot_a, kinds), joints=counts)
     a, b = mechanism_of(robot_a), mechanism_of(robot_b)
     found = match(a, b, tolerances)
     same = not found.differences and found.unexplained == 0
-    causes = () if same else tuple(_causes(robot_a, robot_b, found, tolerances))
+    causes = () if same or not explain else tuple(_causes(robot_a, robot_b, found, tolerances))
     differences = tuple(_named(robot_a, each) for each in found.differences)
     geometry = GeometryLayer(
         same,
@@ -231,21 +234,27 @@ def compare(robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = 0.5, tolera
     return Comparison(verdict, *layers, 1000 * printed, 1000 * aligned, counts, corrected)
 
 
-def best_of(robot: Robot, others: Mapping[str, Robot], **tolerances: float) -> list[tuple[str, Comparison]]:
-    """A robot compared with several, the one that fits best first: fewest entries, then the smallest differences."""
-    found = [(name, compare(robot, other, **tolerances)) for name, other in others.items()]
-    order = {"equal": 0, "same_arm": 1, "other_arm": 2, "other_joint_count": 3}
+def best_of(
+    robot: Robot, others: Mapping[str, Robot], *, tolerance_mm: float = 0.5, tolerance_deg: float = 0.1
+) -> list[tuple[str, Comparison]]:
+    """A robot compared with several, the one that fits best first: fewest entries, then the smallest differences.
 
-    def badness(pair: tuple[str, Comparison]) -> tuple[float, ...]:
-        comparison = pair[1]
-        geometry = comparison.geometry
-        if geometry is None:
-            return (3.0,)
-        size = sum(abs(each.difference) for each in geometry.differences)
-        aligned = comparison.aligned_mm if comparison.aligned_mm is not None else math.inf
-        return order[comparison.verdict], len(geometry.differences), size, aligned
+    Causes are looked for in the best one alone.
+    """
+    tolerances = Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
+    found = [(name, _compared(robot, other, tolerances, explain=False)) for name, other in others.items()]
+    found.sort(key=lambda pair: _misfit(pair[1]))
+    best = found[0][0]
+    return [(best, compare(robot, others[best], tolerance_mm=tolerance_mm, tolerance_deg=tolerance_deg)), *found[1:]]
 
-    return sorted(found, key=badness)
+
+def _misfit(found: Comparison) -> tuple[float, ...]:
+    """Less is a better fit."""
+    if found.geometry is None or found.aligned_mm is None:
+        return (3.0,)
+    differences = found.geometry.differences
+    size = sum(abs(each.difference) for each in differences)
+    return {"equal": 0, "same_arm": 1}.get(found.verdict, 2), len(differences), size, found.aligned_mm
 
 
 def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
@@ -403,7 +412,8 @@ def _largest(distance: Callable[[Reals], Reals], robot: Robot) -> float:
 
 def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances) -> Iterator[Cause]:
     """What explains all differences at once; else which single entries have the wrong sign."""
-    for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)):
+    several = len(found.differences) > 1 or found.unexplained > 0
+    for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)) if several else ():
         there = mechanism_of(other)
         for code, amount, unit, mended in _mended(table, other):
             again = match(mechanism_of(mended), there, tolerances)

@@ -39,7 +39,7 @@ EXACTLY_PARALLEL = 1e-5  # rad; below it a common normal has no digits left
 NEARLY_PARALLEL = math.radians(3.0)
 FAR = 3.0  # m; a normal so far along an axis is no part of an arm
 ON_AXIS = 1e-9  # m
-MOST_SENSES = 48
+MOST_SENSES = 6
 MOST_ENTRIES = 4
 HALF_TURN = rot_x(math.pi)
 
@@ -222,9 +222,10 @@ def _likely_senses(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> 
     for fold, turn in ((0, 0.0), (1, np.pi)):
         for side, normal in ((0, 1.0), (1, -1.0)):
             off = np.abs(wrapped(normal * (other.alpha + turn) - one.alpha))
-            gap = np.abs(normal * other.a - one.a) * placed
+            gap = np.abs(normal * other.a - one.a)
             counted = 1.0 * (off > np.where(inexact, 2 * NEARLY_PARALLEL, tolerances.angle))
-            cost[:, fold, side] = counted + (gap > tolerances.length) * ~inexact + 1e-4 * off + 1e-4 * gap
+            counted += (gap > tolerances.length) & ~inexact & placed
+            cost[:, fold, side] = counted + 1e-4 * off + 1e-4 * gap
     folds = (senses[:, :-1] * senses[:, 1:] < 0).astype(int)
     by_link = np.arange(links)
     normals = np.where(cost[by_link, folds, 0] <= cost[by_link, folds, 1], 1.0, -1.0)
@@ -237,12 +238,15 @@ def _likely_senses(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> 
         total += (gap > tolerances.length) + 1e-4 * gap
     beside = np.concatenate([np.ones((len(senses), 1)), normals, np.ones((len(senses), 1))], axis=1)
     turned = senses * other.offset + np.where(beside[:, :-1] * beside[:, 1:] < 0, np.pi, 0.0) - one.offset
-    moved = (np.abs(wrapped(turned)) > tolerances.angle) & ~one.sliding
+    moved = np.abs(wrapped(turned)) > tolerances.angle
     moved[:, [0, -1]] = False
+    fixed = one.sliding & ~np.append(parallel, False) & ~np.append(False, parallel)  # their theta is geometry
+    total += (moved & fixed).sum(axis=1)
+    moved &= ~one.sliding
     upright = one.base[:3, 2] @ other.base[:3, 2] * senses[:, 0] < 0
     extra = (senses * other.direction * one.direction < 0).sum(axis=1) + moved.sum(axis=1) + upright
     order = np.argsort(np.floor(total) + 0.01 * extra + 1e-3 * (total % 1), kind="stable")
-    best = order[np.floor(total[order]) <= np.floor(total).min() + 1][:MOST_SENSES]
+    best = order[np.floor(total[order]) <= np.floor(total).min() + 1][: MOST_SENSES * (4 if one.sliding.any() else 1)]
     return [(senses[k], normals[k]) for k in best]
 
 
@@ -310,11 +314,13 @@ class Match:
     layers: int
 
     @property
-    def rank(self) -> tuple[int, int, float, float]:
-        """Less is a better match: fewer entries, then fewer conventions, then smaller ones."""
+    def rank(self) -> tuple[float, int, float, float]:
+        """Less is a better match: fewer entries (beta, which few tables have, counts more), fewer conventions, smaller
+        differences."""
+        entries = sum(1.5 if each.column == "beta" else 1.0 for each in self.differences)
         size = sum(abs(each.one - each.other) for each in self.differences)
         turns = turn_of(self.base) + turn_of(self.flange)
-        return len(self.differences) + 2 * (self.unexplained > 0), self.layers, round(size, 6), turns
+        return entries + 2 * (self.unexplained > 0), self.layers, round(size, 6), turns
 
 
 def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
@@ -326,7 +332,7 @@ def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
     near = angles < NEARLY_PARALLEL
     exact = by_normals(one), by_normals(other)
     best: Match | None = None
-    for senses, normals in _likely_senses(*exact, tolerances)[:12]:
+    for senses, normals in _likely_senses(*exact, tolerances):
         if best is not None and best.rank[0] == 0:
             break
         pairs = [(exact[0], with_senses(exact[1], senses, normals))]
