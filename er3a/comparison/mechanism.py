@@ -320,7 +320,7 @@ class Match:
         entries = sum(1.5 if each.column == "beta" else 1.0 for each in self.differences)
         size = sum(abs(each.one - each.other) for each in self.differences)
         turns = turn_of(self.base) + turn_of(self.flange)
-        return entries + 2 * (self.unexplained > 0), self.layers, round(size, 6), turns
+        return entries + 2 * (self.unexplained > 0), self.layers, round(size, 6), round(turns, 4)
 
 
 def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
