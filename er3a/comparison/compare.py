@@ -229,7 +229,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: Tolerances, explain: b
     agree = agree and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
     printed, aligned = _distances(robot_a, robot_b, (a, b), found)
-    corrected = _corrected(robot_a, robot_b, found, tolerances, limits, reverses, joint_zeros)
+    corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = geometry, zero, directions, base, flange, coupled, limits, speeds
     return Comparison(verdict, *layers, 1000 * printed, 1000 * aligned, counts, corrected)
 
@@ -484,6 +484,7 @@ def _corrected(
     found: Match,
     tolerances: Tolerances,
     limits: RangeLayer,
+    *,
     signs: Reals,
     joint_zeros: Reals,
 ) -> Robot:

@@ -384,7 +384,7 @@ def _settled(one: Mechanism, other: Mechanism, senses: Reals, tolerances: Tolera
     explained = np.zeros((links, 3))
     for each in entries:
         explained[each.link, 0 if each.column == "a" else 2] += each.other - each.one
-    shift = _shifts_chosen(one, other, (gaps - explained).ravel(), shifts, places, turned, tolerances)
+    shift = _shifts_chosen(one, other, (gaps - explained).ravel(), shifts, places, turned=turned, tolerances=tolerances)
 
     zeros = np.where(one.sliding, [shift[k][1][2] - shift[k][0][2] for k in range(m)], turned)
     zeros[np.array([k in (0, m - 1) and not one.sliding[k] for k in range(m)])] = 0.0
@@ -566,6 +566,7 @@ def _shifts_chosen(
     gaps: Reals,
     shifts: Reals,
     places: list[list[int]],
+    *,
     turned: Reals,
     tolerances: Tolerances,
 ) -> list[tuple[Reals, Reals]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from er3a.errors import InputError
-from er3a.files.dh_table import read_dh_table
+from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.robot_library import load_robot, robot_of
 from er3a.formats.urdf import robot_name, urdf_table
 from er3a.formats.xacro import plain_urdf
@@ -29,6 +29,8 @@ def read_arm(
     source: str,
     *,
     convention: Convention = "standard",
+    length_unit: LengthUnit = "mm",
+    angle_unit: AngleUnit = "deg",
     base: str | None = None,
     tip: str | None = None,
     xacro: Sequence[str] = (),
@@ -39,6 +41,7 @@ def read_arm(
     ----------
     source : a robot's name, or a path that ends in .csv, .yaml, .urdf or .xacro
     convention : of a D-H table; a column ``convention`` in it counts more
+    length_unit, angle_unit : of a D-H table whose columns are named mm and deg all the same
     base, tip, xacro : of a URDF, as :func:`er3a.import_urdf` and ``er3a.formats.xacro`` have them
 
     Raises
@@ -48,7 +51,9 @@ def read_arm(
     """
     path = Path(source)
     if path.suffix == ".csv":
-        content, notes = read_dh_table(path, robot_name(path), convention)
+        content, notes = read_dh_table(
+            path, robot_name(path), convention, length_unit=length_unit, angle_unit=angle_unit
+        )
         return ReadArm(robot_of(content), True, notes)
     if path.suffix in (".urdf", ".xacro", ".xml"):
         with plain_urdf(path, xacro) as plain:

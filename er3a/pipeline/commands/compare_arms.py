@@ -23,6 +23,8 @@ def compare(
     b: Annotated[str, typer.Argument(metavar="B", help="what it is compared with: as A, or a folder of such files")],
     *,
     convention: Annotated[str, typer.Option(help="of D-H tables: standard | modified")] = "standard",
+    length_unit: Annotated[str, typer.Option(help="of D-H tables: mm | m | in")] = "mm",
+    angle_unit: Annotated[str, typer.Option(help="of D-H tables: deg | rad")] = "deg",
     base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
     xacro: Xacro = None,
@@ -38,14 +40,21 @@ def compare(
     from er3a.pipeline.messages.comparison import headline, layer_rows
     from er3a.robots.conventions import to_modified, to_standard
 
-    if convention not in ("standard", "modified"):
-        raise Er3aError(f"--convention is '{convention}'; known: standard, modified")
+    known = {
+        "--convention": ("standard", "modified"),
+        "--length-unit": ("mm", "m", "in"),
+        "--angle-unit": ("deg", "rad"),
+    }
+    for (option, choices), given in zip(known.items(), (convention, length_unit, angle_unit)):
+        if given not in choices:
+            raise Er3aError(f"{option} is '{given}'; known: {', '.join(choices)}")
     for option, value in (("--tolerance-mm", tolerance_mm), ("--tolerance-deg", tolerance_deg)):
         if not 0 < value < 1000:
             raise Er3aError(f"{option} is {value:g}; give a number above 0")
     if output is not None and output.suffix not in (".yaml", ".yml"):
         raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
-    options: dict[str, Any] = {"convention": convention, "base": base, "tip": tip}
+    options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
+    options |= {"base": base, "tip": tip}
     first = read_arm(a, xacro=xacro or (), **options)
     folder = Path(b)
     if folder.is_dir():
