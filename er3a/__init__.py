@@ -7,6 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from er3a.comparison.compare import Comparison as Comparison
+    from er3a.comparison.compare import compare as compare
     from er3a.dynamics.torques import gravity as gravity
     from er3a.dynamics.torques import mass_matrix as mass_matrix
     from er3a.dynamics.torques import torques as torques
@@ -71,6 +73,8 @@ _PUBLIC = {
     "load_hand_eye": "er3a.files.hand_eye_file",
     "CalibrationSet": "er3a.vision.calibration_set",
     "calibrate_hand_eye": "er3a.vision.hand_eye",
+    "compare": "er3a.comparison.compare",
+    "Comparison": "er3a.comparison.compare",
     "to_modified": "er3a.robots.conventions",
     "to_standard": "er3a.robots.conventions",
     "import_urdf": "er3a.formats.urdf",

@@ -3,11 +3,13 @@
 Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, where they are known, ``offset_deg`` and
 ``direction`` (theta = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. Where a joint slides,
 ``type`` says "prismatic" (else "revolute") and ``theta_deg`` where its theta stands; its limits and speed stand in
-``lower_mm``, ``upper_mm``, ``speed_mm_s``. A cell that does not apply to a joint is left empty.
+``lower_mm``, ``upper_mm``, ``speed_mm_s``. A cell that does not apply to a joint is left empty. A column ``convention``
+(standard or modified, the same in all rows) counts more than what the reader is asked for.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
@@ -15,12 +17,14 @@ from typing import Any, Literal
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import RobotFile
+from er3a.files.units import MOST_DEG
 from er3a.files.yaml_file import parse
-from er3a.robots.robot import MOST_JOINTS, Grade
+from er3a.robots.robot import CONVENTIONS, MOST_JOINTS, Convention, Grade
 
 _NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
 NEEDED = {"joint": CsvColumn(int), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
 OPTIONAL = {
+    "convention": CsvColumn(str, choices=CONVENTIONS),
     "type": CsvColumn(str, choices=("revolute", "prismatic")),
     "theta_deg": _OF_KIND,
     "offset_deg": _OF_KIND,
@@ -33,17 +37,27 @@ OPTIONAL = {
     "speed_mm_s": _OF_KIND,
 }
 ASSUMED_LIMIT_DEG = 180.0
+LengthUnit = Literal["mm", "m", "in"]
+AngleUnit = Literal["deg", "rad"]
+MILLIMETRES: dict[LengthUnit, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
+SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
 ASSUMED_SLIDE_MM = 1000.0
 
 
 def read_dh_table(
-    path: str | Path, name: str, convention: Literal["standard", "modified"] = "standard"
+    path: str | Path,
+    name: str,
+    convention: Convention = "standard",
+    *,
+    length_unit: LengthUnit = "mm",
+    angle_unit: AngleUnit = "deg",
 ) -> tuple[RobotFile, tuple[str, ...]]:
     """A robot file made of a D-H table.
 
     Parameters
     ----------
     name : of the robot
+    length_unit, angle_unit : what the numbers of a table are in whose columns are named mm and deg all the same
 
     Returns
     -------
@@ -58,7 +72,11 @@ def read_dh_table(
     path = Path(path)
     header = read_header(path)
     rows = read_csv(path, NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in header})
+    _in_own_units(path, rows, length_unit, angle_unit)
     given = set(header)
+    if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
+        raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
+    convention = next(iter(stated), convention)
     for unit in ("deg", "mm"):
         if len(pair := given & {f"lower_{unit}", f"upper_{unit}"}) == 1:
             missing = ({f"lower_{unit}", f"upper_{unit}"} - pair).pop()
@@ -70,7 +88,9 @@ def read_dh_table(
     for row in rows:
         _check_kind(path, row, given)
     kinds = {_unit(row) for row in rows}
-    notes = [] if convention == "modified" else ["the table was read as standard D-H; --modified if it is Craig's"]
+    notes = []
+    if convention == "standard" and "convention" not in given:
+        notes.append("the table was read as standard D-H; --modified if it is Craig's")
     if not given & {"offset_deg", "direction"}:
         notes.append("no column offset_deg or direction: joint angles are taken to be the table's own")
     if "deg" in kinds and "lower_deg" not in given:
@@ -80,6 +100,31 @@ def read_dh_table(
     if any(f"speed_{unit}_s" not in given for unit in kinds):
         notes.append("no speeds in the table: those that the study assumes stand in for them")
     return parse(RobotFile, _content(rows, given, name, convention, path.name), path), tuple(notes)
+
+
+def _in_own_units(path: Path, rows: list[dict[str, Any]], length_unit: LengthUnit, angle_unit: AngleUnit) -> None:
+    """Take all values to mm and degrees; refuse lengths that are another unit's, and degrees that were read twice."""
+    longest = max((abs(row[key]) for row in rows for key in ("a_mm", "d_mm")), default=0.0)
+    if length_unit == "mm" and 0 < longest < SHORTEST_ARM_MM and not any(_unit(row) == "mm" for row in rows):
+        problem = f"the longest length is {longest:g} mm, which can only be metres or inches"
+        raise InputError(
+            path,
+            "columns a_mm, d_mm",
+            problem,
+            "Multiply by 1000, or by 25.4; er3a compare takes --length-unit m (or in)",
+        )
+    scales = {"mm": MILLIMETRES[length_unit], "mm_s": MILLIMETRES[length_unit]}
+    scales |= dict.fromkeys(("deg", "deg_s"), math.degrees(1.0) if angle_unit == "rad" else 1.0)
+    for row in rows:
+        for column, value in row.items():
+            unit = column.partition("_")[2].removeprefix("s_")
+            if unit in scales and isinstance(value, float):
+                row[column] = value * scales[unit]
+        alpha = row["alpha_deg"]
+        if abs(alpha) > MOST_DEG:
+            once = math.radians(alpha)
+            problem = f"{alpha:g} deg is more than ten turns: it is {once:.6g} deg that were converted twice"
+            raise InputError(path, f"row {row['row']}, column alpha_deg", problem, f"Write {once:.6g}")
 
 
 def _unit(row: dict[str, Any]) -> str:

@@ -266,6 +266,43 @@ def import_urdf(
     """
     path = Path(path)
     found = read_chain(path, base, tip, snap)
+    robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
+    moving = [joint for joint in found.joints if joint.moves]
+    limits = np.stack([robot.lower, robot.upper], axis=1)
+    q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
+    given = _chain_forward(found.joints, q @ coupling.T + shift)
+    misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
+    root, placed = urdf_root(path), link_places(found, shift)
+    envelopes, hulls, shaped = link_shapes(path, root, robot, placed, _asked(split))
+    names = tuple(joint.name for joint in sources)
+    masses, weighed, changed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
+    stated = {
+        "envelopes": bool(envelopes or hulls),
+        "inertia": bool(masses.links),
+        "drives": masses.drives is not None,
+    }
+    more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
+    if changed:
+        which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
+        text = f"As {path.name} states it, but for the inertia of {which}, for which the nearest possible one was taken"
+        more["inertia"] = Source(text, "export")
+    robot = robot.replace(envelopes=envelopes, hulls=hulls, masses=masses, sources={**robot.sources, **more})
+    first, last = found.joints[0].parent, found.joints[-1].child
+    beyond = _followers_beyond(moving, coupling, shift, limits)
+    return UrdfImport(robot, (*found.notes, *notes, *beyond, *shaped, *weighed), float(misfit), names, first, last)
+
+
+def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = None) -> Robot:
+    """D-H table, limits and speeds alone of a URDF: no meshes are read, and nothing is compiled.
+
+    Parameters and errors are those of :func:`import_urdf`.
+    """
+    path = Path(path)
+    return _robot_of_chain(path, read_chain(path, base, tip, False))[0]
+
+
+def _robot_of_chain(path: Path, found: UrdfChain) -> tuple[Robot, list[UrdfJoint], Reals, Reals, list[str]]:
+    """The robot without shapes and masses, its joints, what they move (m, n) and its constant (m,), notes on limits."""
     moving = [joint for joint in found.joints if joint.moves]
     if not 1 <= len(moving) <= MOST_JOINTS:
         ends = f"from {found.joints[0].parent} to {found.joints[-1].child}" if found.joints else "of no joints"
@@ -292,27 +329,7 @@ def import_urdf(
         continuous=np.array([joint.type == "continuous" for joint in sources]),
         **vars(table),
     )
-    q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
-    given = _chain_forward(found.joints, q @ coupling.T + shift)
-    misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
-    root, placed = urdf_root(path), link_places(found, shift)
-    envelopes, hulls, shaped = link_shapes(path, root, robot, placed, _asked(split))
-    names = tuple(joint.name for joint in sources)
-    masses, weighed, changed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
-    stated = {
-        "envelopes": bool(envelopes or hulls),
-        "inertia": bool(masses.links),
-        "drives": masses.drives is not None,
-    }
-    more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
-    if changed:
-        which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
-        text = f"As {path.name} states it, but for the inertia of {which}, for which the nearest possible one was taken"
-        more["inertia"] = Source(text, "export")
-    robot = robot.replace(envelopes=envelopes, hulls=hulls, masses=masses, sources={**robot.sources, **more})
-    first, last = found.joints[0].parent, found.joints[-1].child
-    beyond = _followers_beyond(moving, coupling, shift, limits)
-    return UrdfImport(robot, (*found.notes, *notes, *beyond, *shaped, *weighed), float(misfit), names, first, last)
+    return robot, sources, coupling, shift, notes
 
 
 def _asked(split: bool | Split) -> Split | None:

@@ -1,0 +1,1 @@
+"""Whether two tables describe the same arm."""

@@ -1,0 +1,575 @@
+"""Whether two tables are of one arm, and if not, which entries differ and what made them.
+
+The answer comes in layers. Geometry is what no choice of base, flange, zeros and directions changes; only if it differs
+is the other table another arm (:mod:`er3a.comparison.mechanism`). The layers behind it are conventions: they matter to
+whoever commands joints or places the base by the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from er3a.by_value import ByValue
+from er3a.comparison.mechanism import (
+    EntryDifference,
+    Match,
+    Mechanism,
+    Tolerances,
+    is_identity,
+    match,
+    mechanism_of,
+    poses,
+    turn_of,
+    wrapped,
+)
+from er3a.errors import RobotError
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Robot, Source
+
+VerdictWord = Literal["equal", "same_arm", "other_arm", "other_joint_count"]
+CauseCode = Literal[
+    "a_and_d_swapped", "other_convention", "all_alphas_negated", "unit", "scale", "rows_shifted", "one_alpha_negated"
+]
+SAMPLES = 192
+SWEEPS = 2
+ROUNDED = 4  # decimals of mm and deg in a corrected table
+UNITS = {25.4: "inch", 1 / 25.4: "inch", 1000.0: "metre", 0.001: "metre", 10.0: "centimetre", 0.1: "centimetre"}
+
+
+@dataclass(frozen=True)
+class Difference:
+    """An entry of the table that the other arm has otherwise.
+
+    ``entry``: column and row as A's table has them (``d4``); ``a``, ``b``: its value in A, and what it would have to be
+    for B's arm; ``unit``: mm or deg; ``alike``: entries that no data can tell from this one.
+    """
+
+    entry: str
+    a: float | str
+    b: float | str
+    difference: float
+    unit: str
+    alike: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What made the entries differ: ``side`` is whose table has it, ``amount`` by how many rows or times."""
+
+    code: CauseCode
+    side: Literal["a", "b"]
+    entries: tuple[str, ...] = ()
+    amount: float | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class GeometryLayer:
+    """``worst_mm`` and ``worst_deg``: the largest gap of all ``invariants`` that were compared."""
+
+    same: bool
+    worst_mm: float
+    worst_deg: float
+    differences: tuple[Difference, ...] = ()
+    causes: tuple[Cause, ...] = ()
+    invariants: int = 0
+    unexplained_mm: float = 0.0
+
+
+@dataclass(frozen=True)
+class ZeroLayer:
+    """By row what B's offset is more than A's (deg; mm of joints that slide); 0 of the first and the last row, whose
+    zeros can't be told from base and flange."""
+
+    same: bool
+    offsets_deg: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class DirectionLayer:
+    """Numbers of the rows that B moves the other way."""
+
+    same: bool
+    reversed: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turn by ``deg`` about a unit ``axis``."""
+
+    deg: float
+    axis: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class PlacementLayer:
+    """Where B's base (flange) stands in A's base (flange) frame once joint axes agree."""
+
+    same: bool
+    shift_mm: tuple[float, float, float]
+    turn: Turn
+
+
+@dataclass(frozen=True)
+class RangeDifference:
+    """A limit or speed of a joint: ``a``, and ``b`` in A's zero and direction."""
+
+    joint: int
+    entry: Literal["lower", "upper", "speed"]
+    a: float
+    b: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class RangeLayer:
+    """Limits or speeds; ``same`` is None where one side gives none."""
+
+    same: bool | None
+    differences: tuple[RangeDifference, ...] = ()
+
+
+@dataclass(frozen=True)
+class CouplingLayer:
+    """Couplings: what rows move by; ``rows`` are those that B couples otherwise."""
+
+    same: bool
+    rows: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(ByValue):
+    """What :func:`compare` found.
+
+    Attributes
+    ----------
+    verdict : equal; same_arm (geometry agrees, something else differs); other_arm; other_joint_count
+    geometry, zero, directions, base, flange, coupling, limits, speeds : the layers; None where joints can't be paired
+    as_printed_mm : largest distance of both flanges over the joint ranges, joint values as the tables have them
+    aligned_mm : the same after base, flange, zeros and directions of B are brought to A's
+    corrected : A's table with all entries mended that differ, which makes it B's arm; None for another joint count
+    """
+
+    verdict: VerdictWord
+    geometry: GeometryLayer | None = None
+    zero: ZeroLayer | None = None
+    directions: DirectionLayer | None = None
+    base: PlacementLayer | None = None
+    flange: PlacementLayer | None = None
+    coupling: CouplingLayer | None = None
+    limits: RangeLayer | None = None
+    speeds: RangeLayer | None = None
+    as_printed_mm: float | None = None
+    aligned_mm: float | None = None
+    joints: tuple[int, int] = (0, 0)
+    corrected: Robot | None = None
+
+    @property
+    def different_entries(self) -> int:
+        """How many entries of geometry differ: less is a better fit."""
+        return len(self.geometry.differences) if self.geometry else 1000
+
+
+def compare(robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = 0.5, tolerance_deg: float = 0.1) -> Comparison:
+    """Compare two arms: geometry, zero, directions, base, flange, couplings, then limits and speeds.
+
+    Parameters
+    ----------
+    robot_a : the table in question, whose entries are named
+    robot_b : the table that it is compared with
+    tolerance_mm, tolerance_deg : entries that differ by no more agree
+
+    Raises
+    ------
+    RobotError
+        if a tolerance is not positive
+    """
+    if not (tolerance_mm > 0 and tolerance_deg > 0):
+        problem = f"the tolerances are {tolerance_mm} mm and {tolerance_deg} deg; both have to be above 0"
+        raise RobotError(robot_a.name, problem)
+    return _compared(robot_a, robot_b, Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg)))
+
+
+def _compared(robot_a: Robot, robot_b: Robot, tolerances: Tolerances, explain: bool = True) -> Comparison:
+    """What :func:`compare` finds; without causes if they are not to be explained."""
+    counts = robot_a.joints, robot_b.joints
+    if counts[0] != counts[1] or robot_a.rows != robot_b.rows:
+        return Comparison("other_joint_count", joints=counts)
+    if (kinds := robot_a.sliding != robot_b.sliding).any():
+        return Comparison("other_arm", _other_kinds(robot_a, kinds), joints=counts)
+    a, b = mechanism_of(robot_a), mechanism_of(robot_b)
+    found = match(a, b, tolerances)
+    same = not found.differences and found.unexplained == 0
+    causes = () if same or not explain else tuple(_causes(robot_a, robot_b, found, tolerances))
+    differences = tuple(_named(robot_a, each) for each in found.differences)
+    geometry = GeometryLayer(
+        same,
+        1000 * found.worst_length,
+        math.degrees(found.worst_angle),
+        differences,
+        causes,
+        found.invariants,
+        1000 * found.unexplained,
+    )
+    moved = np.abs(found.zeros) > np.where(a.sliding, tolerances.length, tolerances.angle)
+    scale = np.where(a.sliding, 1000.0, np.degrees(1.0))
+    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()))
+    reverses, coupled = _joints_paired(robot_a, robot_b, found)
+    directions = DirectionLayer(not found.reverses.any(), tuple((np.flatnonzero(found.reverses) + 1).tolist()))
+    base, flange = (_placement(T, tolerances) for T in (found.base, found.flange))
+    joint_zeros = _joint_zeros(robot_a, found)
+    limits = _limits(robot_a, robot_b, reverses, joint_zeros, tolerances)
+    speeds = _speeds(robot_a, robot_b)
+    agree = zero.same and directions.same and base.same and flange.same and coupled.same
+    agree = agree and limits.same is not False and speeds.same is not False
+    verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
+    printed, aligned = _distances(robot_a, robot_b, (a, b), found)
+    corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
+    layers = geometry, zero, directions, base, flange, coupled, limits, speeds
+    return Comparison(verdict, *layers, 1000 * printed, 1000 * aligned, counts, corrected)
+
+
+def best_of(
+    robot: Robot, others: Mapping[str, Robot], *, tolerance_mm: float = 0.5, tolerance_deg: float = 0.1
+) -> list[tuple[str, Comparison]]:
+    """A robot compared with several, the one that fits best first: fewest entries, then the smallest differences.
+
+    Causes are looked for in the best one alone.
+    """
+    tolerances = Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
+    found = [(name, _compared(robot, other, tolerances, explain=False)) for name, other in others.items()]
+    found.sort(key=lambda pair: _misfit(pair[1]))
+    best = found[0][0]
+    return [(best, compare(robot, others[best], tolerance_mm=tolerance_mm, tolerance_deg=tolerance_deg)), *found[1:]]
+
+
+def _misfit(found: Comparison) -> tuple[float, ...]:
+    """Less is a better fit."""
+    if found.geometry is None or found.aligned_mm is None:
+        return (3.0,)
+    differences = found.geometry.differences
+    size = sum(abs(each.difference) for each in differences)
+    return {"equal": 0, "same_arm": 1}.get(found.verdict, 2), len(differences), size, found.aligned_mm
+
+
+def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
+    words = {False: "revolute", True: "prismatic"}
+    rows = np.flatnonzero(kinds).tolist()
+    kind = [(k, bool(robot.sliding[k])) for k in rows]
+    found = tuple(Difference(f"type{k + 1}", words[own], words[not own], 1.0, "") for k, own in kind)
+    return GeometryLayer(False, 0.0, 0.0, found)
+
+
+def _named(robot: Robot, found: EntryDifference) -> Difference:
+    """A difference by its name, values and unit in A's own table."""
+    column, link = found.column, found.link
+    angle = column in ("alpha", "beta", "theta")
+    scale = np.degrees(1.0) if angle else 1000.0
+    one, other = scale * found.one, scale * found.other
+    alike = tuple(_name(robot, *each) for each in found.alike)
+    return Difference(_name(robot, column, link), one, other, other - one, "deg" if angle else "mm", alike)
+
+
+def _name(robot: Robot, column: str, link: int) -> str:
+    return f"{column}{_row_of(robot, column, link) + 1}"
+
+
+def _row_of(robot: Robot, column: str, link: int) -> int:
+    """The row (from 0) that holds what follows axis ``link``: a modified table has a, alpha and beta one row later."""
+    return link + (robot.convention == "modified" and column in ("a", "alpha", "beta"))
+
+
+def _placement(T: Reals, tolerances: Tolerances) -> PlacementLayer:
+    x, y, z = (1000 * T[:3, 3]).tolist()
+    angle, R = turn_of(T), T[:3, :3]
+    if angle > np.pi - 1e-4:  # the skew part has no digits left
+        outer = 0.5 * (R + np.eye(3))
+        axis = outer[:, int(np.argmax(np.diag(outer)))]
+    else:
+        axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    size = float(np.linalg.norm(axis))
+    u, v, w = (axis / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])).tolist()
+    return PlacementLayer(is_identity(T, tolerances), (x, y, z), Turn(math.degrees(angle), (u, v, w)))
+
+
+# Joints ---------------------------------------------------------------------------------------------------------------
+
+
+def _joints_paired(robot_a: Robot, robot_b: Robot, found: Match) -> tuple[Reals, CouplingLayer]:
+    """+1 or -1 for each joint (n,), -1 where B's pendant counts the other way, and whether couplings agree."""
+    rows = np.where(found.reverses, -1.0, 1.0)
+    if robot_a.coupling is None and robot_b.coupling is None:
+        return rows, CouplingLayer(True)
+    own, other = (
+        np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling for robot in (robot_a, robot_b)
+    )
+    turned = rows[:, None] * other  # what A's rows would move by for B's joints
+    with_same, with_other = np.abs(turned - own).sum(axis=0), np.abs(turned + own).sum(axis=0)
+    signs = np.where(with_other < with_same, -1.0, 1.0)
+    wrong = np.flatnonzero((np.abs(turned * signs - own) > 1e-6).any(axis=1))
+    return signs, CouplingLayer(not wrong.size, tuple((wrong + 1).tolist()))
+
+
+def _joint_zeros(robot: Robot, found: Match) -> Reals:
+    """What A's joints (n,) show, rad or m, where B's show 0."""
+    rows = found.zeros * robot.direction
+    if robot.coupling is None:
+        return rows
+    return np.asarray(np.linalg.lstsq(robot.coupling, rows, rcond=None)[0])
+
+
+def _known(robot: Robot, group: str) -> bool:
+    """Whether a robot's file gives a group, or a reader assumed it."""
+    source = robot.sources.get(group)
+    return source is None or source.grade != "inferred"
+
+
+def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, tolerances: Tolerances) -> RangeLayer:
+    if not (_known(robot_a, "limits") and _known(robot_b, "limits")):
+        return RangeLayer(None)
+    lower, upper = _limits_there(robot_b, signs, zeros)
+    found = []
+    for j in range(robot_a.joints):
+        slides = bool(robot_a.slides[j])
+        scale, tolerance = (1000.0, tolerances.length) if slides else (math.degrees(1.0), tolerances.angle)
+        if robot_a.continuous[j] and robot_b.continuous[j]:
+            continue
+        for entry, own, other in (("lower", robot_a.lower[j], lower[j]), ("upper", robot_a.upper[j], upper[j])):
+            if abs(own - other) > tolerance:
+                unit = "mm" if slides else "deg"
+                found.append(RangeDifference(j + 1, entry, scale * own, scale * other, unit))  # type: ignore[arg-type]
+    return RangeLayer(not found, tuple(found))
+
+
+def _limits_there(robot: Robot, signs: Reals, zeros: Reals) -> tuple[Reals, Reals]:
+    """B's limits as A's joints show them."""
+    ends = np.sort(np.stack([signs * robot.lower + zeros, signs * robot.upper + zeros]), axis=0)
+    return ends[0], ends[1]
+
+
+def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
+    both = np.isfinite(robot_a.speed) & np.isfinite(robot_b.speed)
+    if not both.any() or not (_known(robot_a, "speeds") and _known(robot_b, "speeds")):
+        return RangeLayer(None)
+    found = []
+    for j in np.flatnonzero(both).tolist():
+        slides = bool(robot_a.slides[j])
+        scale, unit = (1000.0, "mm/s") if slides else (math.degrees(1.0), "deg/s")
+        own, other = scale * float(robot_a.speed[j]), scale * float(robot_b.speed[j])
+        if abs(own - other) > 0.005 * max(abs(own), abs(other)):
+            found.append(RangeDifference(j + 1, "speed", own, other, unit))
+    return RangeLayer(not found, tuple(found))
+
+
+# How far the flange is off --------------------------------------------------------------------------------------------
+
+
+def _distances(robot_a: Robot, robot_b: Robot, arms: tuple[Mechanism, Mechanism], found: Match) -> tuple[float, float]:
+    """Largest distances (m) of the flanges that were found, as printed and aligned: sampled, then climbed."""
+    a, b = arms
+    own, other = (
+        np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling for robot in (robot_a, robot_b)
+    )
+    signs = np.where(found.reverses, -1.0, 1.0)
+    behind = np.linalg.inv(found.flange)
+
+    def printed(q: Reals) -> Reals:
+        gaps = poses(a, q @ own.T)[:, :3, 3] - poses(b, q @ other.T)[:, :3, 3]
+        return np.asarray(np.linalg.norm(gaps, axis=1))
+
+    def aligned(q: Reals) -> Reals:
+        u = q @ own.T
+        there = signs * (u - found.zeros * a.direction)
+        gaps = poses(a, u)[:, :3, 3] - (found.base @ poses(b, there) @ behind)[:, :3, 3]
+        return np.asarray(np.linalg.norm(gaps, axis=1))
+
+    return _largest(printed, robot_a), _largest(aligned, robot_a)
+
+
+def _largest(distance: Callable[[Reals], Reals], robot: Robot) -> float:
+    generator = np.random.default_rng(0)
+    q = generator.uniform(robot.lower, robot.upper, (SAMPLES, robot.joints))
+    values = distance(q)
+    best = q[int(values.argmax())]
+    steps = np.linspace(0.0, 1.0, 17)
+    for _ in range(SWEEPS if values.max() > 1e-6 else 0):
+        for j in range(robot.joints):
+            tried = np.tile(best, (len(steps) + 1, 1))
+            tried[1:, j] = robot.lower[j] + steps * (robot.upper[j] - robot.lower[j])
+            gaps = distance(tried)
+            best = tried[int(gaps.argmax())]
+            values = np.append(values, gaps.max())
+    return float(values.max())
+
+
+# Causes ---------------------------------------------------------------------------------------------------------------
+
+
+def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances) -> Iterator[Cause]:
+    """What explains all differences at once; else which single entries have the wrong sign."""
+    several = len(found.differences) > 1 or found.unexplained > 0
+    for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)) if several else ():
+        there = mechanism_of(other)
+        for code, amount, unit, mended in _mended(table, other):
+            again = match(mechanism_of(mended), there, tolerances)
+            if not again.differences and not again.unexplained:
+                yield Cause(code, side, (), amount, unit)  # type: ignore[arg-type]
+                return
+    for each in found.differences:
+        negated = each.column == "alpha" and abs(wrapped(np.array(each.one + each.other))) < tolerances.angle
+        if negated and abs(each.one) > tolerances.angle:
+            yield Cause("one_alpha_negated", "a", (_name(robot_a, each.column, each.link),))
+    swapped = _swapped_in_a_row(robot_a, robot_b, tolerances) if len(found.differences) > 1 else ()
+    if swapped:
+        yield Cause("a_and_d_swapped", "a", swapped)
+
+
+def _mended(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Robot]]:
+    """A table with one slip undone throughout."""
+    yield "a_and_d_swapped", None, "", robot.replace(a=robot.d, d=robot.a)
+    convention = "modified" if robot.convention == "standard" else "standard"
+    yield "other_convention", None, "", robot.replace(convention=convention)
+    yield "all_alphas_negated", None, "", robot.replace(alpha=-robot.alpha)
+    sizes = [float(np.abs(each.a).sum() + np.abs(each.d[1:-1]).sum()) for each in (robot, other)]
+    if min(sizes) > 0:
+        ratio = sizes[1] / sizes[0]
+        near = min(UNITS, key=lambda factor: abs(math.log(ratio / factor)))
+        if abs(math.log(ratio / near)) < math.log(2):
+            yield "unit", near, UNITS[near], robot.replace(a=robot.a * near, d=robot.d * near)
+        for each in _ratios(robot, other):
+            yield "scale", each, "", robot.replace(a=robot.a * each, d=robot.d * each)
+    for rows in (1, -1):
+        moved = {column: np.roll(getattr(robot, column), rows) for column in ("a", "alpha")}
+        yield "rows_shifted", float(rows), "a, alpha", robot.replace(**moved)
+        yield "rows_shifted", float(rows), "d", robot.replace(d=np.roll(robot.d, rows))
+        yield "rows_shifted", float(rows), "a", robot.replace(a=np.roll(robot.a, rows))
+        yield "rows_shifted", float(rows), "alpha", robot.replace(alpha=np.roll(robot.alpha, rows))
+
+
+def _ratios(robot: Robot, other: Robot) -> list[float]:
+    """The factor between the longest lengths of two tables, if it is not about 1."""
+    ends = [mechanism_of(each) for each in (robot, other)]
+    longest = [max(np.abs(each.a).max(initial=0.0), np.abs(each.d).max(initial=0.0)) for each in ends]
+    if min(longest) <= 0:
+        return []
+    ratio = float(longest[1] / longest[0])
+    return [ratio] if abs(math.log(ratio)) > 0.005 else []
+
+
+def _swapped_in_a_row(robot: Robot, other: Robot, tolerances: Tolerances) -> tuple[str, ...]:
+    """The row in which a and d are swapped, if that explains all."""
+    there = mechanism_of(other)
+    for k in range(robot.rows):
+        if abs(robot.a[k] - robot.d[k]) <= tolerances.length:
+            continue
+        a, d = np.array(robot.a), np.array(robot.d)
+        a[k], d[k] = d[k], a[k]
+        again = match(mechanism_of(robot.replace(a=a, d=d)), there, tolerances)
+        if not again.differences and not again.unexplained:
+            return f"a{k + 1}", f"d{k + 1}"
+    return ()
+
+
+# The corrected table --------------------------------------------------------------------------------------------------
+
+
+def _corrected(
+    robot_a: Robot,
+    robot_b: Robot,
+    found: Match,
+    tolerances: Tolerances,
+    limits: RangeLayer,
+    *,
+    signs: Reals,
+    joint_zeros: Reals,
+) -> Robot:
+    """A's table with what differs taken from B, rounded; what agrees stays as it is printed."""
+    columns = {key: np.array(getattr(robot_a, key)) for key in ("a", "alpha", "beta", "d", "offset", "direction")}
+    for each in found.differences:
+        angle = each.column in ("alpha", "beta", "theta")
+        column = "offset" if each.column == "theta" else each.column
+        columns[column][_row_of(robot_a, column, each.link)] = _rounded(each.other, angle)
+    moved = np.abs(found.zeros) > np.where(robot_a.sliding, tolerances.length, tolerances.angle)
+    columns["direction"] = np.where(found.reverses, -1.0, 1.0) * robot_a.direction
+    for k in np.flatnonzero(moved).tolist():
+        column = "d" if robot_a.sliding[k] else "offset"
+        columns[column][k] = _rounded(columns[column][k] + found.zeros[k], column == "offset")
+    first, last = 0, robot_a.rows - 1
+    base, flange = robot_a.base, robot_a.flange
+    if not is_identity(found.base, tolerances):
+        before = np.linalg.inv(robot_a.base) @ np.linalg.inv(found.base) @ robot_a.base
+        if robot_a.convention == "standard" and _about_z(before):
+            _put_on_axis(columns, first, before)
+        else:
+            base = _rounded_pose(np.linalg.inv(found.base) @ robot_a.base)
+    if not is_identity(found.flange, tolerances):
+        behind = robot_a.flange @ found.flange @ np.linalg.inv(robot_a.flange)
+        folded = robot_a.convention == "standard" and bool(columns["a"][last] or np.sin(columns["alpha"][last]))
+        if not folded and _about_z(behind) and last > 0:
+            turned_over = robot_a.convention == "standard" and np.cos(columns["alpha"][last]) < 0
+            _put_on_axis(columns, last, np.linalg.inv(behind) if turned_over else behind)
+        else:
+            flange = _rounded_pose(robot_a.flange @ found.flange)
+    # Mended zeros and directions make A's joint values those of B.
+    ends = np.sort(np.stack([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)]), axis=0)
+    lower, upper, continuous = ends[0], ends[1], robot_a.continuous
+    if limits.same is False or (_known(robot_b, "limits") and not _known(robot_a, "limits")):
+        lower, upper, continuous = robot_b.lower, robot_b.upper, robot_b.continuous
+    speed = np.where(np.isfinite(robot_b.speed), robot_b.speed, robot_a.speed)
+    text = f"{robot_a.name}, corrected by {robot_b.name}"
+    sources = {group: Source(text, source.grade) for group, source in robot_a.sources.items()}
+    for group, source in robot_b.sources.items():
+        if group in ("limits", "speeds", "base", "flange"):
+            sources[group] = Source(text, source.grade)
+    for group, changed in (("base", base is not robot_a.base), ("flange", flange is not robot_a.flange)):
+        if changed:
+            sources.setdefault(group, Source(text, "inferred"))
+    return Robot(
+        name=robot_a.name,
+        title=f"{robot_a.title}, corrected",
+        convention=robot_a.convention,
+        lower=lower,
+        upper=upper,
+        continuous=continuous,
+        speed=speed,
+        base=base,
+        flange=flange,
+        sliding=robot_a.sliding,
+        coupling=robot_a.coupling,
+        zero_pose=robot_b.zero_pose,
+        sources=sources,
+        a=columns["a"],
+        alpha=columns["alpha"],
+        beta=columns["beta"],
+        d=columns["d"],
+        offset=columns["offset"],
+        direction=columns["direction"],
+    )
+
+
+def _rounded(value: float, angle: bool) -> float:
+    """A length (m) or an angle (rad), rounded as a table prints it."""
+    scale = math.degrees(1.0) if angle else 1000.0
+    return float(np.round(value * scale, ROUNDED) / scale)
+
+
+def _rounded_pose(T: Reals) -> Reals:
+    rounded = T.copy()
+    rounded[:3, 3] = np.round(T[:3, 3] * 1000, ROUNDED) / 1000
+    return rounded
+
+
+def _about_z(T: Reals) -> bool:
+    """Whether a transform only turns about z and shifts along it."""
+    return bool(np.hypot(*T[:2, 3]) < 1e-6 and np.hypot(*T[:2, 2]) < 1e-6 and T[2, 2] > 0)
+
+
+def _put_on_axis(columns: dict[str, Reals], row: int, T: Reals) -> None:
+    turn = float(np.arctan2(T[1, 0], T[0, 0]))
+    columns["d"][row] = _rounded(columns["d"][row] + T[2, 3], False)
+    columns["offset"][row] = _rounded(float(wrapped(np.array(columns["offset"][row] + turn))), True)

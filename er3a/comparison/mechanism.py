@@ -1,0 +1,622 @@
+"""Two arms matched axis by axis: what of their tables is geometry, and what is a free choice.
+
+Two serial arms are the same mechanism if rigid transforms bring each of their joint axes, as lines (of joints that
+slide: as directions), together at some joint values. Of a table with rows
+``L_k = Tz(d_k) Tx(a_k) Rx(alpha_k) Ry(beta_k)`` between the motions ``Rz(theta_k)`` this leaves free [1]_ [2]_:
+
+- the sense of each axis and of each common normal (``senses``, ``normals``): signs of a, alpha, d, half turns of theta;
+- at each joint what commutes with its motion: the zero, and a shift along the axis. That shift has no effect on the
+  next row where neighbouring axes are parallel, so d is known there as a sum alone; joints that slide have no place;
+- all that stands before the first joint and behind the last: base and flange.
+
+Signs are counted out. Everything else is linear once the directions agree: translations ``t_k`` of the rows differ by
+``c_k - R_k c_(k+1)`` with free shifts c, and by what entries differ. The fewest entries that explain it are taken.
+
+Axes less than ``NEARLY_PARALLEL`` apart have common normals far away, which errors of measurement move by metres.
+They are compared in two forms, and the one with fewer differences counts: by their normals, which is exact, and by
+where the next axis crosses the plane across this one (Hayati's beta), which does not magnify errors.
+
+References
+----------
+.. [1] J. Denavit, R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms", J. Applied Mechanics 22 (1955).
+.. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 2.8.2.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.conventions import to_standard
+from er3a.robots.robot import Robot
+
+EXACTLY_PARALLEL = 1e-5  # rad; below it a common normal has no digits left
+NEARLY_PARALLEL = math.radians(3.0)
+FAR = 3.0  # m; a normal so far along an axis is no part of an arm
+ON_AXIS = 1e-9  # m
+MOST_SENSES = 6
+MOST_ENTRIES = 4
+HALF_TURN = rot_x(math.pi)
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """By how much entries may differ and still agree: m and rad."""
+
+    length: float = 0.5e-3
+    angle: float = math.radians(0.1)
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """A table in standard form: ``base Rz(theta_1) L_1 ... Rz(theta_m) flange``, theta = direction * u + offset.
+
+    Attributes
+    ----------
+    alpha, beta : (m - 1,), rad; a : (m - 1,), m, of the links between two axes
+    d : (m,), m; of the first joint and the last it is 0, for base and flange hold it
+    offset, direction, sliding : (m,); start : (m,), m, what the shift of a joint that slides begins with
+    base, flange : (4, 4), m, before the first joint and behind the last
+    """
+
+    a: Reals
+    alpha: Reals
+    beta: Reals
+    d: Reals
+    offset: Reals
+    direction: Reals
+    sliding: Flags
+    base: Reals
+    flange: Reals
+
+
+def mechanism_of(robot: Robot) -> Mechanism:
+    """A robot's table without its tool."""
+    table = to_standard(robot)
+    last = table.rows - 1
+    d = np.array(table.d)
+    behind = translation(table.a[last], 0, 0) @ rot_x(table.alpha[last]) @ rot_y(table.beta[last]) @ table.flange
+    base, flange = table.base, behind
+    if last:
+        base, flange = base @ translation(0, 0, d[0]), translation(0, 0, d[last]) @ behind
+        d[0] = d[last] = 0.0
+    else:
+        flange, d[0] = translation(0, 0, d[0]) @ behind, 0.0
+    a, alpha, beta = (np.array(part[:last]) for part in (table.a, table.alpha, table.beta))
+    return Mechanism(a, alpha, beta, d, np.array(table.offset), np.array(table.direction), table.sliding, base, flange)
+
+
+def between(mechanism: Mechanism) -> Reals:
+    """Angles (m - 1,), rad, 0 to pi/2, between neighbouring axes as lines."""
+    angles: Reals = np.arctan2(
+        np.hypot(np.sin(mechanism.beta), np.sin(mechanism.alpha) * np.cos(mechanism.beta)),
+        np.abs(np.cos(mechanism.alpha) * np.cos(mechanism.beta)),
+    )
+    return angles
+
+
+def poses(mechanism: Mechanism, u: Reals) -> Reals:
+    """Poses (N, 4, 4) of the flange for what the rows move by, u (N, m), rad or m."""
+    x = mechanism.direction * u
+    theta = np.where(mechanism.sliding, 0.0, x) + mechanism.offset
+    shift = np.where(mechanism.sliding, x, 0.0) + mechanism.d
+    c, s = np.cos(theta), np.sin(theta)
+    steps = np.zeros((*theta.shape, 4, 4))
+    steps[..., 0, 0], steps[..., 0, 1], steps[..., 1, 0], steps[..., 1, 1] = c, -s, s, c
+    steps[..., 2, 2] = steps[..., 3, 3] = 1.0
+    steps[..., 2, 3] = shift
+    T = mechanism.base @ steps[:, 0]
+    for k in range(len(mechanism.a)):
+        T = T @ _across(mechanism, k) @ steps[:, k + 1]
+    return T @ mechanism.flange
+
+
+def _across(mechanism: Mechanism, k: int) -> Reals:
+    """(4, 4), from one axis to the next, what lies along the axes not included."""
+    T = rot_x(mechanism.alpha[k]) @ rot_y(mechanism.beta[k])
+    T[0, 3] = mechanism.a[k]
+    return T
+
+
+# Feet of normals, and other points to measure from -------------------------------------------------------------------
+
+
+def _measured_at(mechanism: Mechanism, k: int, height: float | None) -> Mechanism:
+    """The same arm with link k measured from another point of its axis: ``d[k]`` becomes ``height``.
+
+    None: from the foot of the common normal, with beta = 0.
+    """
+    a, alpha, beta, d = mechanism.a[k], mechanism.alpha[k], mechanism.beta[k], mechanism.d[k]
+    R = (rot_x(alpha) @ rot_y(beta))[:3, :3]
+    w, point = R[:, 2], np.array([a, 0.0, d])
+    lean = math.hypot(w[0], w[1])
+    along = -(a * w[0]) / lean**2 if height is None else (height - d) / w[2]
+    crossing = point + along * w
+    radius = math.hypot(crossing[0], crossing[1])
+    if height is None:
+        turned = math.atan2(w[0], -w[1])
+        if crossing[0] * math.cos(turned) + crossing[1] * math.sin(turned) < 0:
+            turned += math.pi
+    elif radius > ON_AXIS:
+        turned = math.atan2(crossing[1], crossing[0])
+    else:
+        turned = math.atan2(w[0], -w[1]) if lean > ON_AXIS else 0.0
+    leans = rot_z(-turned)[:3, :3] @ w
+    new_alpha, new_beta = math.atan2(-leans[1], leans[2]), math.asin(min(1.0, max(-1.0, leans[0])))
+    if height is None:
+        new_beta = 0.0
+    rest = (rot_x(new_alpha) @ rot_y(new_beta))[:3, :3].T @ rot_z(-turned)[:3, :3] @ R
+    found = {key: np.array(getattr(mechanism, key)) for key in ("a", "alpha", "beta", "d", "offset")}
+    found["a"][k], found["alpha"][k], found["beta"][k], found["d"][k] = radius, new_alpha, new_beta, crossing[2]
+    found["offset"][k] += turned
+    found["offset"][k + 1] += math.atan2(rest[1, 0], rest[0, 0])
+    flange, base = mechanism.flange, mechanism.base
+    if k == 0:
+        base = base @ translation(0, 0, found["d"][0])
+        found["d"][0] = 0.0
+    if k + 2 == len(mechanism.d):
+        flange = translation(0, 0, -along) @ flange
+    else:
+        found["d"][k + 1] -= along
+    return replace(mechanism, **found, flange=flange, base=base)
+
+
+def by_normals(mechanism: Mechanism) -> Mechanism:
+    """The arm with beta = 0 wherever axes are not parallel to ``EXACTLY_PARALLEL``."""
+    for k in np.flatnonzero(mechanism.beta):
+        if between(mechanism)[k] > EXACTLY_PARALLEL:
+            mechanism = _measured_at(mechanism, int(k), None)
+    return mechanism
+
+
+def without_far_normals(mechanism: Mechanism) -> Mechanism:
+    """The arm with links between nearly parallel axes measured within it."""
+    angles = between(mechanism)
+    for k in np.flatnonzero((angles > 0) & (angles < NEARLY_PARALLEL)):
+        d = mechanism.d
+        if abs(d[k]) > FAR or (k + 1 < len(d) and abs(d[k + 1]) > FAR):
+            mechanism = _measured_at(mechanism, int(k), 0.0)
+    return mechanism
+
+
+def with_senses(mechanism: Mechanism, senses: Reals, normals: Reals) -> Mechanism:
+    """The same arm with axes turned over (senses (m,), +1 or -1) and normals turned over (normals (m - 1,))."""
+    folded = senses[:-1] * senses[1:] < 0
+    beside = np.concatenate([[1.0], normals, [1.0]])
+    over = [HALF_TURN if senses[k] < 0 else np.eye(4) for k in (0, -1)]
+    return replace(
+        mechanism,
+        a=normals * mechanism.a,
+        alpha=wrapped(normals * (mechanism.alpha + np.where(folded, np.pi, 0.0))),
+        beta=normals * senses[1:] * mechanism.beta,
+        d=senses * mechanism.d,
+        offset=senses * mechanism.offset + np.where(beside[:-1] * beside[1:] < 0, np.pi, 0.0),
+        direction=senses * mechanism.direction,
+        base=mechanism.base @ over[0],
+        flange=over[1] @ mechanism.flange,
+    )
+
+
+def wrapped(angles: Reals) -> Reals:
+    """Angles (rad) in (-pi, pi]."""
+    return angles - 2 * np.pi * np.ceil((angles - np.pi) / (2 * np.pi))
+
+
+# Which way axes and normals point -------------------------------------------------------------------------------------
+
+
+def _likely_senses(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> list[tuple[Reals, Reals]]:
+    """Senses (m,) and normals (m - 1,) of the other arm, those first by which the fewest entries differ."""
+    m, links = len(one.d), len(one.a)
+    senses = 1.0 - 2.0 * np.array(list(itertools.product((0, 1), repeat=m)))
+    near = (between(one) < NEARLY_PARALLEL) & (between(other) < NEARLY_PARALLEL)
+    parallel = between(other) < np.where(near, NEARLY_PARALLEL, EXACTLY_PARALLEL)
+    inexact = near & (np.maximum(between(one), between(other)) > EXACTLY_PARALLEL)
+    placed = ~_beside_a_slide(one.sliding)
+    cost = np.empty((links, 2, 2))  # by link, fold and sense of the normal
+    for fold, turn in ((0, 0.0), (1, np.pi)):
+        for side, normal in ((0, 1.0), (1, -1.0)):
+            off = np.abs(wrapped(normal * (other.alpha + turn) - one.alpha))
+            gap = np.abs(normal * other.a - one.a)
+            counted = 1.0 * (off > np.where(inexact, 2 * NEARLY_PARALLEL, tolerances.angle))
+            counted += (gap > tolerances.length) & ~inexact & placed
+            cost[:, fold, side] = counted + 1e-4 * off + 1e-4 * gap
+    folds = (senses[:, :-1] * senses[:, 1:] < 0).astype(int)
+    by_link = np.arange(links)
+    normals = np.where(cost[by_link, folds, 0] <= cost[by_link, folds, 1], 1.0, -1.0)
+    total = cost.min(axis=2)[by_link, folds].sum(axis=1)
+    for first, last, along in _parallel_blocks(one, parallel):
+        if first == 0 or last == m - 1 or not placed[max(first - 1, 0) : last + 1].all():
+            continue
+        inside = slice(first, last + 1)
+        gap = np.abs((senses[:, inside] * other.d[inside] - one.d[inside]) @ along)
+        total += (gap > tolerances.length) + 1e-4 * gap
+    beside = np.concatenate([np.ones((len(senses), 1)), normals, np.ones((len(senses), 1))], axis=1)
+    turned = senses * other.offset + np.where(beside[:, :-1] * beside[:, 1:] < 0, np.pi, 0.0) - one.offset
+    moved = np.abs(wrapped(turned)) > tolerances.angle
+    moved[:, [0, -1]] = False
+    fixed = one.sliding & ~np.append(parallel, False) & ~np.append(False, parallel)  # their theta is geometry
+    total += (moved & fixed).sum(axis=1)
+    moved &= ~one.sliding
+    upright = one.base[:3, 2] @ other.base[:3, 2] * senses[:, 0] < 0
+    extra = (senses * other.direction * one.direction < 0).sum(axis=1) + moved.sum(axis=1) + upright
+    order = np.argsort(np.floor(total) + 0.01 * extra + 1e-3 * (total % 1), kind="stable")
+    best = order[np.floor(total[order]) <= np.floor(total).min() + 1][: MOST_SENSES * (4 if one.sliding.any() else 1)]
+    return [(senses[k], normals[k]) for k in best]
+
+
+def _beside_a_slide(sliding: Flags) -> Flags:
+    """Links (m - 1,) whose translation belongs to a chain of links around a joint that slides, or to an end of them."""
+    links = len(sliding) - 1
+    touched = sliding[:-1] | sliding[1:] if links else np.zeros(0, dtype=bool)
+    return np.asarray(touched)
+
+
+def _parallel_blocks(mechanism: Mechanism, parallel: Flags) -> list[tuple[int, int, Reals]]:
+    """Runs of parallel axes: the first and the last axis, and the sense of each along the first."""
+    found, first = [], 0
+    for k in range(len(mechanism.d)):
+        if k < len(parallel) and parallel[k]:
+            continue
+        along = np.cumprod([1.0, *np.sign(np.cos(mechanism.alpha[first:k]))])
+        found.append((first, k, along))
+        first = k + 1
+    return found
+
+
+# The match ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class EntryDifference:
+    """An entry of the first table that the other arm has otherwise: m or rad.
+
+    ``column`` is a, alpha, beta, d or theta (of a joint that slides); ``link`` counts rows of a standard table from 0.
+    ``alike``: entries that no data can tell from this one, as (column, link).
+    """
+
+    column: str
+    link: int
+    one: float
+    other: float
+    alike: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """The other arm brought onto the first one.
+
+    Attributes
+    ----------
+    differences : of geometry, the fewest that explain the other arm; worst_length, worst_angle : m and rad
+    invariants : how many numbers were compared; unexplained : m, what no entries explain
+    senses : (m,), -1 where an axis of the other table points the other way
+    reverses : (m,) bool, rows that the other arm moves the other way
+    zeros : (m,), rad or m, other's ``offset`` less the first's once the other is brought there; 0 of the ends
+    base : (4, 4), the other's base in the first's base; flange : (4, 4), other's flange in the first's flange
+    """
+
+    differences: tuple[EntryDifference, ...]
+    worst_length: float
+    worst_angle: float
+    invariants: int
+    unexplained: float
+    senses: Reals
+    reverses: Flags
+    zeros: Reals
+    base: Reals
+    flange: Reals
+    layers: int
+
+    @property
+    def rank(self) -> tuple[float, int, float, float]:
+        """Less is a better match: fewer entries (beta, which few tables have, counts more), fewer conventions, smaller
+        differences."""
+        entries = sum(1.5 if each.column == "beta" else 1.0 for each in self.differences)
+        size = sum(abs(each.one - each.other) for each in self.differences)
+        turns = turn_of(self.base) + turn_of(self.flange)
+        return entries + 2 * (self.unexplained > 0), self.layers, round(size, 6), round(turns, 4)
+
+
+def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
+    """The match by which the fewest entries differ, and of those the one with the fewest differences of convention.
+
+    Both need the same number of rows, of the same kinds.
+    """
+    angles = np.maximum(between(one), between(other))
+    near = angles < NEARLY_PARALLEL
+    exact = by_normals(one), by_normals(other)
+    best: Match | None = None
+    for senses, normals in _likely_senses(*exact, tolerances):
+        if best is not None and best.rank[0] == 0:
+            break
+        pairs = [(exact[0], with_senses(exact[1], senses, normals))]
+        if (near & (angles > EXACTLY_PARALLEL)).any():
+            local = without_far_normals(one), without_far_normals(other)
+            pairs.append(_measured_alike(local[0], with_senses(local[1], senses, normals)))
+            pairs.append((one, with_senses(other, senses, normals)))
+        for first, second in pairs:
+            found = _settled(first, second, senses, tolerances)
+            if best is None or found.rank < best.rank:
+                best = found
+    assert best is not None
+    return best
+
+
+def _measured_alike(one: Mechanism, other: Mechanism) -> tuple[Mechanism, Mechanism]:
+    """Both arms with links between nearly parallel axes measured from the same height of the axis."""
+    for k in range(len(one.a)):
+        widest = max(between(one)[k], between(other)[k])
+        if EXACTLY_PARALLEL < widest < NEARLY_PARALLEL:
+            other = _measured_at(other, k, float(one.d[k]))
+    return one, other
+
+
+def _settled(one: Mechanism, other: Mechanism, senses: Reals, tolerances: Tolerances) -> Match:
+    """The match for chosen senses."""
+    m, links = len(one.d), len(one.a)
+    least = NEARLY_PARALLEL if one.beta.any() or other.beta.any() else EXACTLY_PARALLEL
+    parallel = between(other) < np.where(between(one) < NEARLY_PARALLEL, least, EXACTLY_PARALLEL)
+    offset, steps = _with_free_turns(one, other, parallel, tolerances)
+    turned = wrapped(offset - one.offset)
+    differences = []
+    off = wrapped(other.alpha - one.alpha), wrapped(other.beta - one.beta)
+    for column, gaps, values in (("alpha", off[0], one.alpha), ("beta", off[1], one.beta)):
+        for k in np.flatnonzero(np.abs(gaps) > tolerances.angle).tolist():
+            differences.append(EntryDifference(column, k, float(values[k]), float(values[k] + gaps[k])))
+    inner_slides = [k for k in range(1, m - 1) if one.sliding[k]]
+    for k in inner_slides:
+        if abs(turned[k]) > tolerances.angle:
+            differences.append(EntryDifference("theta", k, float(one.offset[k]), float(one.offset[k] + turned[k])))
+    worst_angle = max(
+        [0.0, *np.abs(off[0]).tolist(), *np.abs(off[1]).tolist(), *(abs(turned[k]) for k in inner_slides)]
+    )
+
+    gaps = steps - np.stack([one.a, np.zeros(links), one.d[:links]], axis=1)
+    shifts, places = _free_shifts(one, other, parallel, offset)
+    entries, counted, left = _entries(one, gaps.ravel(), shifts, tolerances)
+    differences += entries
+    explained = np.zeros((links, 3))
+    for each in entries:
+        explained[each.link, 0 if each.column == "a" else 2] += each.other - each.one
+    shift = _shifts_chosen(one, other, (gaps - explained).ravel(), shifts, places, turned=turned, tolerances=tolerances)
+
+    zeros = np.where(one.sliding, [shift[k][1][2] - shift[k][0][2] for k in range(m)], turned)
+    zeros[np.array([k in (0, m - 1) and not one.sliding[k] for k in range(m)])] = 0.0
+    left_end, right_end = shift[0][0], shift[m - 1][1]
+    base = other.base @ rot_z(turned[0]) @ rot_z(one.offset[0] * one.sliding[0]) @ translation(*left_end)
+    base = base @ rot_z(-one.offset[0] * one.sliding[0])
+    last_turn = turned[m - 1] if m > 1 else 0.0
+    flange = translation(*(-right_end)) @ rot_z(last_turn) @ other.flange
+    placed = one.base @ np.linalg.inv(base), np.linalg.inv(one.flange) @ flange
+    reverses = one.direction * other.direction < 0
+    moved = np.abs(zeros) > np.where(one.sliding, tolerances.length, tolerances.angle)
+    layers = int(reverses.sum() + moved.sum() + sum(not is_identity(T, tolerances) for T in placed))
+    lengths = [abs(each.other - each.one) for each in entries]
+    return Match(
+        tuple(differences),
+        max([0.0, left, *lengths, *counted[1]]),
+        worst_angle,
+        links + len(inner_slides) + counted[0],
+        left if left > tolerances.length else 0.0,
+        senses,
+        reverses,
+        zeros,
+        *placed,
+        layers,
+    )
+
+
+def is_identity(T: Reals, tolerances: Tolerances) -> bool:
+    """Whether a transform moves nothing by more than the tolerances."""
+    return bool(np.linalg.norm(T[:3, 3]) <= tolerances.length and turn_of(T) <= tolerances.angle)
+
+
+def turn_of(T: Reals) -> float:
+    """Angle (rad) by which a transform (4, 4) turns."""
+    R = T[:3, :3]
+    skew = math.hypot(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
+    return math.atan2(skew, R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
+
+
+def _with_free_turns(one: Mechanism, other: Mechanism, parallel: Flags, tolerances: Tolerances) -> tuple[Reals, Reals]:
+    """The other's offsets (m,), and translations (m - 1, 3) of its links, with turns that parallel axes share put where
+    they are free: to joints that turn, off those that slide; of coincident axes to the joint farther out."""
+    m, links = len(one.d), len(one.a)
+    offset = other.offset.copy()
+    steps = np.stack([other.a, np.zeros(links), other.d[:links]], axis=1)
+
+    def turn(k: int, angle: float) -> None:
+        offset[k] -= angle
+        steps[k] = rot_z(angle)[:3, :3] @ steps[k]
+        offset[k + 1] += angle * np.sign(np.cos(other.alpha[k]))
+
+    def gap(k: int) -> float:
+        return float(wrapped(offset[k] - one.offset[k]))
+
+    for k in range(m - 1, 0, -1):
+        if one.sliding[k] and parallel[k - 1] and k < m - 1:
+            turn(k - 1, -gap(k) * float(np.sign(np.cos(other.alpha[k - 1]))))
+    for k in range(m - 1):
+        if one.sliding[k] and parallel[k] and k > 0:
+            turn(k, gap(k))
+    for k in range(links):
+        coincident = parallel[k] and max(abs(one.a[k]), abs(other.a[k])) < tolerances.length
+        if coincident and not (one.sliding[k] or one.sliding[k + 1]):
+            if k == 0:
+                turn(0, -gap(1) * float(np.sign(np.cos(other.alpha[0]))))
+            else:
+                turn(k, gap(k))
+    return offset, steps
+
+
+def _free_shifts(one: Mechanism, other: Mechanism, parallel: Flags, offset: Reals) -> tuple[Reals, list[list[int]]]:
+    """What the translations of links (3 (m - 1),) change by shifts that are free at the joints, and their columns.
+
+    Of joint k: one along its axis if it turns; if it slides two across it, and one along it on either side.
+    """
+    m, links = len(one.d), len(one.a)
+    places, count = [], 0
+    for k in range(m):
+        size = 4 if one.sliding[k] else 1
+        places.append(list(range(count, count + size)))
+        count += size
+    matrix = np.zeros((links, 3, count))
+    for k in range(links):
+        R = (rot_x(other.alpha[k]) @ rot_y(other.beta[k]))[:3, :3]
+        if parallel[k]:
+            R = np.diag([1.0, 0.0, 0.0]) + np.sign(np.cos(other.alpha[k])) * np.diag([0.0, 1.0, 1.0])
+        start, end = places[k], places[k + 1]
+        if one.sliding[k]:
+            matrix[k][:, start[0]], matrix[k][:, start[1]], matrix[k][:, start[3]] = np.eye(3)
+        else:
+            matrix[k][:, start[0]] = 0.0, 0.0, 1.0
+        if one.sliding[k + 1]:
+            across = R @ rot_z((offset if k + 2 < m else one.offset)[k + 1])[:3, :3]
+            matrix[k][:, end[0]], matrix[k][:, end[1]], matrix[k][:, end[2]] = -across.T
+        else:
+            matrix[k][:, end[0]] -= R[:, 2]
+    return matrix.reshape(3 * links, count), places
+
+
+def _entries(
+    one: Mechanism, gaps: Reals, shifts: Reals, tolerances: Tolerances
+) -> tuple[list[EntryDifference], tuple[int, list[float]], float]:
+    """The fewest lengths that explain translations that differ by ``gaps``, up to free shifts.
+
+    Returns
+    -------
+    entries; how many lengths can be told apart, and by how much those differ that agree; what is unexplained, m
+    """
+    links = len(one.a)
+    if not links:
+        return [], (0, []), 0.0
+    names = [("a", k) for k in range(links)] + [("d", k) for k in range(1, links)]
+    rows = [3 * k + (0 if column == "a" else 2) for column, k in names]
+    left = np.linalg.svd(shifts, full_matrices=True)
+    rank = int((left[1] > 1e-9).sum())
+    kept = left[0][:, rank:]
+    columns, wanted = kept[rows].T, kept.T @ gaps  # what shifts leave of entries and gaps
+    sizes = np.linalg.norm(columns, axis=0)
+    classes: list[list[int]] = []
+    for j in np.flatnonzero(sizes > 1e-7).tolist():
+        for members in classes:
+            i = members[0]
+            if abs(columns[:, i] @ columns[:, j]) > (1 - 1e-9) * sizes[i] * sizes[j]:
+                members.append(j)
+                break
+        else:
+            classes.append([j])
+    heads = [members[0] for members in classes]
+    amounts, residual, distinct = _fewest(columns[:, heads], wanted, np.abs(gaps[rows])[heads], tolerances)
+    found, small = [], []
+    for members, amount in zip(classes, amounts.tolist()):
+        j = members[0]
+        if len(members) > 1:
+            raw = np.abs(gaps[[rows[i] for i in members]])
+            printed = np.abs([getattr(one, names[i][0])[names[i][1]] for i in members])
+            apart = raw > tolerances.length
+            j = members[int(np.argmax(raw if apart.sum() == 1 else printed))]
+            amount *= float(columns[:, members[0]] @ columns[:, j]) / sizes[j] ** 2
+        if abs(amount) > tolerances.length:
+            column, k = names[j]
+            value = float(getattr(one, column)[k])
+            alike = tuple(names[i] for i in members if i != j)
+            found.append(EntryDifference(column, k, value, value + amount, alike))
+        else:
+            small.append(abs(amount))
+    return found, (distinct, small), residual
+
+
+def _fewest(columns: Reals, wanted: Reals, printed: Reals, tolerances: Tolerances) -> tuple[Reals, float, int]:
+    """Amounts of columns that make up what is wanted: all of them if that is unique, else as few as will do."""
+    count = columns.shape[1]
+    if not count:
+        return np.empty(0), float(np.abs(wanted).max(initial=0.0)), 0
+    solved = np.linalg.lstsq(columns, wanted, rcond=1e-7)
+    amounts = np.asarray(solved[0], float)
+    rank = int(solved[2])
+    if rank == count or np.linalg.norm(amounts) < 0.2 * tolerances.length:
+        return amounts, float(np.abs(wanted - columns @ amounts).max(initial=0.0)), rank
+    fit = float(np.abs(wanted - columns @ amounts).max()) + 0.1 * tolerances.length
+    for size in range(1, min(rank, MOST_ENTRIES) + 1):
+        best: tuple[float, Reals] | None = None
+        for chosen in itertools.combinations(range(count), size):
+            some = columns[:, chosen]
+            values = np.asarray(np.linalg.lstsq(some, wanted, rcond=1e-7)[0], float)
+            if np.abs(wanted - some @ values).max() <= fit:
+                strange = float(np.sum(printed) - printed[list(chosen)].sum() + 1e-6 * np.abs(values).sum())
+                if best is None or strange < best[0]:
+                    full = np.zeros(count)
+                    full[list(chosen)] = values
+                    best = strange, full
+        if best is not None:
+            return best[1], float(np.abs(wanted - columns @ best[1]).max()), rank
+    return amounts, float(np.abs(wanted - columns @ amounts).max()), rank
+
+
+def _shifts_chosen(
+    one: Mechanism,
+    other: Mechanism,
+    gaps: Reals,
+    shifts: Reals,
+    places: list[list[int]],
+    *,
+    turned: Reals,
+    tolerances: Tolerances,
+) -> list[tuple[Reals, Reals]]:
+    """The shift (3,), m, on the near and on the far side of each joint, in its own frame.
+
+    What is free throughout (all axes parallel, or slides at the ends) is chosen so that as few as can be of base,
+    zeros and flange differ.
+    """
+    m, count = len(one.d), shifts.shape[1]
+    if len(shifts):
+        U, S, V = np.linalg.svd(shifts, full_matrices=True)
+        rank = int((S > 1e-9).sum())
+        y, free = V[:rank].T @ ((U[:, :rank].T @ gaps) / S[:rank]), V[rank:].T
+    else:
+        y, free = np.zeros(count), np.eye(count)
+
+    def sides(values: Reals) -> list[tuple[Reals, Reals]]:
+        found = []
+        for k in range(m):
+            own = values[places[k]]
+            near = np.array([own[0], own[1], own[2]]) if one.sliding[k] else np.array([0.0, 0.0, own[0]])
+            far = np.array([own[0], own[1], own[3]]) if one.sliding[k] else near
+            found.append((near, far))
+        return found
+
+    if not free.shape[1]:
+        return sides(y)
+
+    def outcome(values: Reals) -> Reals:
+        """Gaps (m,) left at base (3), joints that slide, flange (3)."""
+        found = sides(values)
+        start = rot_z(one.offset[0] * one.sliding[0])[:3, :3] @ found[0][0]
+        at_base = other.base[:3, 3] + other.base[:3, :3] @ start - one.base[:3, 3]
+        at_flange = (rot_z(turned[-1] if m > 1 else 0.0) @ other.flange)[:3, 3] - found[-1][1] - one.flange[:3, 3]
+        return np.concatenate(
+            [at_base, [found[k][1][2] - found[k][0][2] for k in range(m) if one.sliding[k]], at_flange]
+        )
+
+    reference = outcome(y)
+    response = np.stack([outcome(y + free[:, j]) - reference for j in range(free.shape[1])], axis=1)
+    slides = int(one.sliding.sum())
+    best: tuple[int, Reals] | None = None
+    for spared in ((slides + 3, slides + 6), (3, slides + 3), (0, 3)):
+        weight = np.ones(slides + 6)
+        weight[slice(*spared)] = 1e-5
+        step = np.linalg.lstsq(weight[:, None] * response, -weight * reference, rcond=1e-9)[0]
+        left = np.abs(reference + response @ step)
+        parts = left[:3].max(), *left[3 : 3 + slides].tolist(), left[3 + slides :].max()
+        apart = sum(part > tolerances.length for part in parts)
+        if best is None or apart < best[0]:
+            best = apart, y + free @ step
+    assert best is not None
+    return sides(best[1])

@@ -1,0 +1,115 @@
+"""``er3a compare``: is this table that arm?"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from er3a.errors import Er3aError
+from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Xacro, app, print_json, print_note
+
+if TYPE_CHECKING:
+    from er3a.comparison.compare import Comparison
+
+_ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
+def compare(
+    a: Annotated[str, typer.Argument(metavar="A", help=f"the table in question: {_ARM}")],
+    b: Annotated[str, typer.Argument(metavar="B", help="what it is compared with: as A, or a folder of such files")],
+    *,
+    convention: Annotated[str, typer.Option(help="of D-H tables: standard | modified")] = "standard",
+    length_unit: Annotated[str, typer.Option(help="of D-H tables: mm | m | in")] = "mm",
+    angle_unit: Annotated[str, typer.Option(help="of D-H tables: deg | rad")] = "deg",
+    base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
+    tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
+    xacro: Xacro = None,
+    tolerance_mm: Annotated[float, typer.Option(help="lengths that differ by no more agree")] = 0.5,
+    tolerance_deg: Annotated[float, typer.Option(help="angles that differ by no more agree")] = 0.1,
+    output: Annotated[Path | None, typer.Option(help="write A with what differs mended, .yaml")] = None,
+    html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
+    as_json: AsJson = False,
+):
+    """Is this table that arm? Geometry, zero, directions, base, flange; which entries differ. Exit code 1 if any do."""
+    from er3a.comparison.compare import best_of
+    from er3a.files.arm_file import read_arm, read_arms
+    from er3a.pipeline.messages.comparison import headline, layer_rows
+    from er3a.robots.conventions import to_modified, to_standard
+
+    known = {
+        "--convention": ("standard", "modified"),
+        "--length-unit": ("mm", "m", "in"),
+        "--angle-unit": ("deg", "rad"),
+    }
+    for (option, choices), given in zip(known.items(), (convention, length_unit, angle_unit)):
+        if given not in choices:
+            raise Er3aError(f"{option} is '{given}'; known: {', '.join(choices)}")
+    for option, value in (("--tolerance-mm", tolerance_mm), ("--tolerance-deg", tolerance_deg)):
+        if not 0 < value < 1000:
+            raise Er3aError(f"{option} is {value:g}; give a number above 0")
+    if output is not None and output.suffix not in (".yaml", ".yml"):
+        raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
+    options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
+    options |= {"base": base, "tip": tip}
+    first = read_arm(a, xacro=xacro or (), **options)
+    folder = Path(b)
+    if folder.is_dir():
+        others, left_out = read_arms(folder, **options)
+        for problem in left_out:
+            print_note(problem)
+    else:
+        others = {b: read_arm(b, xacro=xacro or (), **options)}
+    arm = first.robot
+    if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
+        arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
+    ranked = best_of(
+        arm,
+        {name: other.robot for name, other in others.items()},
+        tolerance_mm=tolerance_mm,
+        tolerance_deg=tolerance_deg,
+    )
+    name, found = ranked[0]
+    if output is not None and found.corrected is not None:
+        from er3a.files.robot_writer import write_robot
+
+        write_robot(found.corrected.replace(name=output.stem), output)
+    if html is not None:
+        from er3a.pipeline.viewing.comparison import write_comparison
+
+        where = str(folder / name) if folder.is_dir() else name
+        write_comparison((a, arm), (where, others[name].robot), found, html, (tolerance_mm, tolerance_deg))
+    if as_json:
+        print_json(_record(ranked, folder.is_dir()))
+    else:
+        if folder.is_dir():
+            for other, each in ranked[:5]:
+                print(f"{other}: {headline(each)}")
+            print()
+        print(headline(found))
+        for layer, state, detail in layer_rows(found):
+            print(f"  {layer:<11} {state:<8} {detail}".rstrip())
+        if output is not None and found.corrected is not None:
+            print(f"{output}: written")
+        if html is not None:
+            print(f"{html}: written")
+    if found.verdict != "equal":
+        raise typer.Exit(1)
+
+
+def _record(ranked: list[tuple[str, Comparison]], folder: bool) -> dict[str, Any]:
+    """A comparison as JSON; of a folder the best one's with a ranking of all."""
+    name, found = ranked[0]
+    record = {
+        key: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+        for key, value in vars(found).items()
+    }
+    del record["corrected"]
+    if not folder:
+        return record
+    keys = "verdict", "different_entries", "as_printed_mm", "aligned_mm"
+    ranking = [{"arm": other} | {key: getattr(each, key) for key in keys} for other, each in ranked]
+    return record | {"best": name, "ranking": ranking}

@@ -1,0 +1,150 @@
+"""What a comparison of two arms says: a headline, and a line for each layer."""
+
+from __future__ import annotations
+
+from er3a.comparison.compare import (
+    Cause,
+    Comparison,
+    Difference,
+    GeometryLayer,
+    PlacementLayer,
+    RangeDifference,
+    RangeLayer,
+)
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.say import joined, say, word
+
+LAYERS = {
+    "geometry": N_("geometry"),
+    "zero": N_("zero"),
+    "directions": N_("directions"),
+    "base": N_("base"),
+    "flange": N_("flange"),
+    "coupling": N_("coupling"),
+    "limits": N_("limits"),
+    "speeds": N_("speeds"),
+}
+HEADLINES = {
+    "equal": N_("equal: the same arm, usable as printed"),
+    "same_arm": N_("same arm, defined otherwise"),
+    "other_arm": N_("another arm"),
+    "other_joint_count": N_("another number of joints"),
+}
+CAUSES = {
+    "a_and_d_swapped": N_("a and d are swapped"),
+    "other_convention": N_("the table is of the other D-H convention, standard or modified"),
+    "all_alphas_negated": N_("the sign of every alpha is turned round"),
+    "one_alpha_negated": N_("the sign is turned round"),
+    "unit": N_("the lengths are in another unit"),
+    "scale": N_("all lengths are scaled"),
+    "rows_shifted": N_("values stand a row too high or too low"),
+}
+STATES = {True: N_("agrees"), False: N_("differs"), None: N_("not given")}
+
+
+def headline(found: Comparison) -> str:
+    """The verdict in one sentence."""
+    text = word("comparison", HEADLINES, found.verdict)
+    if found.as_printed_mm is None or found.aligned_mm is None:
+        a, b = found.joints
+        return tr("{verdict}: {a} and {b}", verdict=text, a=a, b=b) if found.verdict == "other_joint_count" else text
+    if found.verdict == "equal":
+        return text
+    return tr(
+        "{verdict} (tool up to {printed:.1f} mm off as printed; after alignment {aligned:.4g} mm)",
+        verdict=text,
+        printed=found.as_printed_mm,
+        aligned=found.aligned_mm,
+    )
+
+
+def layer_rows(found: Comparison) -> list[tuple[str, str, str]]:
+    """Of each layer its name, whether it agrees, and how it differs."""
+    rows = []
+    for name, shown in LAYERS.items():
+        layer = getattr(found, name)
+        if (
+            layer is None
+            or (name == "coupling" and layer.same)
+            or (name in ("limits", "speeds") and layer.same is None)
+        ):
+            continue
+        rows.append((tr(shown), tr(STATES[layer.same]), _detail(name, found)))
+    return rows
+
+
+def _detail(name: str, found: Comparison) -> str:
+    layer = getattr(found, name)
+    if name == "geometry":
+        return say(layer)
+    if name == "zero" and not layer.same:
+        moved = [(k, value) for k, value in enumerate(layer.offsets_deg, 1) if abs(value) > 1e-3]
+        return ", ".join(f"J{k} {value:+.6g}" for k, value in moved)
+    if name == "directions" and not layer.same:
+        return tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
+    if name == "coupling":
+        return tr("rows {rows}", rows=", ".join(map(str, layer.rows)))
+    if layer.same:
+        return ""
+    return say(layer)
+
+
+@say.register
+def _(found: GeometryLayer) -> str:
+    if found.same:
+        return tr(
+            "{count} of {count} invariants, worst {mm:.2g} mm, {deg:.2g} deg",
+            count=found.invariants,
+            mm=found.worst_mm,
+            deg=found.worst_deg,
+        )
+    entries = joined([say(each) for each in found.differences], ", ")
+    return joined([entries, *(say(each) for each in found.causes)])
+
+
+@say.register
+def _(found: Difference) -> str:
+    if isinstance(found.a, str) or isinstance(found.b, str):
+        return f"{found.entry} {found.a} → {found.b}"
+    shown = f"{found.entry} {found.a:.6g} → {found.b:.6g} {found.unit}"
+    if not found.alike:
+        return shown
+    return tr("{shown} (or {others}: a sum alone is known)", shown=shown, others=", ".join(found.alike))
+
+
+@say.register
+def _(found: Cause) -> str:
+    text = word("comparison", CAUSES, found.code)
+    amount = "" if found.amount is None else f" ({found.unit} {found.amount:.6g})".replace("( ", "(")
+    where = f"{', '.join(found.entries)}: " if found.entries else ""
+    side = tr("in the first table") if found.side == "a" else tr("in the second table")
+    return f"{where}{text}{amount}, {side}"
+
+
+@say.register
+def _(found: PlacementLayer) -> str:
+    x, y, z = (value + 0.0 if abs(value) > 5e-4 else 0.0 for value in found.shift_mm)
+    parts = []
+    if max(abs(x), abs(y), abs(z)) > 0:
+        parts.append(tr("shifted by ({x:.6g}, {y:.6g}, {z:.6g}) mm", x=x, y=y, z=z))
+    if found.turn.deg > 1e-3:
+        axis = _axis(found.turn.axis)
+        parts.append(tr("turned {deg:.6g} deg about {axis}", deg=found.turn.deg, axis=axis))
+    return joined(parts, ", ")
+
+
+def _axis(axis: tuple[float, float, float]) -> str:
+    for name, value in zip("xyz", axis):
+        if abs(value) > 1 - 1e-6:
+            return name if value > 0 else f"-{name}"
+    return "({:.4g}, {:.4g}, {:.4g})".format(*axis)
+
+
+@say.register
+def _(found: RangeLayer) -> str:
+    return joined([say(each) for each in found.differences], ", ")
+
+
+@say.register
+def _(found: RangeDifference) -> str:
+    return f"J{found.joint} {found.entry} {found.a:.6g} → {found.b:.6g} {found.unit}"

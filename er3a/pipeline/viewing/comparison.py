@@ -1,0 +1,103 @@
+"""The page of ``er3a compare``: both tables side by side, both arms in one picture, the corrected table."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from er3a.comparison.compare import Comparison
+from er3a.files.kept_files import sha256
+from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.kinematics.chain import constant_links, joint_starts
+from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages.comparison import headline, layer_rows
+from er3a.pipeline.messages.language import tr
+from er3a.pipeline.results import Input, Provenance
+from er3a.pipeline.viewing import page
+from er3a.robots.joint_limits import joint_shown
+from er3a.robots.robot import Robot
+
+COLUMNS = ("a", "alpha", "d", "offset", "direction")
+
+
+def write_comparison(
+    one: tuple[str, Robot], other: tuple[str, Robot], found: Comparison, output: Path, tolerances: tuple[float, float]
+) -> None:
+    """Render a comparison as a page; ``one`` and ``other``: as they were named on the command line, and read."""
+    mended = found.corrected
+    text = "" if mended is None else yaml_text(robot_file(mended).model_dump(exclude_none=True, exclude_defaults=True))
+    lengths, angles = (f"{value:g}" for value in tolerances)
+    words = ["--tolerance-mm", lengths, "--tolerance-deg", angles, "--html", str(output)]
+    files = [Path(name) for name, _ in (one, other) if Path(name).is_file()]
+    page.render(
+        Path(__file__).with_name("comparison.html.j2"),
+        output,
+        command=shlex.join(["er3a", "compare", one[0], other[0], *words]),
+        provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest(__name__)),
+        names=(one[0], other[0]),
+        verdict=found.verdict,
+        headline=headline(found),
+        layers=layer_rows(found),
+        columns=_columns(one[1]),
+        rows=[] if mended is None else _rows(one[1], mended),
+        corrected=text,
+        corrected_address=page.text_address(text),
+        arms=None if mended is None else _arms(one[1], other[1], found),
+        compare_script=Path(__file__).with_name("comparison.js").read_text(encoding="utf-8"),
+    )
+
+
+def _columns(robot: Robot) -> list[str]:
+    units = {"a": "mm", "d": "mm", "direction": ""}
+    return [f"{column} ({unit})" if (unit := units.get(column, "deg")) else tr("direction") for column in COLUMNS]
+
+
+def _rows(robot: Robot, mended: Robot) -> list[list[tuple[str, str, bool]]]:
+    """By row of the table and column what is printed, what it would have to be, and whether they differ."""
+    found = []
+    for k in range(robot.rows):
+        cells = []
+        for column in COLUMNS:
+            scale = {"a": 1000.0, "d": 1000.0, "direction": 1.0}.get(column, float(np.degrees(1.0)))
+            own, other = (f"{round(scale * float(getattr(each, column)[k]), 4) + 0.0:g}" for each in (robot, mended))
+            cells.append((own, other, own != other))
+        found.append(cells)
+    return found
+
+
+def _arms(one: Robot, other: Robot, found: Comparison) -> dict[str, Any]:
+    """Both arms as chains for the page's script, and what brings the second onto the first."""
+    if found.base is None or found.zero is None or found.directions is None:
+        return {}
+    turn = Rotation.from_rotvec(np.radians(found.base.turn.deg) * np.array(found.base.turn.axis)).as_matrix()
+    placed = np.eye(4)
+    placed[:3, :3], placed[:3, 3] = turn, np.array(found.base.shift_mm) / 1000
+    scale = np.where(one.sliding, 1e-3, np.radians(1.0))
+    joints = []
+    for j in range(one.joints):
+        (lower, slides), (upper, _) = (joint_shown(one, j, float(value[j])) for value in (one.lower, one.upper))
+        start = min(max(0.0, lower), upper)
+        joints.append({"lower": lower, "upper": upper, "start": start, "unit": "mm" if slides else "deg"})
+    return {
+        "arms": [_chain(one), _chain(other)],
+        "base": placed.tolist(),
+        "zeros": (scale * np.array(found.zero.offsets_deg) * one.direction).tolist(),
+        "signs": [-1 if k in found.directions.reversed else 1 for k in range(1, one.rows + 1)],
+        "joints": joints,
+    }
+
+
+def _chain(robot: Robot) -> dict[str, Any]:
+    bare = robot.without_tool()
+    coupling = np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling
+    return {
+        "links": constant_links(bare).tolist(),
+        "starts": joint_starts(bare).tolist(),
+        "directions": robot.direction.tolist(),
+        "sliding": robot.sliding.tolist(),
+        "coupling": coupling.tolist(),
+    }
