@@ -158,7 +158,7 @@ from pathlib import Path
 import numpy as np
 import er3a
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.selection import say
+from er3a.pipeline.messages.kinematics import say
 from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.study import load_study
 from er3a.selection.select import select
@@ -457,8 +457,8 @@ assert len(er3a.inverse(robot, missed, 0 * one).q) == 0
 
 @pytest.mark.long
 def test_a_column_and_its_plot(carry_out):
-    column = """    across_mm: Reals = column("greatest distance of its centre from the last axis", "mm")
-    weight_n: Reals = column("weight of the load at rest", "N", heading=N_("weight"))
+    column = """    across_mm: Reals = column("greatest distance of its centre from the last axis")
+    weight_n: Reals = column("weight of the load at rest", heading=N_("weight"))
 """
     values = """        across_mm=1000 * diagram.across[:, :last].ravel(),
         weight_n=gravity * np.repeat(diagram.mass, last),
