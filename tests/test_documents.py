@@ -47,6 +47,7 @@ STANDS_FOR = {
     "program": {},
     "calibrate": {"ROBOT": "er3a_c60", "MEASUREMENTS.csv": "measured.csv", "FILE.csv": "measured.csv"},
     "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
+    "compare": {"A": "er3a_c60", "B": "er3_600", "table.csv": "er3a_c60_article", "arm.urdf": "er3a_c60"},
     "--help": {},
 }
 # Those of a study: tests/integration/test_wheel.py runs them, but for what a terminal or a desktop is needed.
@@ -214,8 +215,8 @@ def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(tmp_path
         for words in of_verb:
             command = [sys.executable, "-m", "er3a", verb, *(stands_for.get(word, word) for word in words)]
             done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-            unsafe = verb == "program"  # one of those paths is, on purpose, and is refused
-            assert done.returncode == int(unsafe), (verb, words, done.stderr)
+            told = verb in ("program", "compare")  # of a path that is unsafe on purpose, and of arms that differ
+            assert done.returncode == int(told), (verb, words, done.stderr)
     assert list((tmp_path / "programs").glob("*.src"))
 
 

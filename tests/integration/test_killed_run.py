@@ -86,5 +86,8 @@ def test_sigterm_ends_a_run_and_its_jobs_with_one_line_and_without_temporary_fil
 
 def jobs_below(pid: int) -> list[psutil.Process]:
     """The processes of jobs below a run, the server's that do them in their name too; none before there is a job."""
-    below = psutil.Process(pid).children(recursive=True)
-    return below if any({"compute", "sample"} & set(each.cmdline()) for each in below) else []
+    below = [each for each in psutil.Process(pid).children(recursive=True) if each.status() != psutil.STATUS_ZOMBIE]
+    try:
+        return below if any({"compute", "sample"} & set(each.cmdline()) for each in below) else []
+    except psutil.NoSuchProcess:  # one has just ended
+        return []

@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 
 from er3a.pipeline.results import check_checksum
 from er3a.pipeline.study import STAGES
-from er3a.pipeline.viewing import viewer
+from er3a.pipeline.viewing import preview
 from er3a.pipeline.viewing.arm import LABEL
 from testing.small_study import stages_of
 from tests.conftest import ROBOT, ROBOTS, ROOT
@@ -105,7 +105,7 @@ def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, r
 @pytest.mark.parametrize("stage", ["workspace", "inverse"])
 def test_a_preview_drawn_again_is_the_same_to_the_byte(small_study, stage, vulkan, tmp_path):
     recording = small_study.folder / f"reports/{ROBOT}/{stage}.rrd"
-    assert viewer.draw_preview(recording, tmp_path / "again.webp") is None
+    assert preview.draw_preview(recording, tmp_path / "again.webp") is None
     assert (tmp_path / "again.webp").read_bytes() == recording.with_suffix(".webp").read_bytes()
 
 
@@ -113,7 +113,7 @@ def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(small_study
     for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
         monkeypatch.setenv(name, "/nowhere")
     monkeypatch.setenv("LIBGL_DRIVERS_PATH", "/nowhere")
-    told = viewer.draw_preview(small_study.folder / f"reports/{ROBOT}/inverse.rrd", tmp_path / "inverse.webp")
+    told = preview.draw_preview(small_study.folder / f"reports/{ROBOT}/inverse.rrd", tmp_path / "inverse.webp")
     assert re.fullmatch("the Rerun viewer .+", told)
     assert (tmp_path / "inverse.webp").read_bytes() == b""
 
