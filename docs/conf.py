@@ -57,6 +57,7 @@ ROOMS = {
     "What an arm can reach": ("workspace",),
     "Paths": ("planning", "collision"),
     "Choosing solutions": ("selection",),
+    "Comparing arms": ("comparison",),
     "References, diagnosis, calibration": ("references", "identifiability", "diagnosis", "calibration"),
     "Robot programs": ("programs", "program_check"),
     "What the motors feel": ("dynamics",),
@@ -65,7 +66,7 @@ ROOMS = {
     "Beneath": ("numerics",),
 }
 TABLE = ("| module | what it is about |", "|---|---|")
-ALONE = ("errors", "findings", "display", "public")
+ALONE = ("errors", "findings", "by_value", "public")
 
 
 def first_sentence(text: str | None) -> str:
