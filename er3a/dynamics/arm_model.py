@@ -5,16 +5,13 @@ The model's joints are the rows of the table, with ``x = direction * (coupling @
 belong to the joints that the drives move, and are added there, because Pinocchio's model knows no coupling, and its
 ``rnea`` no friction.
 
+The one place where Pinocchio [3]_ is imported.
+
 References
 ----------
 .. [1] R. Featherstone, *Rigid Body Dynamics Algorithms*, chapters 5 to 7 (RNEA, CRBA, ABA).
 .. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, 7.2 and 7.5.
-
-The one place where Pinocchio [1]_ is imported.
-
-References
-----------
-.. [1] J. Carpentier et al., "The Pinocchio C++ library", IEEE/SICE Int. Symp. on System Integration (2019).
+.. [3] J. Carpentier et al., "The Pinocchio C++ library", IEEE/SICE Int. Symp. on System Integration (2019).
 """
 
 from __future__ import annotations
@@ -242,11 +239,11 @@ def _outline(part: Envelope | Reals) -> Reals:
 
 
 def filled(points: Reals, density: float = WATER) -> MassBody:
-    """The hull of points (k, 3), m, filled at ``density`` (kg/m^3), as tetrahedra about its middle [1]_.
+    """The hull of points (k, 3), m, filled at ``density`` (kg/m^3), as tetrahedra about its middle [4]_.
 
     References
     ----------
-    .. [1] F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", J. Math. Stat. 1 (2005).
+    .. [4] F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", J. Math. Stat. 1 (2005).
     """
     hull, middle = scipy.spatial.ConvexHull(points), points.mean(axis=0)
     corners = points[hull.simplices] - middle

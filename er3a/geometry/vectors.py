@@ -104,11 +104,11 @@ def wrap_to_pi(angle: Reals) -> Reals:
 
 
 def fibonacci_sphere(count: int, turned_back: bool = False) -> Reals:
-    """Nearly even unit vectors (count, 3), each for the same area [1]_; ``turned_back``: mirrored at y = 0.
+    """Nearly even unit vectors (count, 3), each for the same area [2]_; ``turned_back``: mirrored at y = 0.
 
     References
     ----------
-    .. [1] A. Gonzalez, "Measurement of areas on a sphere using Fibonacci and latitude-longitude lattices",
+    .. [2] A. Gonzalez, "Measurement of areas on a sphere using Fibonacci and latitude-longitude lattices",
        Mathematical Geosciences 42, 2010.
     """
     n = np.arange(count)

@@ -5,33 +5,30 @@ Six equations with a symmetric positive matrix, for many lanes at once.
 Cholesky's factors written out [1]_, so that one pass over the lanes does it all: ``l_ij`` are the entries of the lower
 factor, ``r_i`` the reciprocals of its diagonal.
 
-References
-----------
-.. [1] G. H. Golub, C. F. Van Loan, *Matrix Computations*, 4th ed., algorithm 4.2.1.
-
 The iteration behind the numerical inverse, as a kernel over poses.
 
 Levenberg-Marquardt on the pose error in the tool frame of the target: the position in parts of a length, the rotation
-as a rotation vector [1]_. The damping falls with the squared error [2]_, so that convergence is quadratic. Joints at a
+as a rotation vector [2]_. The damping falls with the squared error [3]_, so that convergence is quadratic. Joints at a
 limit that the step would leave are held there (projected Gauss-Newton). A start that stalls is given up for a random
-one; random numbers depend on seed, pose and start alone [3]_.
+one; random numbers depend on seed, pose and start alone [4]_.
 
 ``LANES`` poses are iterated side by side, so that the arithmetic becomes vector instructions; a lane that is done takes
 the next pose. What a lane computes depends on its own pose alone.
-
-References
-----------
-.. [1] R. M. Murray, Z. Li, S. S. Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994, equation 2.18;
-   its derivative: J. Sola et al., "A micro Lie theory", arXiv 1812.01537, equations 145 and 146.
-.. [2] T. Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans.
-   Robotics 27(5), 2011.
-.. [3] G. L. Steele, D. Lea, C. H. Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
 
 The iteration of :mod:`iteration` for arms of any number of joints, sliding or coupled ones among them.
 
 The same steps without lanes: Levenberg-Marquardt on the pose error in the target's tool frame, damped by the squared
 error, joints held at limits that a step would leave, random starts by counters. Joints that slide count in parts of the
 arm's length.
+
+References
+----------
+.. [1] G. H. Golub, C. F. Van Loan, *Matrix Computations*, 4th ed., algorithm 4.2.1.
+.. [2] R. M. Murray, Z. Li, S. S. Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994, equation 2.18;
+   its derivative: J. Sola et al., "A micro Lie theory", arXiv 1812.01537, equations 145 and 146.
+.. [3] T. Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans.
+   Robotics 27(5), 2011.
+.. [4] G. L. Steele, D. Lea, C. H. Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
 """
 
 from __future__ import annotations

@@ -5,22 +5,19 @@ type of singularity: *wrist* (axes 4 and 6 align), *elbow* (arm straight or fold
 in the plane of axis 1 and the direction of axis 2, where turning joint 1 can't move it). So is that of an arm with
 parallel axes 2, 3 and 4: there the wrist centre is where axes 5 and 6 meet, and the forearm ends on axis 4.
 
-References
-----------
-.. [1] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 3.3.
-.. [2] T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research 4(2), 1985.
-
 Singularities of any arm along a motion: where its Jacobian loses rank, and which axes become dependent.
 
 Columns of joints that slide, and linear rows, are scaled by the arm's length. With six joints the determinant changes
 sign where the motion crosses the singular set. With more, or fewer, rank loss is told by the smallest singular value.
 Between two samples nothing is missed: turning joint j by d changes the scaled Jacobian by at most ``B_j d`` in norm,
-and no singular value by more [1]_, so an interval whose ends have larger ones than its joints' travel can take away is
+and no singular value by more [3]_, so an interval whose ends have larger ones than its joints' travel can take away is
 clear; others are halved. Axes are named by the smallest set of columns that are dependent there.
 
 References
 ----------
-.. [1] R. A. Horn, C. R. Johnson, *Matrix Analysis*, 2nd ed., corollary 7.3.5 (Weyl).
+.. [1] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 3.3.
+.. [2] T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research 4(2), 1985.
+.. [3] R. A. Horn, C. R. Johnson, *Matrix Analysis*, 2nd ed., corollary 7.3.5 (Weyl).
 """
 
 from __future__ import annotations

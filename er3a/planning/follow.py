@@ -10,10 +10,6 @@ that they lie on (several, if the start is singular).
 
 An unreachable pose interrupts the sequence; the stretch behind it is solved on its own.
 
-References
-----------
-.. [1] R. Bellman, *Dynamic Programming*, Princeton, 1957.
-
 All closed-form branches along a line, on a grid that is refined until each branch can be told from the others.
 
 Between two grid points a branch is followed by continuity, which is safe only if no joint of it moves far between them.
@@ -27,7 +23,8 @@ A line as an arm follows it: joint angles at any point of the way, and their der
 
 References
 ----------
-.. [1] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, sections 3.5 and 3.6 (equations 3.46, 3.98).
+.. [1] R. Bellman, *Dynamic Programming*, Princeton, 1957.
+.. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, sections 3.5 and 3.6 (equations 3.46, 3.98).
 """
 
 from __future__ import annotations

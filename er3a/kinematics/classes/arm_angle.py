@@ -5,11 +5,6 @@ tells by how much: it is the angle about that line from the plane with a referen
 the elbow, the direction ``+-(axis 4 x S W)``, + where joint 4 is bent in the positive sense [1]_. Shoulder and wrist
 are three joints through a point each, with two roots. The slot is ``4 elbow + 2 shoulder + wrist``.
 
-References
-----------
-.. [1] K. Kreutz-Delgado, M. Long, H. Seraji, "Kinematic analysis of 7-DOF manipulators", Int. J. Robotics Research 11
-   (1992).
-
 Three revolute joints through one point: their angles from a rotation, by two roots.
 
 With a the angle between axes 1 and 2 and b that between 2 and 3 the rotation is ``Rz(x) Rx(a) Rz(y) Rx(-b) Rz(z)``.
@@ -20,11 +15,13 @@ Which arm angles keep the joints of :mod:`arm_angle` within limits, and which of
 
 All entries of the rotations of shoulder and wrist are ``a cos(psi) + b sin(psi) + c``, and "a joint is at its limit" is
 linear in them. The arm angles at which limits are met are therefore zeros of such terms, and the set within the limits
-is a union of intervals with exact ends [1]_.
+is a union of intervals with exact ends [2]_.
 
 References
 ----------
-.. [1] M. Shimizu et al., "Analytical inverse kinematic computation for 7-DOF redundant manipulators with joint limits
+.. [1] K. Kreutz-Delgado, M. Long, H. Seraji, "Kinematic analysis of 7-DOF manipulators", Int. J. Robotics Research 11
+   (1992).
+.. [2] M. Shimizu et al., "Analytical inverse kinematic computation for 7-DOF redundant manipulators with joint limits
    and its application to redundancy resolution", IEEE Trans. Robotics 24 (2008).
 """
 

@@ -15,11 +15,6 @@ the determinant is a trigonometric polynomial of degree 8 in x_3 (of Raghavan an
 Special lengths and angles make the determinant vanish for some readings of the loop, never for all in arms that were
 met; :mod:`six_revolute` chooses among the twelve.
 
-References
-----------
-.. [1] M. Raghavan, B. Roth, "Inverse kinematics of the general 6R manipulator and related linkages", J. Mech. Design
-   115 (1993).
-
 Fifteen numbers of a directed line with a point on it, which every rigid motion maps linearly.
 
 For the point p and the direction l: p, l, ``p x l``, ``(p . p) l - 2 (p . l) p`` (three numbers each), ``p . p``,
@@ -27,22 +22,19 @@ For the point p and the direction l: p, l, ``p x l``, ``(p . p) l - 2 (p . l) p`
 a linear combination of them, so the equations of a chain are products of constant matrices and rotations about z, and
 those turn the first two components of each triple.
 
-References
-----------
-.. [1] M. Raghavan, B. Roth, "Inverse kinematics of the general 6R manipulator and related linkages", J. Mech. Design
-   115 (1993).
-
 All real zeros of a trigonometric polynomial of degree 8, none missed that rises above its noise.
 
 On each of eight arcs the polynomial, as a polynomial in the tangent of half the angle from the arc's middle, is written
-in Bernstein's basis, whose coefficients enclose its values [1]_. Arcs without a change of sign hold no zero, arcs on
+in Bernstein's basis, whose coefficients enclose its values [2]_. Arcs without a change of sign hold no zero, arcs on
 which the coefficients are in order hold at most one; others are halved. The change of basis enlarges no noise by more
 than 1.4, because it is a product of factors of equal size. Where the coefficients sink below the noise the arc is
 reported as *dark*: there may be zeros, a double one for instance.
 
 References
 ----------
-.. [1] B. Mourrain, F. Rouillier, M.-F. Roy, "Bernstein's basis and real root isolation", INRIA RR-5149 (2004).
+.. [1] M. Raghavan, B. Roth, "Inverse kinematics of the general 6R manipulator and related linkages", J. Mech. Design
+   115 (1993).
+.. [2] B. Mourrain, F. Rouillier, M.-F. Roy, "Bernstein's basis and real root isolation", INRIA RR-5149 (2004).
 """
 
 from __future__ import annotations
