@@ -327,7 +327,7 @@ class Followed(ByValue):
         return nearest
 
     def derivatives(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
-        """Joint angles and their first and second derivative by progress, at shares of the way (n,) [1]_.
+        """Joint angles and their first and second derivative by progress, at shares of the way (n,) [2]_.
 
         With the tool's twist per unit of progress, J q' = twist and J q'' = twist' - J' q'. Where the Jacobian is
         singular, the derivatives are those just beside, if both sides agree; else NaN: no finite joint speed follows
