@@ -17,6 +17,8 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
+import er3a.pipeline.messages.kinematics
+import er3a.pipeline.messages.validation  # noqa: F401
 from er3a.collision.along import clearance
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot

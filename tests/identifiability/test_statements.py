@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import er3a.pipeline.messages.references  # noqa: F401
+import er3a.pipeline.messages.references
+import er3a.pipeline.messages.validation  # noqa: F401
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.reactions import bases_of, count_checks

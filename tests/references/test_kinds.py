@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 import pytest
 
+import er3a.pipeline.messages.references  # noqa: F401
 from er3a.files.csv_file import CsvColumn, Written
 from er3a.files.reference_sets import FORMATS, Format, load_references
 from er3a.files.robot_library import load_robot

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.along import clearance
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene

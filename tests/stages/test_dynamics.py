@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 import er3a
+import er3a.pipeline.messages.dynamics
 from er3a.dynamics.plausibility import MissingLink
 from er3a.errors import InputError
 from er3a.files.mass_fields import WristLoadFields, check_masses

@@ -14,6 +14,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+import er3a.pipeline.messages.inverse  # noqa: F401
 from er3a.collision.along import clearance
 from er3a.errors import InputError, ResultError
 from er3a.files.robot_library import ROBOTS, load_robot

@@ -14,6 +14,7 @@ from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
 import er3a
+import er3a.pipeline.messages.validation
 from er3a.calibration.outcomes import Misfit, MorePositions, NoCorrectionFound
 from er3a.diagnosis.conclusions import MostLikelyFault, NoFewFaultsExplain, NothingToExplain
 from er3a.diagnosis.faults import WrongOffset
