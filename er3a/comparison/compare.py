@@ -84,7 +84,7 @@ class GeometryLayer:
 @dataclass(frozen=True)
 class ZeroLayer:
     """By row what B's offset is more than A's (deg; mm of joints that slide); 0 of the first and the last row, whose
-    zeros can't be told from base and flange."""
+    zeros can't be distinguished from base and flange."""
 
     same: bool
     offsets_deg: tuple[float, ...]
@@ -152,7 +152,7 @@ class Comparison(ByValue):
     geometry, zero, directions, base, flange, coupling, limits, speeds : the layers; None where joints can't be paired
     as_printed_mm : largest distance of both flanges over the joint ranges, joint values as the tables have them
     aligned_mm : the same after base, flange, zeros and directions of B are brought to A's
-    corrected : A's table with all entries mended that differ, which makes it B's arm; None for another joint count
+    corrected : A's table with all entries corrected that differ, which makes it B's arm; None for another joint count
     """
 
     verdict: VerdictWord
@@ -415,8 +415,8 @@ def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances
     several = len(found.differences) > 1 or found.unexplained > 0
     for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)) if several else ():
         there = mechanism_of(other)
-        for code, amount, unit, mended in _mended(table, other):
-            again = match(mechanism_of(mended), there, tolerances)
+        for code, amount, unit, repaired in _repaired(table, other):
+            again = match(mechanism_of(repaired), there, tolerances)
             if not again.differences and not again.unexplained:
                 yield Cause(code, side, (), amount, unit)  # type: ignore[arg-type]
                 return
@@ -429,7 +429,7 @@ def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances
         yield Cause("a_and_d_swapped", "a", swapped)
 
 
-def _mended(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Robot]]:
+def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Robot]]:
     """A table with one slip undone throughout."""
     yield "a_and_d_swapped", None, "", robot.replace(a=robot.d, d=robot.a)
     convention = "modified" if robot.convention == "standard" else "standard"

@@ -57,10 +57,10 @@ def read_arm(
         return ReadArm(robot_of(content), True, notes)
     if path.suffix in (".urdf", ".xacro", ".xml"):
         with plain_urdf(path, xacro) as plain:
-            return ReadArm(urdf_table(plain, base=base, tip=tip).replace(name=robot_name(path)), False)
+            robot, assumed = urdf_table(plain, base=base, tip=tip)
+        return ReadArm(robot.replace(name=robot_name(path)), False, assumed)
     if path.suffix in (".yaml", ".yml") or (not path.suffix and not path.exists()):
-        robot = load_robot(source)
-        return ReadArm(robot, True)
+        return ReadArm(load_robot(source), True)
     raise InputError(path, None, "is no kind of file that describes an arm", f"Give one that ends in {', '.join(READ)}")
 
 

@@ -292,13 +292,15 @@ def import_urdf(
     return UrdfImport(robot, (*found.notes, *notes, *beyond, *shaped, *weighed), float(misfit), names, first, last)
 
 
-def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = None) -> Robot:
-    """D-H table, limits and speeds alone of a URDF: no meshes are read, and nothing is compiled.
+def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = None) -> tuple[Robot, tuple[str, ...]]:
+    """D-H table, limits and speeds alone of a URDF, and notes on what was assumed: no meshes are read.
 
     Parameters and errors are those of :func:`import_urdf`.
     """
     path = Path(path)
-    return _robot_of_chain(path, read_chain(path, base, tip, False))[0]
+    chain = read_chain(path, base, tip, False)
+    robot, *_, notes = _robot_of_chain(path, chain)
+    return robot, (*chain.notes, *notes)
 
 
 def _robot_of_chain(path: Path, found: UrdfChain) -> tuple[Robot, list[UrdfJoint], Reals, Reals, list[str]]:

@@ -364,8 +364,10 @@ def _snakemake(words: list[str]) -> bool:
     try:
         with redirect_stderr(said):
             parser, asked = parse_args(words)
-    except SystemExit as end:
+    except BaseException as end:  # what it said before it ended stands where a person looks
         print(said.getvalue(), end="", file=sys.stderr)
+        if not isinstance(end, SystemExit):
+            raise
         return end.code in (0, None)
     try:
         return bool(args_to_api(asked, parser))

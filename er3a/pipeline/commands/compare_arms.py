@@ -30,7 +30,7 @@ def compare(
     xacro: Xacro = None,
     tolerance_mm: Annotated[float, typer.Option(help="lengths that differ by no more agree")] = 0.5,
     tolerance_deg: Annotated[float, typer.Option(help="angles that differ by no more agree")] = 0.1,
-    output: Annotated[Path | None, typer.Option(help="write A with what differs mended, .yaml")] = None,
+    output: Annotated[Path | None, typer.Option(help="write A with what differs corrected, .yaml")] = None,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     as_json: AsJson = False,
 ):

@@ -63,11 +63,7 @@ def layer_rows(found: Comparison) -> list[tuple[str, str, str]]:
     rows = []
     for name, shown in LAYERS.items():
         layer = getattr(found, name)
-        if (
-            layer is None
-            or (name == "coupling" and layer.same)
-            or (name in ("limits", "speeds") and layer.same is None)
-        ):
+        if layer is None or (name == "coupling" and layer.same):
             continue
         rows.append((tr(shown), tr(STATES[layer.same]), _detail(name, found)))
     return rows
@@ -84,9 +80,7 @@ def _detail(name: str, found: Comparison) -> str:
         return tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
     if name == "coupling":
         return tr("rows {rows}", rows=", ".join(map(str, layer.rows)))
-    if layer.same:
-        return ""
-    return say(layer)
+    return "" if layer.same is not False else say(layer)
 
 
 @say.register

@@ -28,8 +28,12 @@ def write_comparison(
     one: tuple[str, Robot], other: tuple[str, Robot], found: Comparison, output: Path, tolerances: tuple[float, float]
 ) -> None:
     """Render a comparison as a page; ``one`` and ``other``: as they were named on the command line, and read."""
-    mended = found.corrected
-    text = "" if mended is None else yaml_text(robot_file(mended).model_dump(exclude_none=True, exclude_defaults=True))
+    corrected = found.corrected
+    text = (
+        ""
+        if corrected is None
+        else yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True))
+    )
     lengths, angles = (f"{value:g}" for value in tolerances)
     words = ["--tolerance-mm", lengths, "--tolerance-deg", angles, "--html", str(output)]
     files = [Path(name) for name, _ in (one, other) if Path(name).is_file()]
@@ -43,10 +47,10 @@ def write_comparison(
         headline=headline(found),
         layers=layer_rows(found),
         columns=_columns(one[1]),
-        rows=[] if mended is None else _rows(one[1], mended),
+        rows=[] if corrected is None else _rows(one[1], corrected),
         corrected=text,
         corrected_address=page.text_address(text),
-        arms=None if mended is None else _arms(one[1], other[1], found),
+        arms=None if corrected is None else _arms(one[1], other[1], found),
         compare_script=Path(__file__).with_name("comparison.js").read_text(encoding="utf-8"),
     )
 
@@ -56,14 +60,14 @@ def _columns(robot: Robot) -> list[str]:
     return [f"{column} ({unit})" if (unit := units.get(column, "deg")) else tr("direction") for column in COLUMNS]
 
 
-def _rows(robot: Robot, mended: Robot) -> list[list[tuple[str, str, bool]]]:
+def _rows(robot: Robot, corrected: Robot) -> list[list[tuple[str, str, bool]]]:
     """By row of the table and column what is printed, what it would have to be, and whether they differ."""
     found = []
     for k in range(robot.rows):
         cells = []
         for column in COLUMNS:
             scale = {"a": 1000.0, "d": 1000.0, "direction": 1.0}.get(column, float(np.degrees(1.0)))
-            own, other = (f"{round(scale * float(getattr(each, column)[k]), 4) + 0.0:g}" for each in (robot, mended))
+            own, other = (f"{round(scale * float(getattr(each, column)[k]), 4) + 0.0:g}" for each in (robot, corrected))
             cells.append((own, other, own != other))
         found.append(cells)
     return found
