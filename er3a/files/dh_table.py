@@ -4,12 +4,14 @@ Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, where they
 ``direction`` (theta = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. Where a joint slides,
 ``type`` says "prismatic" (else "revolute") and ``theta_deg`` where its theta stands; its limits and speed stand in
 ``lower_mm``, ``upper_mm``, ``speed_mm_s``. A cell that does not apply to a joint is left empty. A column ``convention``
-(standard or modified, the same in all rows) counts more than what the reader is asked for.
+(standard or modified, the same in all rows) counts more than what the reader is asked for. Any of these columns may be
+in metres, inches or radians instead, and named so: ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
@@ -40,6 +42,9 @@ ASSUMED_LIMIT_DEG = 180.0
 LengthUnit = Literal["mm", "m", "in"]
 AngleUnit = Literal["deg", "rad"]
 MILLIMETRES: dict[LengthUnit, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
+DEGREES: dict[AngleUnit, float] = {"deg": 1.0, "rad": math.degrees(1.0)}
+OTHER_UNITS: dict[str, tuple[str, float]] = {unit: ("mm", scale) for unit, scale in MILLIMETRES.items() if unit != "mm"}
+OTHER_UNITS |= {"rad": ("deg", DEGREES["rad"])}
 SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
 ASSUMED_SLIDE_MM = 1000.0
 
@@ -70,10 +75,14 @@ def read_dh_table(
         naming row and column, or the field of the robot file that the values can't make
     """
     path = Path(path)
-    header = read_header(path)
-    rows = read_csv(path, NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in header})
-    _in_own_units(path, rows, length_unit, angle_unit)
-    given = set(header)
+    names = {_usual_unit(column)[0]: column for column in read_header(path)}
+    known = NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in names}
+    rows = read_csv(path, {names.get(column, column): kind for column, kind in known.items()})
+    rows = [{_usual_unit(column)[0]: value for column, value in row.items()} for row in rows]
+    asked = {"mm": MILLIMETRES[length_unit], "deg": DEGREES[angle_unit]}
+    scales = {column: _usual_unit(name)[1] or asked.get(_unit_of(column), 1.0) for column, name in names.items()}
+    _convert(path, rows, scales)
+    given = set(names)
     if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
     convention = next(iter(stated), convention)
@@ -90,7 +99,7 @@ def read_dh_table(
     kinds = {_unit(row) for row in rows}
     notes = []
     if convention == "standard" and "convention" not in given:
-        notes.append("the table was read as standard D-H; --modified if it is Craig's")
+        notes.append("the table was read as standard D-H; --convention modified if it is Craig's")
     if not given & {"offset_deg", "direction"}:
         notes.append("no column offset_deg or direction: joint angles are taken to be the table's own")
     if "deg" in kinds and "lower_deg" not in given:
@@ -102,24 +111,29 @@ def read_dh_table(
     return parse(RobotFile, _content(rows, given, name, convention, path.name), path), tuple(notes)
 
 
-def _in_own_units(path: Path, rows: list[dict[str, Any]], length_unit: LengthUnit, angle_unit: AngleUnit) -> None:
+def _unit_of(column: str) -> str:
+    """The unit that a column's name ends in, of a speed that of its path; "" if it has none."""
+    return column.removesuffix("_s").rpartition("_")[2]
+
+
+def _usual_unit(column: str) -> tuple[str, float | None]:
+    """A column's name in mm or degrees, and what takes its values to those; None if its name has them already."""
+    unit, scale = OTHER_UNITS.get(_unit_of(column), ("", None))
+    return (column if scale is None else re.sub(r"_(m|in|rad)(_s)?$", rf"_{unit}\2", column)), scale
+
+
+def _convert(path: Path, rows: list[dict[str, Any]], scales: dict[str, float]) -> None:
     """Take all values to mm and degrees; refuse lengths that are another unit's, and degrees that were read twice."""
-    longest = max((abs(row[key]) for row in rows for key in ("a_mm", "d_mm")), default=0.0)
-    if length_unit == "mm" and 0 < longest < SHORTEST_ARM_MM and not any(_unit(row) == "mm" for row in rows):
+    lengths = [column for column in ("a_mm", "d_mm") if scales[column] == 1.0]
+    longest = max((abs(row[column]) for row in rows for column in lengths), default=0.0)
+    if 0 < longest < SHORTEST_ARM_MM and len(lengths) == 2 and not any(_unit(row) == "mm" for row in rows):
         problem = f"the longest length is {longest:g} mm, which can only be metres or inches"
-        raise InputError(
-            path,
-            "columns a_mm, d_mm",
-            problem,
-            "Multiply by 1000, or by 25.4; er3a compare takes --length-unit m (or in)",
-        )
-    scales = {"mm": MILLIMETRES[length_unit], "mm_s": MILLIMETRES[length_unit]}
-    scales |= dict.fromkeys(("deg", "deg_s"), math.degrees(1.0) if angle_unit == "rad" else 1.0)
+        remedy = "Name the columns a_m, d_m (or a_in, d_in), or give --length-unit m (or in)"
+        raise InputError(path, "columns a_mm, d_mm", problem, remedy)
     for row in rows:
-        for column, value in row.items():
-            unit = column.partition("_")[2].removeprefix("s_")
-            if unit in scales and isinstance(value, float):
-                row[column] = value * scales[unit]
+        for column, scale in scales.items():
+            if isinstance(row[column], float):
+                row[column] *= scale
         alpha = row["alpha_deg"]
         if abs(alpha) > MOST_DEG:
             once = math.radians(alpha)

@@ -81,9 +81,10 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
 
 
 def _packages_near(path: Path) -> dict[str, Path]:
-    """Packages by name: the folders with a ``package.xml`` above the file, nearest last, and beside those."""
+    """Packages by name: folders above the file, nearest last, and beside those; ``package.xml`` renames one."""
     found: dict[str, Path] = {}
     for above in reversed(path.resolve().parents[:FOLDERS_UP]):
+        found |= {folder.name: folder for folder in (*sorted(above.glob("*/")), above)}
         for manifest in (*sorted(above.glob("*/package.xml")), above / "package.xml"):
             if manifest.is_file():
                 found[_package_name(manifest)] = manifest.parent

@@ -96,9 +96,13 @@ def stage_forms(robot: Robot) -> dict[str, str]:
 def check_file(path: Path) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
 
+    A folder stands for the study in it.
+
     Of a study each file that it names is looked at too, from the folder that it is run in: that which ``config``, where
     it stands, and ``data`` stand in, or else the working folder.
     """
+    if path.is_dir():
+        return check_file(path / "config" / "config.yaml")
     if path.suffix == ".csv" and path.parent.name == "targets":
         read_targets(path)
         return _WORDS["targets"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from dataclasses import replace
@@ -151,6 +152,32 @@ def test_names_come_from_odd_files_too(tmp_path, stem, name):
     assert arm_of(None, table, None).robot.name == name
 
 
+def test_a_table_says_its_units_in_its_columns_or_by_options(tmp_path):
+    millimetres = [line.split(",") for line in UR.split()[1:]]
+    metres = [
+        [n, str(float(a) / 1000), str(math.radians(float(alpha))), str(float(d) / 25.4)]
+        for n, a, alpha, d in millimetres
+    ]
+    texts = {
+        "named": ("joint,a_m,alpha_rad,d_in", metres, {}),
+        "asked": ("joint,a_mm,alpha_rad,d_in", metres, {"length_unit": "m"}),
+    }
+    (tmp_path / "usual.csv").write_text(UR, encoding="utf-8")
+    usual = arm_of(None, tmp_path / "usual.csv", None).robot
+    for name, (header, rows, options) in texts.items():
+        file = tmp_path / f"{name}.csv"
+        file.write_text("\n".join([header, *map(",".join, rows)]), encoding="utf-8")
+        robot = arm_of(None, file, None, **options).robot
+        assert np.allclose(robot.a, usual.a, atol=1e-12)
+        assert np.allclose(robot.alpha, usual.alpha, atol=1e-12)
+        assert np.allclose(robot.d, usual.d, atol=1e-12)
+    file.write_text(
+        "\n".join([texts["named"][0] + ",d_mm", *(",".join([*row, "1"]) for row in metres)]), encoding="utf-8"
+    )
+    with pytest.raises(InputError, match="d_mm"):
+        arm_of(None, file, None)
+
+
 @pytest.mark.long
 def test_an_arm_without_a_spherical_wrist_gets_targets_and_paths(tmp_path, monkeypatch):
     table = tmp_path / "ur.csv"
@@ -222,7 +249,7 @@ def test_a_table_with_all_columns(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new_text", "told"),
     [
-        ("a_mm", "a_m", "column a_m"),
+        ("a_mm", "a_cm", "column a_cm"),
         ("2,-425,0,0\n", "", "the joints are 1, 3, 4, 5"),
         ("-425", "-0.425", "looks like metres"),
         ("-425", "nan", "row 3, column a_mm"),
@@ -323,6 +350,12 @@ def test_xacro_is_expanded_with_its_packages_arguments_and_meshes(xacro):
     assert [path.name for path in xacro.parent.iterdir()] == [xacro.name]
 
 
+def test_a_folder_without_a_manifest_is_the_package_of_its_name(xacro):
+    for manifest in xacro.parents[2].glob("*/package.xml"):
+        manifest.unlink()
+    assert len(arm_of(xacro, None, None, xacro=("mesh:=box.stl",)).robot.hulls) == 1
+
+
 def test_import_urdf_takes_xacro_too(xacro, tmp_path):
     done = CliRunner().invoke(
         app, ["import-urdf", str(xacro), "--xacro", "mesh:=box.stl", "--output", str(tmp_path / "arm.yaml")]
@@ -407,7 +440,7 @@ def test_meshes_are_split_where_that_is_asked_for(xacro):
         (("--robot", "er3_600", "--dh", "x.csv"), "--dh and --robot each name an arm"),
         (("--robot", "er3_601"), "there is no robot 'er3_601'"),
         (("--robot", "er3_600", "--name", "Arm"), "can't be a robot's name"),
-        (("--robot", "er3_600", "--modified"), "--modified says how a table is meant"),
+        (("--robot", "er3_600", "--convention", "modified"), "say how a table is meant"),
         (("--urdf", "nowhere.urdf"), "there is no such file"),
         (("--robot", "er3_600", "--split"), "say how a URDF is read"),
         (("--dh", "x.csv", "--xacro", "a:=b"), "say how a URDF is read"),

@@ -7,11 +7,12 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict, astuple
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from er3a.errors import Er3aError
+from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands.options import (
     DEFAULT_REPORTS,
     DEFAULT_RESULTS,
@@ -35,6 +36,7 @@ from er3a.pipeline.messages import language
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.study import load_study
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
+from er3a.robots.robot import Convention
 
 
 @app.command(rich_help_panel=FIRST)
@@ -49,7 +51,9 @@ def new(
     dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, by the name or the file of a robot of er3a")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
-    modified: Annotated[bool, typer.Option(help="the table of --dh is modified (Craig), not standard")] = False,
+    convention: Annotated[Convention | None, typer.Option(help="of the table of --dh; standard if none")] = None,
+    length_unit: Annotated[LengthUnit, typer.Option(help="of that table, where its columns don't say")] = "mm",
+    angle_unit: Annotated[AngleUnit, typer.Option(help="of that table, where its columns don't say")] = "deg",
 ):
     """Write a study to start from: robot file, targets and paths that the arm can do, a scene, a README."""
     from er3a.pipeline.new_study.write import arm_of, write_study
@@ -57,7 +61,8 @@ def new(
     ends, arguments = (base, tip), tuple(xacro or ())
     with shown_work(f"{folder}: the arm is read") as at:
         shown = split and (lambda mesh: at(f"{mesh}: split into convex pieces"))
-        arm = arm_of(urdf, dh, robot, name=name, modified=modified, ends=ends, xacro=arguments, split=shown)
+        form: Any = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
+        arm = arm_of(urdf, dh, robot, name=name, ends=ends, xacro=arguments, split=shown, **form)
         at(f"{folder}: targets and paths that the arm can do are looked for")
         written = write_study(arm, folder)
     for note in (*arm.notes, *written.missing):

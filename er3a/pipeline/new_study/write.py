@@ -12,7 +12,7 @@ from typing import Any, Literal
 import jinja2
 
 from er3a.errors import Er3aError
-from er3a.files.dh_table import read_dh_table
+from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.kept_files import write_atomically
 from er3a.files.reference_sets import FORMATS
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
@@ -28,7 +28,7 @@ from er3a.formats.xacro import plain_urdf
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.new_study.tasks import LEAST_TARGETS, Spot, TaskSearch, reach_of, scenes
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Convention, Robot
 
 SCHEMA_LINE = "# yaml-language-server: $schema=../../config/robot.schema.json\n"
 
@@ -56,7 +56,9 @@ def arm_of(
     robot: str | None,
     *,
     name: str | None = None,
-    modified: bool = False,
+    convention: Convention | None = None,
+    length_unit: LengthUnit = "mm",
+    angle_unit: AngleUnit = "deg",
     ends: tuple[str | None, str | None] = (None, None),
     xacro: Sequence[str] = (),
     split: bool | Split = False,
@@ -66,7 +68,7 @@ def arm_of(
     Parameters
     ----------
     name : of the robot in the study; by default that of the file
-    modified : whether the D-H table is modified (Craig)
+    convention, length_unit, angle_unit : of the D-H table, where its columns don't say; "standard" if None
     ends : the URDF's links at which the arm begins and ends, where the file leaves a choice
     xacro : arguments ``NAME:=VALUE`` of a URDF that is xacro
     split : whether collision meshes of a URDF are split into convex pieces (a function gets each before that); else
@@ -84,15 +86,16 @@ def arm_of(
     if name is not None and not re.match(NAME_PATTERN, name):
         told = "small letters, digits, - and _, a letter or digit first, 64 at most"
         raise Er3aError(f"--name '{name}' can't be a robot's name: {told}")
-    if modified and dh is None:
-        raise Er3aError("--modified says how a table is meant; give it with --dh")
+    if dh is None and (convention, length_unit, angle_unit) != (None, "mm", "deg"):
+        raise Er3aError("--convention, --length-unit and --angle-unit say how a table is meant; give them with --dh")
     if urdf is None and (ends != (None, None) or xacro or split):
         raise Er3aError("--base, --tip, --xacro and --split say how a URDF is read; give them with --urdf")
     if urdf is not None:
         with plain_urdf(urdf, xacro) as file:
             return _from_urdf(file, name or robot_name(file), ends, split)
     if dh is not None:
-        content, notes = read_dh_table(dh, name or robot_name(dh), "modified" if modified else "standard")
+        units: Any = {"length_unit": length_unit, "angle_unit": angle_unit}
+        content, notes = read_dh_table(dh, name or robot_name(dh), convention or "standard", **units)
         return Arm(robot_of(content), _text(content), notes)
     return _known(str(robot), name)
 
