@@ -554,6 +554,15 @@ def test_a_double_root_stands_once():
     assert np.isfinite(inverse_batch(robot, forward(robot, own)[None]).q[0, :, 0]).sum() == 1
 
 
+def test_two_roots_a_few_microradians_apart_stand_both(random):
+    robot = arm(UR5)
+    q = random.uniform(robot.lower, robot.upper, (200, 6))
+    q[:, 2] = 10.0 ** random.uniform(-6.1, -4.5, 200) * random.choice([-1, 1], 200)  # the elbow's roots: q and -q
+    found = inverse_batch(robot, forward(robot, q))
+    for angle in (q[:, 2], -q[:, 2]):
+        assert (np.abs(found.q[:, :, 2] - angle[:, None]) < 1e-8).any(axis=1).all()
+
+
 def test_branches_that_meet_at_an_aligned_shoulder_stand_once():
     robot = ARMS["arm_angle"][0]
     q = np.array([0.7, 0.0, 1.1, -0.9, 0.5, 0.6, -0.8])
