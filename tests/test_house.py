@@ -117,3 +117,13 @@ def test_documents_name_files_where_they_stand():
             ]
             missing += [] if any(map(Path.exists, places)) else [f"{document.name}: {named}"]
     assert missing == []
+
+
+def test_docstrings_name_modules_that_are_there():
+    names = {part for path in trees() for part in path.removesuffix(".py").split("/")}
+    named = {
+        (path, reference)
+        for path in trees()
+        for reference in re.findall(r":mod:`[~.]*([\w.]+)`", (ROOT / path).read_text(encoding="utf-8"))
+    }
+    assert [each for each in sorted(named) if each[1].split(".")[-1] not in names] == []

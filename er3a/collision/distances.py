@@ -1,28 +1,24 @@
-"""Distances of the bodies that links carry, compiled: for batches of arms, for boxes of joints.
+"""Distances and depths of convex bodies, compiled: of two bodies, for batches of joint vectors, for boxes of them.
 
 A point of a body moves, while each row k of the table moves by up to ``h_k`` from where it is, by no more than the sum
 over the rows, from the body inwards, of ``h_k`` if it slides, or of ``2 sin(h_k / 2)`` times its distance from the
 axis, which the rows farther out have changed by no more than what they have added so far. A row moves by no more than
 what the joints that the coupling lays on it do together. A body moves, as a set, by no more than its points do. A pair
-whose distance exceeds that (:mod:`core_distance`) is apart in the whole box of joint vectors.
-
-Distances between two convex cores, compiled.
+whose distance exceeds that is apart in the whole box of joint vectors.
 
 A body is a core grown by a radius. The core is the hull of points, a cylinder (two points, the ends of its axis, with
 the radius of its disc) or a half-space (a normal, and how far along it the solid ends). The distance of two bodies is
 that of their cores less both radii. Two lines are measured in closed form [1]_, all else by the Gilbert-Johnson-Keerthi
-iteration [2]_, whose closest points of a simplex are found region by region [1]_.
+iteration [2]_, whose closest points of a simplex are found region by region [1]_. How deep two cores overlap is the
+least shift that parts them: their Minkowski difference holds the origin while they overlap, and its nearest face is the
+nearest way out [3]_.
 
 References
 ----------
 .. [1] C. Ericson, *Real-Time Collision Detection*, 2005, sections 5.1.5, 5.1.6 and 5.1.9.
 .. [2] E. G. Gilbert, D. W. Johnson, S. S. Keerthi, "A fast procedure for computing the distance between complex
    objects in three-dimensional space", IEEE J. Robotics and Automation 4, 1988.
-
-How deep two cores overlap: the least shift that parts them, by the hull of their Minkowski difference.
-
-The difference holds the origin while the cores overlap; its nearest face is the nearest way out (G. van den Bergen,
-*Collision Detection in Interactive 3D Environments*, 2003, sections 2.3 and 4.3.8).
+.. [3] G. van den Bergen, *Collision Detection in Interactive 3D Environments*, 2003, sections 2.3 and 4.3.8.
 """
 
 from __future__ import annotations

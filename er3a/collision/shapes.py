@@ -1,11 +1,10 @@
 """The convex bodies of an arm, of what it carries and of a scene, in one form, and as arrays for kernels.
 
-The shapes of an arm's links: those that its file gives, else capsules guessed from its table.
-
-A file that gives any shape gives them all: a link without one has none. Links are often left without a shape because
-the shapes of their neighbours cover them (frames in a wrist, rings between two housings), and a capsule guessed along
-the table's lengths lies inside what the file draws around the next joint, so that the two would overlap in every pose.
-Which links have none is said (``ArmShapes.bare``), because nothing that they hit is seen.
+The shapes of an arm's links are those that its file gives, else capsules guessed from its table. A file that gives any
+shape gives them all: a link without one has none. Links are often left without a shape because the shapes of their
+neighbours cover them (frames in a wrist, rings between two housings), and a capsule guessed along the table's lengths
+lies inside what the file draws around the next joint, so that the two would overlap in every pose. Which links have
+none is said (``ArmShapes.bare``), because nothing that they hit is seen.
 
 The guess puts a capsule around each straight piece of a link, along its joint's axis and across to the next. Its
 radius is a share of the arm's size (the sum of all link lengths): 5.5 % at the shoulder, falling to 3 % at the wrist,
@@ -117,7 +116,7 @@ class Body:
     name : ``base``, ``link_3``, or that of the solid or of what is carried
     link : 0 for the base, k for the link that row k moves, ``WORLD`` for what stands around
     points : (k, 3), m, in the link's frame; a half-space has its normal and, in the second row, its offset first
-    kind, radius, disc : see :mod:`core_distance`
+    kind, radius, disc : see :mod:`er3a.collision.distances`
     """
 
     name: str

@@ -4,10 +4,9 @@ Torques are linear in the mass of a payload whose centre and radii of gyration s
 gravity and Coulomb friction stay, viscous friction goes with it, inertia and velocity terms with its square [1]_. So
 the square of the effective torque is a polynomial of degree two in the one and of degree four in the other.
 
-How far torques can be off because masses and centres are: linear, by the regressor.
-
-``tau = Y(q, qd, qdd) p`` is linear in each body's ten parameters p [2]_. A body's mass is off with its centre and radii
-of gyration kept, so p moves along itself; its centre is off with mass and inertia about it kept. Worst cases add.
+How far torques can be off because masses and centres are is linear, by the regressor: ``tau = Y(q, qd, qdd) p`` is
+linear in each body's ten parameters p [2]_. A body's mass is off with its centre and radii of gyration kept, so p moves
+along itself; its centre is off with mass and inertia about it kept. Worst cases add.
 
 References
 ----------

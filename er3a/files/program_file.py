@@ -62,7 +62,7 @@ class ProgramsFile(StrictModel):
 
 
 def load_programs(path: str | Path) -> ProgramsFile:
-    """Read and check a program file; the programs themselves are read by :func:`er3a.programs.read_program`.
+    """Read and check a program file; the programs themselves are read by :func:`er3a.programs.languages.read_program`.
 
     Raises
     ------

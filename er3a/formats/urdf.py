@@ -3,12 +3,11 @@
 Reference: the ROS URDF specification (joint origin, axis, limit, mimic; rpy is fixed-axis roll-pitch-yaw, the same
 matrix as R = Rz(yaw) Ry(pitch) Rx(roll)).
 
-A standard D-H table from joint axes, as a URDF or a measurement gives them.
-
-Frames are placed by the common normals of neighbouring axes (Denavit and Hartenberg 1955; Siciliano et al., *Robotics:
-Modelling, Planning and Control*, section 2.8.2). What the rule leaves open is chosen so that usual arms get their
-usual table: z axes along the base frame's positive axes or along a positive d, parallel axes with equal sense and
-d = 0, x axes turned as little as possible from one joint to the next.
+The standard D-H table follows from the joint axes, as a URDF or a measurement gives them. Frames are placed by the
+common normals of neighbouring axes (Denavit and Hartenberg 1955; Siciliano et al., *Robotics: Modelling, Planning and
+Control*, section 2.8.2). What the rule leaves open is chosen so that usual arms get their usual table: z axes along the
+base frame's positive axes or along a positive d, parallel axes with equal sense and d = 0, x axes turned as little as
+possible from one joint to the next.
 
 Axes that are parallel but for an error have a common normal kilometres away. Between them d is 0 and the table takes
 Hayati's turn beta about y [1]_, which needs no normal.

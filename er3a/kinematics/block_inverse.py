@@ -2,12 +2,12 @@
 
 A block holds one number of ``BLOCK`` poses per row, so that each loop is straight-line arithmetic that becomes vector
 instructions. Joint angles are taken from points (cosine, sine) by one arctangent each; no sine or cosine is evaluated.
-The arm comes in the frames of :mod:`block_constants`.
+The arm comes in frames in which most constants vanish (below).
 
 Poses at or next to a singularity or the edge of reach are marked and left to :mod:`closed_form`, which knows about free
 joints, boundaries and why a pose is refused.
 
-An arm in the frames in which the block kernel solves it: most constants vanish there.
+The frames:
 
 - frame 1: z on axis 1, x across axes 1 and 2, the origin at the foot of axis 2's point;
 - the plane across axis 2: first direction x of frame 1, turned so that axis 2 is its normal;

@@ -1,25 +1,17 @@
 """The numerical inverse: any arm, from a start guess, with or without limits, for parts of a pose.
 
-Six equations with a symmetric positive matrix, for many lanes at once.
-
-Cholesky's factors written out [1]_, so that one pass over the lanes does it all: ``l_ij`` are the entries of the lower
-factor, ``r_i`` the reciprocals of its diagonal.
-
-The iteration behind the numerical inverse, as a kernel over poses.
-
 Levenberg-Marquardt on the pose error in the tool frame of the target: the position in parts of a length, the rotation
 as a rotation vector [2]_. The damping falls with the squared error [3]_, so that convergence is quadratic. Joints at a
 limit that the step would leave are held there (projected Gauss-Newton). A start that stalls is given up for a random
 one; random numbers depend on seed, pose and start alone [4]_.
 
 ``LANES`` poses are iterated side by side, so that the arithmetic becomes vector instructions; a lane that is done takes
-the next pose. What a lane computes depends on its own pose alone.
+the next pose. What a lane computes depends on its own pose alone. Its six equations with a symmetric positive matrix
+are solved by Cholesky's factors, written out [1]_ so that one pass over the lanes does it all: ``l_ij`` are the entries
+of the lower factor, ``r_i`` the reciprocals of its diagonal.
 
-The iteration of :mod:`iteration` for arms of any number of joints, sliding or coupled ones among them.
-
-The same steps without lanes: Levenberg-Marquardt on the pose error in the target's tool frame, damped by the squared
-error, joints held at limits that a step would leave, random starts by counters. Joints that slide count in parts of the
-arm's length.
+Arms of any other number of joints, or with sliding or coupled ones, take the same steps without lanes. Joints that
+slide count in parts of the arm's length.
 
 References
 ----------

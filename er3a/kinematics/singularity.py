@@ -1,17 +1,16 @@
-"""How near an arm is to a singularity, and to which one.
+"""How near an arm is to a singularity, to which one, and where a motion meets one.
 
 The determinant of a wrist-partitioned arm's Jacobian is a product of three factors [1]_, each of which is zero on one
 type of singularity: *wrist* (axes 4 and 6 align), *elbow* (arm straight or folded), *shoulder* (the wrist centre lies
 in the plane of axis 1 and the direction of axis 2, where turning joint 1 can't move it). So is that of an arm with
 parallel axes 2, 3 and 4: there the wrist centre is where axes 5 and 6 meet, and the forearm ends on axis 4.
 
-Singularities of any arm along a motion: where its Jacobian loses rank, and which axes become dependent.
-
-Columns of joints that slide, and linear rows, are scaled by the arm's length. With six joints the determinant changes
-sign where the motion crosses the singular set. With more, or fewer, rank loss is told by the smallest singular value.
-Between two samples nothing is missed: turning joint j by d changes the scaled Jacobian by at most ``B_j d`` in norm,
-and no singular value by more [3]_, so an interval whose ends have larger ones than its joints' travel can take away is
-clear; others are halved. Axes are named by the smallest set of columns that are dependent there.
+Along a motion any arm is singular where its Jacobian loses rank. Columns of joints that slide, and linear rows, are
+scaled by the arm's length. With six joints the determinant changes sign where the motion crosses the singular set. With
+more, or fewer, rank loss is told by the smallest singular value. Between two samples nothing is missed: turning joint j
+by d changes the scaled Jacobian by at most ``B_j d`` in norm, and no singular value by more [3]_, so an interval whose
+ends have larger ones than its joints' travel can take away is clear; others are halved. Axes are named by the smallest
+set of columns that are dependent there.
 
 References
 ----------

@@ -2,15 +2,13 @@
 
 Memory is set by the grid: samples live in chunks of a few hundred that stay in the processor's cache.
 
-The furthest samples in many fixed directions, found without storing the samples.
-
-A sample at distance r from an inner point can only be a new extreme if r exceeds a threshold that depends on the way
-it points. The ways are sorted into the patches of a cube map; with s_d the best support so far in direction d, seen
-from the inner point, and theta the least angle between d and the patch, no sample of the patch below
-``min_d s_d / cos(theta)`` improves anything. Each cell of the grid gets such a threshold, and each patch a list of the
-directions that come into question first. Both are refreshed as the support grows. They only skip what could not matter,
-so the result is that of comparing each sample with each direction.
-"""
+The furthest samples in many fixed directions are found without storing samples. A sample at distance r from an inner
+point can only be a new extreme if r exceeds a threshold that depends on the way it points. The ways are sorted into the
+patches of a cube map; with s_d the best support so far in direction d, seen from the inner point, and theta the least
+angle between d and the patch, no sample of the patch below ``min_d s_d / cos(theta)`` improves anything. Each cell of
+the grid gets such a threshold, and each patch a list of the directions that come into question first. Both are
+refreshed as the support grows. They only skip what could not matter, so the result is that of comparing each sample
+with each direction."""
 
 from __future__ import annotations
 

@@ -1,14 +1,13 @@
-"""The proof for any serial arm: closed lines of joint values fill rings (:mod:`.general_inner`), sets about each axis
-leave them empty (:mod:`.general_outer`), and what is neither is split.
+"""The proof for any serial arm: closed lines of joint values fill rings, sets about each axis leave them empty,
+and what is neither is split.
 
-What any serial arm reaches at least: a closed line of joint values whose image winds around a ring fills it.
-
-Hold joint 1 still and let f take the other joints' values to radius and height of the tool point. The limits of the
-joints leave a convex set, so any closed line of joint values in it spans a disc. If f takes the line around a rectangle
-of the section without touching it, with a winding number other than 0, then f takes some point of the disc to each
-point of the rectangle: otherwise f could be drawn off that point, and the winding number would be that of a constant
-[1]_. No derivative has to be regular, joints may stand at their limits, and the line may run along the border of what
-is reached; so what is lost there is about the rectangle's own size.
+**Filled**: a ring is, if the image of a closed line of joint values winds around it. Hold joint 1 still and let f take
+the other joints' values to radius and height of the tool point. The limits of the joints leave a convex set, so any
+closed line of joint values in it spans a disc. If f takes the line around a rectangle of the section without touching
+it, with a winding number other than 0, then f takes some point of the disc to each point of the rectangle: otherwise f
+could be drawn off that point, and the winding number would be that of a constant [1]_. No derivative has to be regular,
+joints may stand at their limits, and the line may run along the border of what is reached; so what is lost there is
+about the rectangle's own size.
 
 Where joint 1 slides, the section lies across it, and what holds of rings holds of bars.
 

@@ -1,19 +1,17 @@
 """The adaptive proof: rings of the section, split where they are neither filled nor empty.
 
-A second proof that a cell is filled: the tool's sphere swept across it.
+**Filled**, a second proof: the tool's sphere is swept across the cell. For a point x of the cell at the angle phi, the
+sphere of radius d about W must pass through x with the direction in the zone. Move joints 1 to 3 along a short straight
+line from a configuration where every point of the cell lies inside the sphere to one where every point lies outside: by
+the intermediate value theorem the sphere passes through each point on the way. If the direction stays in the zone all
+along, for all points of the cell, the cell is filled. Standing still in joints 2 and 3 is the case of a line along phi,
+with exact ranges; here any joint may move, which is what it takes where the wrist must lie in the cell's own half
+plane.
 
-For a point x of the cell at the angle phi, the sphere of radius d about W must pass through x with the direction in the
-zone. Move joints 1 to 3 along a short straight line from a configuration where every point of the cell lies inside the
-sphere to one where every point lies outside: by the intermediate value theorem the sphere passes through each point on
-the way. If the direction stays in the zone all along, for all points of the cell, the cell is filled. Standing still in
-joints 2 and 3 is the case of a line along phi, with exact ranges; here any joint may
-move, which is what it takes where the wrist must lie in the cell's own half plane.
-
-Proof that the tool point can't enter a cell: branch and bound over joints 1 to 3.
-
-A cell is a ring about axis 1 with a rectangle as section, of middle (rho, z) and half sides h; only the angle phi
-between the cell's azimuth and the arm's plane matters, so the box is over (phi, theta_2, tau). A tool point at
-x + delta in the cell needs, with v = x - W (see :mod:`er3a.workspace.section_arm`)::
+**Empty**: that the tool point can't enter a cell is proven by branch and bound over joints 1 to 3. A cell is a ring
+about axis 1 with a rectangle as section, of middle (rho, z) and half sides h; only the angle phi between the cell's
+azimuth and the arm's plane matters, so the box is over (phi, theta_2, tau). A tool point at x + delta in the cell
+needs, with v = x - W (see :mod:`er3a.workspace.section_arm`)::
 
     |v + delta|^2 = d^2     and     d low <= (v + delta) . f <= d high.
 

@@ -1,8 +1,7 @@
 """The side view as manufacturers draw it: x in the arm's plane, positive to the front at joint 1 = 0, and height.
 
-The exact border of the section, as circular arcs with the joint values that make them.
-
-In the arm's plane, with points as complex numbers x + i z, an arm that is its own mirror image has
+The exact border of the section is made of circular arcs, which come with the joint values that make them. In the arm's
+plane, with points as complex numbers x + i z, an arm that is its own mirror image has
 
     W = C + e^(-i theta_2) (U + e^(-i tau) M),    p = W + d e^(-i gamma) f,    f = e^(-i (theta_2 + tau)) F
 

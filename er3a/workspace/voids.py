@@ -1,8 +1,7 @@
 """Voids inside the hull: what the proof finds empty, and what only samples tell of.
 
-Voids that samples leave: untouched cells inside the hull, sorted into enclosed ones and open pockets.
-
-How far to trust a void rests on its rim, the touched cells that border it:
+Voids that samples leave are untouched cells inside the hull, sorted into enclosed ones and open pockets. How far to
+trust a void rests on its rim, the touched cells that border it:
 
 * Would chance explain it? With the rim's low density (the 5 % quantile of samples per cell) the void's cells would
   hold ``expected_samples``; the chance of seeing none is exp of minus that number.

@@ -1,7 +1,7 @@
 """Six revolute joints reduced to one: a determinant that vanishes at one joint's angle of each solution.
 
 The chain and the pose close a loop of six joints, ``Rz(x_1) K_1 ... Rz(x_6) K_6 = 1``, which can be read from any joint
-on and in either sense. Joint 6's axis, as fifteen numbers (:mod:`lines`), is seen from joint 2 in two ways:
+on and in either sense. Joint 6's axis, as fifteen numbers (below), is seen from joint 2 in two ways:
 
     K_2 Rz(x_3) K_3 Rz(x_4) K_4 Rz(x_5) K_5 axis = Rz(-x_2) K_1^-1 Rz(-x_1) K_6^-1 axis
 
@@ -15,20 +15,18 @@ the determinant is a trigonometric polynomial of degree 8 in x_3 (of Raghavan an
 Special lengths and angles make the determinant vanish for some readings of the loop, never for all in arms that were
 met; :mod:`six_revolute` chooses among the twelve.
 
-Fifteen numbers of a directed line with a point on it, which every rigid motion maps linearly.
-
-For the point p and the direction l: p, l, ``p x l``, ``(p . p) l - 2 (p . l) p`` (three numbers each), ``p . p``,
+**Fifteen numbers** of a directed line with a point on it are mapped linearly by every rigid motion. For the point p and
+the direction l they are p, l, ``p x l``, ``(p . p) l - 2 (p . l) p`` (three numbers each), ``p . p``,
 ``p . l`` and 1. They are the monomials of Raghavan and Roth's fourteen equations [1]_. Under x -> R x + t each image is
 a linear combination of them, so the equations of a chain are products of constant matrices and rotations about z, and
 those turn the first two components of each triple.
 
-All real zeros of a trigonometric polynomial of degree 8, none missed that rises above its noise.
-
-On each of eight arcs the polynomial, as a polynomial in the tangent of half the angle from the arc's middle, is written
-in Bernstein's basis, whose coefficients enclose its values [2]_. Arcs without a change of sign hold no zero, arcs on
-which the coefficients are in order hold at most one; others are halved. The change of basis enlarges no noise by more
-than 1.4, because it is a product of factors of equal size. Where the coefficients sink below the noise the arc is
-reported as *dark*: there may be zeros, a double one for instance.
+**All real zeros** of the polynomial are found that rise above its noise. On each of eight arcs the polynomial, as a
+polynomial in the tangent of half the angle from the arc's middle, is written in Bernstein's basis, whose coefficients
+enclose its values [2]_. Arcs without a change of sign hold no zero, arcs on which the coefficients are in order hold at
+most one; others are halved. The change of basis enlarges no noise by more than 1.4, because it is a product of factors
+of equal size. Where the coefficients sink below the noise the arc is reported as *dark*: there may be zeros, a double
+one for instance.
 
 References
 ----------

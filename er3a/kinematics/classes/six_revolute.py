@@ -1,6 +1,6 @@
 """All solutions, up to sixteen, of any chain of six revolute joints.
 
-One joint's angle follows from the zeros of a trigonometric polynomial (:mod:`hidden_joint`, :mod:`circle_zeros`); the
+One joint's angle follows from the zeros of a trigonometric polynomial (:mod:`hidden_joint`); the
 null vector of its matrix gives two more, the remaining three follow one by one, and Newton's method on the chain itself
 (:mod:`polish`) decides what is a solution.
 

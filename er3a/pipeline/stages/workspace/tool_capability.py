@@ -187,7 +187,7 @@ def tool_capability(
     Parameters
     ----------
     cell : m, edge of the workspace's cells; taken coarser where more would span the reach, or take too long, than
-        :mod:`.capability_plan` allows
+        the plan of cells allows
     scene : what the arm may not touch where it serves the box, and in clear poses; nor may it touch itself
     seed : of the poses tried
     proven : what is known of the reach; cells that are proven empty need not be asked
