@@ -193,6 +193,32 @@ def test_every_table_sorts_by_every_column(browser, small_study, page):
             assert list(map(shown_number, falling)) == sorted(numbers, reverse=True)
 
 
+def test_cells_with_units_signs_and_marks_sort_by_value(browser, tmp_path, small_study):
+    shown = {
+        "unit": ["13.8 mm", "5.12 mm", "–", "−2 mm", "1\u202f200 ± 3 mm"],
+        "sign": ["+352", "+10", "", "+19", "+12"],
+        "mark": ["✓ 12 deg", "✗ 100 deg", "≥ 3 deg", "< 0.5 deg", "✓ 1.5·10⁻³ deg"],
+        "name": ["6R", "pick 2", "2-axis", "pick 10", "arm_3"],
+    }
+    rising = {
+        "unit": ["−2 mm", "5.12 mm", "13.8 mm", "1\u202f200 ± 3 mm", "–"],
+        "sign": ["+10", "+12", "+19", "+352", ""],
+        "mark": ["✓ 1.5·10⁻³ deg", "< 0.5 deg", "≥ 3 deg", "✓ 12 deg", "✗ 100 deg"],
+    }
+    browser.get((small_study.folder / "reports/er3a_c60/inverse.html").as_uri())
+    rows = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in zip(*shown.values()))
+    table = (
+        f"<table><thead><tr>{''.join(f'<th>{name}</th>' for name in shown)}</tr></thead><tbody>{rows}</tbody></table>"
+    )
+    browser.execute_script(
+        "document.body.innerHTML = arguments[0]; makeSortable(document.querySelector('table'))",
+        table.replace("< 0", "&lt; 0"),
+    )
+    orders = dict(zip(shown, (column[1] for column in browser.execute_script(SORT_ALL))))
+    assert orders | rising == orders
+    assert sorted(orders["name"]) == sorted(shown["name"])
+
+
 SORT_ALL = """
 for (const part of document.querySelectorAll("[data-one-of] > [hidden]")) part.hidden = false;
 const columns = [];

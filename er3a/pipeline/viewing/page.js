@@ -19,9 +19,25 @@ function textOf(cell) {
   return (cell.innerText || cell.textContent).replace(/\s*\n\s*/g, " ").trim(); // what is folded has no inner text
 }
 
+const NUMBER = /[+−-]?\d+(?:\u202f\d{3})*(?:\.\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|e[+−-]?\d+)?/u;
+const LEADING = new RegExp(`^[^\\p{L}\\d+−-]*(${NUMBER.source})(?![\\p{L}\\d_.-])`, "u");
+
+// The number that a cell begins with, after a mark and before a unit, a spread or words; NaN if it begins otherwise.
+function valueOf(text) {
+  const exact = numberIn(text);
+  const found = Number.isNaN(exact) && LEADING.exec(text);
+  return found ? numberIn(found[1].replaceAll("−", "-")) : exact;
+}
+
+// What each row of a column sorts by: if most cells begin with a number, that.
+function sortedBy(texts) {
+  const filled = texts.filter((text) => text !== "" && text !== "–");
+  const numeric = 2 * filled.filter((text) => !Number.isNaN(valueOf(text))).length > filled.length;
+  return texts.map((text) => [text, (numeric ? valueOf : numberIn)(text)]);
+}
+
 // Numbers by value, then words by letter; empty cells and dashes come last either way.
-function compare(a, b, sign) {
-  const [x, y] = [numberIn(a), numberIn(b)];
+function compare([a, x], [b, y], sign) {
   const rank = (text, number) => (Number.isNaN(number) ? (text === "" || text === "–" ? 2 : 1) : 0);
   const ranks = rank(a, x) - rank(b, y);
   if (ranks !== 0) return ranks;
@@ -48,7 +64,9 @@ function makeSortable(table) {
       headers.forEach((other) => other.removeAttribute("aria-sort"));
       if (next !== "none") header.setAttribute("aria-sort", next);
       const sign = next === "descending" ? -1 : 1;
-      const keys = new Map(written.map((row) => [row, row.cells[column] ? textOf(row.cells[column]) : ""]));
+      const texts = written.map((row) => (row.cells[column] ? textOf(row.cells[column]) : ""));
+      const by = sortedBy(texts);
+      const keys = new Map(written.map((row, place) => [row, by[place]]));
       const rows = next === "none" ? written : [...written].sort((a, b) => compare(keys.get(a), keys.get(b), sign));
       body.append(...rows);
     };
