@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -63,15 +64,21 @@ def import_urdf(
 def export_urdf(
     robot: AnyRobot,
     output: Annotated[Path, typer.Option(help="the URDF to write")],
+    srdf: Annotated[Path | None, typer.Option(help="also write what MoveIt needs: pairs of links not to check")] = None,
 ):
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
+    from er3a.formats.srdf import export_srdf
     from er3a.formats.urdf import export_urdf as urdf_text
 
-    text = urdf_text(load_robot(robot), output.with_name(f"{output.stem}_meshes"))
-    write_atomically(output, lambda path: path.write_text(text, encoding="utf-8"))
-    print(f"{output}: written")
+    arm = load_robot(robot)
+    texts = {output: urdf_text(arm, output.with_name(f"{output.stem}_meshes"))}
+    if srdf is not None:
+        texts[srdf] = export_srdf(arm)
+    for file, text in texts.items():
+        write_atomically(file, partial(Path.write_text, data=text, encoding="utf-8"))
+        print(f"{file}: written")
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
