@@ -6,15 +6,20 @@ Columns of the tool: ``x_mm``, ``y_mm``, ``z_mm`` and those of one form of orien
 (:data:`er3a.files.target_file.FORMS`). Columns of the joints: ``q1_deg`` .. ``qn_deg``, of those that
 slide ``q3_mm``. Either with ``t_s``, which
 starts at 0 and rises. A row that repeats the point before is a halt if the table has times, else it is left out.
+
+A joint trajectory of ROS or MoveIt (``trajectory_msgs/JointTrajectory``, or ``moveit_msgs/RobotTrajectory`` around it)
+as YAML or JSON is a timed table of joints. Of its points positions and times count; which joint is which says the
+number in its name.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, TypeGuard, get_args
 
 import numpy as np
 import scipy
@@ -26,7 +31,7 @@ from er3a.files.robot_file import Name, Text
 from er3a.files.shipped import given_file
 from er3a.files.target_file import FORMS, POSITION, Orientation
 from er3a.files.units import JointsDeg, PositionMm, Triple, check_degrees, check_millimetres, joint_rates, joint_values
-from er3a.files.yaml_file import StrictModel, load
+from er3a.files.yaml_file import StrictModel, load, read_yaml
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -53,6 +58,7 @@ UNIT_LENGTH_TOLERANCE = 1e-6
 LONGEST_S = 3600.0
 MOST_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
+MOST_RAD = 10 * 2 * math.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +71,7 @@ class PathTable:
     times : (n,), s, rising from 0; None for a table without
     poses : (n, 4, 4), T_base_tool; None for a table of joints
     joints : (n, joints), rad or m; None for a table of the tool
-    sliding : of a table of joints, which of them it gives in mm
+    sliding : of a table of joints, which of them it gives in mm; None where units don't say, as in ROS
     repeated : (n,) bool, whether a row repeats the point before
     """
 
@@ -75,7 +81,7 @@ class PathTable:
     poses: Reals | None
     joints: Reals | None
     repeated: Flags
-    sliding: tuple[bool, ...] = ()
+    sliding: tuple[bool, ...] | None = ()
 
 
 def read_path_table(path: str | Path) -> PathTable:
@@ -88,6 +94,10 @@ def read_path_table(path: str | Path) -> PathTable:
         orientation that is none
     """
     path = given_file(Path(path))
+    if path.suffix in (".yaml", ".yml", ".json"):
+        at, values = _ros_trajectory(path)
+        repeated = _repeated(path, np.abs(np.diff(values, axis=0)).max(axis=1))
+        return PathTable(path, np.arange(1, len(values) + 1), at, None, values, repeated, None)
     header = set(read_header(path))
     forms = [form for form, columns in FORMS.items() if header & set(columns)]
     own = _joint_columns(path, header)
@@ -123,10 +133,67 @@ def read_path_table(path: str | Path) -> PathTable:
             np.swapaxes(poses[:-1, :3, :3], -1, -2) @ poses[1:, :3, :3]
         ).magnitude()
         size = np.maximum(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1), turn)
+    sliding = tuple(name.endswith("_mm") for name in own)
+    return PathTable(path, lines, times, poses, joints, _repeated(path, size), sliding)
+
+
+def _repeated(path: Path, size: Reals) -> Flags:
     repeated = np.concatenate([[False], size < SAME_POINT])
     if repeated[1:].all():
-        raise InputError(path, None, f"all {len(rows)} points are the same", "Give points that differ")
-    return PathTable(path, lines, times, poses, joints, repeated, tuple(name.endswith("_mm") for name in own))
+        raise InputError(path, None, f"all {len(repeated)} points are the same", "Give points that differ")
+    return repeated
+
+
+def _ros_trajectory(path: Path) -> tuple[Reals, Reals]:
+    """Times (n,) in s and joint values (n, joints) in rad or m of a joint trajectory of ROS."""
+    content = read_yaml(path)
+    body = content.get("joint_trajectory", content)
+    names, points = (body.get("joint_names"), body.get("points")) if isinstance(body, dict) else (None, None)
+    if not isinstance(names, list) or not isinstance(points, list) or not names:
+        remedy = "Give trajectory_msgs/JointTrajectory: joint_names, and points with positions and time_from_start"
+        raise InputError(path, None, "holds no joint trajectory", remedy)
+    if not 2 <= len(points) <= MOST_ROWS:
+        raise InputError(path, "points", f"the path has {_points(len(points))}", f"Give 2 to {MOST_ROWS} points")
+    order = _joint_order(path, [str(name) for name in names])
+    times, joints = np.empty(len(points)), np.empty((len(points), len(names)))
+    for k, point in enumerate(points):
+        values = point.get("positions") if isinstance(point, dict) else None
+        if not isinstance(values, list) or len(values) != len(names) or not all(map(_is_number, values)):
+            raise InputError(path, f"points[{k}].positions", f"not {len(names)} numbers", "Give one for each joint")
+        joints[k], times[k] = values, _seconds(path, k, point.get("time_from_start"))
+    _check_times(path, [f"points[{k}].time_from_start" for k in range(len(points))], times)
+    if np.abs(joints).max() > MOST_RAD:
+        k = int(np.abs(joints).max(axis=1).argmax())
+        problem = f"{np.abs(joints[k]).max():g} rad are more than ten turns"
+        raise InputError(path, f"points[{k}].positions", problem, "Write radians, and metres where a joint slides")
+    return times, joints[:, order]
+
+
+def _joint_order(path: Path, names: list[str]) -> list[int]:
+    """Where joints 1 to n stand, by the numbers in their names."""
+    found = [re.findall(r"\d+", name)[-1:] for name in names]
+    numbers = [int(each[0]) for each in found if each]
+    first = min(numbers, default=0)
+    if sorted(numbers) != list(range(first, first + len(names))):
+        problem = f"which joint is which can't be told from {', '.join(names)}"
+        raise InputError(path, "joint_names", problem, "Name them joint_1, joint_2 ... from the base on")
+    return sorted(range(len(names)), key=numbers.__getitem__)
+
+
+def _seconds(path: Path, k: int, value: object) -> float:
+    """Seconds of a point's ``time_from_start``: a number, or those of ROS 1 (secs, nsecs) and ROS 2 (sec, nanosec)."""
+    if _is_number(value):
+        return float(value)
+    if isinstance(value, dict):
+        whole, rest = value.get("sec", value.get("secs", 0)), value.get("nanosec", value.get("nsecs", 0))
+        if {*value} <= {"sec", "secs", "nanosec", "nsecs"} and _is_number(whole) and _is_number(rest):
+            return whole + rest * 1e-9
+    where = f"points[{k}].time_from_start"
+    raise InputError(path, where, "no time", "Write seconds, or sec and nanosec")
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _joint_columns(path: Path, header: set[str]) -> tuple[str, ...]:
@@ -151,14 +218,18 @@ def _row_joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) 
 
 def _times(path: Path, lines: Integers, rows: list[dict[str, Any]]) -> Reals:
     times = np.array([row["t_s"] for row in rows])
-    if times[0] != 0:
-        raise InputError(path, f"row {lines[0]}, column t_s", f"the path starts at {times[0]:g} s", "Start at 0")
-    for i in np.flatnonzero(np.diff(times) <= 0):
-        problem = f"{times[i + 1]:g} s is not later than {times[i]:g} s of the row before"
-        raise InputError(path, f"row {lines[i + 1]}, column t_s", problem, "Let the times rise from row to row")
-    if times[-1] > LONGEST_S:
-        raise InputError(path, f"row {lines[-1]}, column t_s", f"{times[-1]:g} s is too long", "Write seconds, not ms")
+    _check_times(path, [f"row {line}, column t_s" for line in lines], times)
     return times
+
+
+def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
+    if times[0] != 0:
+        raise InputError(path, places[0], f"the path starts at {times[0]:g} s", "Start at 0")
+    for i in np.flatnonzero(np.diff(times) <= 0).tolist():
+        problem = f"{times[i + 1]:g} s is not later than {times[i]:g} s of the row before"
+        raise InputError(path, places[i + 1], problem, "Let the times rise from row to row")
+    if times[-1] > LONGEST_S:
+        raise InputError(path, places[-1], f"{times[-1]:g} s is too long", "Write seconds, not ms")
 
 
 def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -> Reals:
@@ -476,7 +547,8 @@ class TablePath(NamedPath):
             raise source.error("duration_s", "the table's t_s gives it too", "Remove one of the two")
         repeated = tuple(table.rows[table.repeated].tolist())
         if table.joints is not None:
-            if table.sliding != tuple(robot.slides.tolist()):
+            slides = tuple(robot.slides.tolist())
+            if len(slides) != table.joints.shape[1] or table.sliding not in (None, slides):
                 columns = ", ".join(joint_columns(robot))
                 raise source.error("file", f"its joints are not those of {robot.name}", f"Give the columns {columns}")
             if self.blend_mm is not None:

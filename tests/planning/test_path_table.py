@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -44,6 +46,56 @@ def test_joint_angles_and_times(tmp_path):
     table = read_path_table(write(tmp_path, header, [0, *[0.0] * 6], [1.5, 10, 20, 30, 40, 50, 60]))
     np.testing.assert_allclose(table.joints[1], np.radians([10, 20, 30, 40, 50, 60]))
     np.testing.assert_array_equal(table.times, [0, 1.5])
+
+
+ROS = {
+    "joint_names": ["joint_3", "joint_1", "joint_2"],
+    "points": [
+        {"positions": [0.3, 0.1, 0.2], "velocities": [0, 0, 0], "time_from_start": {"sec": 0, "nanosec": 0}},
+        {"positions": [0.6, 0.4, 0.5], "time_from_start": {"secs": 1, "nsecs": 500_000_000}},
+        {"positions": [0.6, 0.4, 0.5], "time_from_start": 2},
+    ],
+}
+
+
+@pytest.mark.parametrize("name", ["move.json", "move.yaml"])
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_a_trajectory_of_ros_is_a_timed_table_in_the_order_of_its_joints(tmp_path, name, wrapped):
+    content = {"joint_trajectory": ROS, "multi_dof_joint_trajectory": {}} if wrapped else ROS
+    (tmp_path / name).write_text(json.dumps(content))
+    table = read_path_table(tmp_path / name)
+    np.testing.assert_array_equal(table.joints, [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.4, 0.5, 0.6]])
+    np.testing.assert_allclose(table.times, [0, 1.5, 2], rtol=1e-15)
+    np.testing.assert_array_equal(table.repeated, [False, False, True])
+
+
+def changed(**more):
+    return ROS | more
+
+
+def point(**more):
+    return changed(points=[ROS["points"][0], ROS["points"][1] | more])
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ({"kind": "paths"}, "holds no joint trajectory"),
+        (changed(joint_names=["shoulder", "elbow", "wrist"]), "joint_names: which joint is which"),
+        (changed(joint_names=["j1", "j1", "j2"]), "joint_names: which joint is which"),
+        (changed(points=ROS["points"][:1]), "points: the path has"),
+        (point(positions=[1, 2]), r"points\[1\].positions: not 3 numbers"),
+        (point(positions=[1, 2, True]), r"points\[1\].positions: not 3 numbers"),
+        (point(positions=[90, -45, 0]), "more than ten turns"),
+        (point(time_from_start=None), r"points\[1\].time_from_start: no time"),
+        (point(time_from_start={"seconds": 1}), "no time"),
+        (point(time_from_start=0), "not later than 0 s"),
+    ],
+)
+def test_what_is_no_trajectory_of_ros_is_one_clear_error(tmp_path, content, told):
+    (tmp_path / "move.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=told):
+        read_path_table(tmp_path / "move.json")
 
 
 def test_rows_that_repeat_the_point_before_are_marked(tmp_path):
