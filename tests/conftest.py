@@ -19,8 +19,10 @@ import numpy as np
 import pytest
 import yaml
 from hypothesis import settings
+from numba.core.registry import CPUDispatcher
 
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.classes import six_revolute
 from er3a.pipeline.cli import main
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
@@ -92,6 +94,21 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 def random() -> np.random.Generator:
     """A generator with a fixed seed."""
     return np.random.default_rng(20261120)
+
+
+@pytest.fixture
+def uncompiled(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Kernels run as the Python that they are written in: those of the general arms take half a minute to compile.
+
+    Long tests run them compiled. A chain's readings are tried at two poses only.
+    """
+    for module in [module for name, module in sys.modules.items() if name.startswith("er3a.")]:
+        for name, value in list(vars(module).items()):
+            if isinstance(value, CPUDispatcher):
+                monkeypatch.setattr(module, name, value.py_func)
+    monkeypatch.setattr(six_revolute, "TRIALS", 2)
+    with np.errstate(all="ignore"):  # as kernels have it
+        yield
 
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
