@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import re
 import shutil
@@ -18,8 +19,10 @@ import numpy as np
 import pytest
 import yaml
 from hypothesis import settings
+from numba.core.registry import CPUDispatcher
 
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.classes import six_revolute
 from er3a.pipeline.cli import main
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
@@ -34,9 +37,37 @@ settings.register_profile("no test asserts on time", deadline=None)
 settings.load_profile("no test asserts on time")
 
 
+# What is imported and collected stays to the end: looking for garbage in it takes a tenth of all processor time.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
+    gc.enable()
+
+
+def pytest_unconfigure() -> None:
+    gc.unfreeze()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Iterator[None]:
+    """Every other process collects backwards: what one has compiled to bytecode the others then load."""
+    report = yield
+    if not isinstance(collector, pytest.Module | pytest.Class) and _process_number() % 2:
+        report.result.reverse()
+    return report
+
+
+def _process_number() -> int:
+    return int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of the small study or of a stage's results of it are long; time limits of long ones and of Snakemake's."""
+    """One order in all processes; tests of the small study or of a stage's results of it are long; time limits."""
+    items.sort(key=lambda item: item.path)
     for item in items:
         fixtures = getattr(item, "fixturenames", ())
         if {"small_study", "small_results"} & set(fixtures):
@@ -63,6 +94,21 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 def random() -> np.random.Generator:
     """A generator with a fixed seed."""
     return np.random.default_rng(20261120)
+
+
+@pytest.fixture
+def uncompiled(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Kernels run as the Python that they are written in: those of the general arms take half a minute to compile.
+
+    Long tests run them compiled. A chain's readings are tried at two poses only.
+    """
+    for module in [module for name, module in sys.modules.items() if name.startswith("er3a.")]:
+        for name, value in list(vars(module).items()):
+            if isinstance(value, CPUDispatcher):
+                monkeypatch.setattr(module, name, value.py_func)
+    monkeypatch.setattr(six_revolute, "TRIALS", 2)
+    with np.errstate(all="ignore"):  # as kernels have it
+        yield
 
 
 Call = Callable[..., subprocess.CompletedProcess[str]]

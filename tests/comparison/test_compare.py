@@ -118,7 +118,7 @@ def test_no_right_table_is_accused(kind):
 @pytest.mark.parametrize("moved", [False, True])
 def test_wrong_entries_are_named(kind, moved):
     rng = np.random.default_rng(5)
-    for _ in range(12):
+    for _ in range(4):
         values = table(rng, kind)
         printed = robot(values)
         n, wrong = printed.joints, {key: value.copy() for key, value in values.items()}

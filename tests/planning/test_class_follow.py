@@ -67,6 +67,7 @@ def test_scara_follows_a_line_as_plane_trigonometry_has_it(side):
 LONG_TO_COMPILE = [pytest.param(robot, marks=pytest.mark.long) for robot in (FIVE, SIX)]
 
 
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("robot", [THREE, *LONG_TO_COMPILE])
 def test_points_and_directions_of_the_tool_are_met_between_the_points_solved(robot, random):
     q = random.uniform(0.3, 0.9, robot.joints)
@@ -90,6 +91,7 @@ def test_without_start_joints_the_roomiest_arm_is_taken_and_limits_count():
     assert follow_by_class(narrow, line(T[0], T[1], 1.0)).joints(np.array([0.0]))[0, 1] < 0
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_what_can_not_be_followed_is_told_with_the_time():
     T = forward(SCARA, by_hand(*np.array([[0.5, 0.0, 0.25, 0.0]]).T, 1))[0]
     beyond = T.copy()

@@ -159,6 +159,7 @@ def test_limits_of_sums_count(random):
     assert bounds[1][0] > 0.85 * bounds[1][1]
 
 
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("robot", [skew(), scara(-1.0, 2.0, 1.0)], ids=["skew", "scara"])
 def test_the_chain_gives_what_forward_and_jacobian_give(random, robot):
     arm, R, origin = general_arm(robot)

@@ -28,7 +28,6 @@ from er3a.workspace.section_arm import MOST_ARCS, measure, meets, remove, sectio
 from er3a.workspace.section_proof import Proof, judge, prove
 from er3a.workspace.side_view import border
 
-NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
 RIGHT = np.pi / 2
 
 
@@ -71,7 +70,7 @@ def two_links(tool: float = 0.1, **changes) -> Robot:
     ).replace(**changes)
 
 
-@pytest.fixture(scope="module", params=NAMES)
+@pytest.fixture(scope="module", params=["er3a_c60", "er3a_c60_article", pytest.param("er3_600", marks=pytest.mark.long)])
 def proven(request):
     robot = load_robot(request.param)
     return robot, SectionMap(prove(section_arm(robot), 0.0, 3000))
