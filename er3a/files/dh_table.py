@@ -10,13 +10,13 @@ Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, where they
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Literal
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
-from er3a.files.robot_file import RobotFile
+from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.files.units import MOST_DEG
 from er3a.files.yaml_file import parse
 from er3a.robots.robot import CONVENTIONS, MOST_JOINTS, Convention, Grade
@@ -40,7 +40,10 @@ ASSUMED_LIMIT_DEG = 180.0
 LengthUnit = Literal["mm", "m", "in"]
 AngleUnit = Literal["deg", "rad"]
 MILLIMETRES: dict[LengthUnit, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
-SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
+SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres
+LONGEST_ARM_IN = 200.0  # inches; a length of five metres
+ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3)
+"""What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
 ASSUMED_SLIDE_MM = 1000.0
 
 
@@ -49,15 +52,19 @@ def read_dh_table(
     name: str,
     convention: Convention = "standard",
     *,
-    length_unit: LengthUnit = "mm",
+    length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit = "deg",
+    as_printed: bool = False,
 ) -> tuple[RobotFile, tuple[str, ...]]:
     """A robot file made of a D-H table.
 
     Parameters
     ----------
     name : of the robot
-    length_unit, angle_unit : what the numbers of a table are in whose columns are named mm and deg all the same
+    length_unit, angle_unit : what the numbers of a table are in whose columns are named mm and deg all the same; with
+        no ``length_unit`` they are mm unless they can't be
+    as_printed : read values that look like another unit's all the same, with a note on what they were taken for; else
+        they are refused
 
     Returns
     -------
@@ -72,7 +79,8 @@ def read_dh_table(
     path = Path(path)
     header = read_header(path)
     rows = read_csv(path, NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in header})
-    _in_own_units(path, rows, length_unit, angle_unit)
+    short = any(0 < abs(row[key]) < SHORTEST_PLAIN_LENGTH_MM for row in rows for key in ("a_mm", "d_mm"))
+    notes = list(_in_own_units(path, rows, length_unit, angle_unit, as_printed))
     given = set(header)
     if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
@@ -88,9 +96,9 @@ def read_dh_table(
     for row in rows:
         _check_kind(path, row, given)
     kinds = {_unit(row) for row in rows}
-    notes = []
     if convention == "standard" and "convention" not in given:
-        notes.append("the table was read as standard D-H; --modified if it is Craig's")
+        option = "--convention modified" if as_printed else "--modified"
+        notes.append(f"the table was read as standard D-H; {option} if it is Craig's")
     if not given & {"offset_deg", "direction"}:
         notes.append("no column offset_deg or direction: joint angles are taken to be the table's own")
     if "deg" in kinds and "lower_deg" not in given:
@@ -99,32 +107,57 @@ def read_dh_table(
         notes.append(f"no limits in the table: 0 to {ASSUMED_SLIDE_MM:g} mm were assumed for all joints that slide")
     if any(f"speed_{unit}_s" not in given for unit in kinds):
         notes.append("no speeds in the table: those that the study assumes stand in for them")
-    return parse(RobotFile, _content(rows, given, name, convention, path.name), path), tuple(notes)
+    content = _content(rows, given, name, convention, path.name)
+    if as_printed and (short or length_unit):
+        content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
+    return parse(RobotFile, content, path), tuple(notes)
 
 
-def _in_own_units(path: Path, rows: list[dict[str, Any]], length_unit: LengthUnit, angle_unit: AngleUnit) -> None:
-    """Take all values to mm and degrees; refuse lengths that are another unit's, and degrees that were read twice."""
-    longest = max((abs(row[key]) for row in rows for key in ("a_mm", "d_mm")), default=0.0)
-    if length_unit == "mm" and 0 < longest < SHORTEST_ARM_MM and not any(_unit(row) == "mm" for row in rows):
-        problem = f"the longest length is {longest:g} mm, which can only be metres or inches"
-        raise InputError(
-            path,
-            "columns a_mm, d_mm",
-            problem,
-            "Multiply by 1000, or by 25.4; er3a compare takes --length-unit m (or in)",
-        )
-    scales = {"mm": MILLIMETRES[length_unit], "mm_s": MILLIMETRES[length_unit]}
+def _in_own_units(
+    path: Path, rows: list[dict[str, Any]], length_unit: LengthUnit | None, angle_unit: AngleUnit, as_printed: bool
+) -> Iterator[str]:
+    """Take all values to mm and degrees. Lengths that are another unit's, and degrees that were read twice, are
+    refused, or with ``as_printed`` taken for what they are, with a note."""
+    lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key]]
+    unit = length_unit or "mm"
+    if length_unit is None and lengths and not any(_unit(row) == "mm" for row in rows):
+        unit = _likely_unit(lengths)
+        if unit != "mm":
+            word = {"m": "metres", "in": "inches"}[unit]
+            if not as_printed:
+                problem = f"the lengths, {max(lengths):g} mm at most, are those of an arm in {word}"
+                remedy = f"Multiply by {MILLIMETRES[unit]:g}; er3a compare takes --length-unit {unit} (or mm)"
+                raise InputError(path, "columns a_mm, d_mm", problem, remedy)
+            yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
+    scales = {"mm": MILLIMETRES[unit], "mm_s": MILLIMETRES[unit]}
     scales |= dict.fromkeys(("deg", "deg_s"), math.degrees(1.0) if angle_unit == "rad" else 1.0)
+    twice = [row for row in rows if abs(row["alpha_deg"]) > MOST_DEG and angle_unit == "deg"]
     for row in rows:
         for column, value in row.items():
-            unit = column.partition("_")[2].removeprefix("s_")
-            if unit in scales and isinstance(value, float):
-                row[column] = value * scales[unit]
-        alpha = row["alpha_deg"]
-        if abs(alpha) > MOST_DEG:
-            once = math.radians(alpha)
-            problem = f"{alpha:g} deg is more than ten turns: it is {once:.6g} deg that were converted twice"
-            raise InputError(path, f"row {row['row']}, column alpha_deg", problem, f"Write {once:.6g}")
+            suffix = column.partition("_")[2].removeprefix("s_")
+            if suffix in scales and isinstance(value, float):
+                row[column] = value * scales[suffix]
+    for row in twice:
+        alpha, once = row["alpha_deg"], math.radians(row["alpha_deg"])
+        problem = f"{alpha:g} deg is more than ten turns: it is {once:.6g} deg that were converted twice"
+        if not as_printed:
+            remedy = f"Write {once:.6g}; er3a compare reads it so"
+            raise InputError(path, f"row {row['row']}, column alpha_deg", problem, remedy)
+        row["alpha_deg"] = once
+        yield f"row {row['row']}, column alpha_deg: {problem}"
+
+
+def _likely_unit(lengths: list[float]) -> LengthUnit:
+    """What lengths are in: inches if they are round millimetres in inches alone, else metres if all are below 10."""
+
+    def is_round(scale: float) -> bool:
+        off = [[abs(x * scale - round(x * scale / step) * step) for x in lengths] for step, _, _ in ROUND_MM]
+        return any(len(set(lengths)) >= least and max(gaps) < near for gaps, (_, near, least) in zip(off, ROUND_MM))
+
+    if max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0):
+        if max(lengths) >= SHORTEST_ARM_MM or not is_round(1000.0):
+            return "in"
+    return "m" if max(lengths) < SHORTEST_ARM_MM else "mm"
 
 
 def _unit(row: dict[str, Any]) -> str:
