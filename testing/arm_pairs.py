@@ -155,7 +155,7 @@ def effects(arm: Arm, entries: Sequence[tuple[str, int]]) -> np.ndarray:
     nothing = np.stack([(seen(each) - here) / STEP for each in free], axis=1)
     own = np.stack([(seen(changed(arm, each, STEP)) - here) / STEP for each in entries], axis=1)
     U, S, _ = np.linalg.svd(nothing, full_matrices=False)
-    U = U[:, S > 1e-7 * S[0]]
+    U = U[:, 1e-7 * S[0] < S]
     return np.asarray(own - U @ (U.T @ own))
 
 
@@ -183,7 +183,9 @@ def with_wrong_entries(random: np.random.Generator, arm: Arm) -> tuple[Arm, Wron
             amount = random.choice(LENGTHS_M) if lengths else np.radians(random.choice(ANGLES_DEG))
             wrong = changed(wrong, entries[i], amount * random.choice([1, -1]))
         if _known(entries, effect, chosen) and _known(entries, effects(wrong, entries), chosen):
-            if any(column == "a" and abs(wrong.a[k] + arm.a[k]) < 1e-9 for column, k in map(entries.__getitem__, chosen)):
+            if any(
+                column == "a" and abs(wrong.a[k] + arm.a[k]) < 1e-9 for column, k in map(entries.__getitem__, chosen)
+            ):
                 continue  # the same normal, the other way
             same = np.abs(effect.T @ effect) > ALIKE * np.outer(size, size)
             alike = [frozenset(name(entries[j]) for j in np.flatnonzero(same[i])) for i in chosen]

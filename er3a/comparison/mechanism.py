@@ -652,3 +652,57 @@ def _shifts_chosen(
             best = apart, y + free @ step
     assert best is not None
     return sides(best[1])
+
+
+# From axes ------------------------------------------------------------------------------------------------------------
+
+
+def mechanism_from_axes(directions: Reals, points: Reals, flange: Reals, angle: float) -> Mechanism:
+    """The arm that turns about given lines, all joints at 0 where they are given.
+
+    Parameters
+    ----------
+    directions, points : (m, 3), of positive rotation, and on each line, m, in the base's frame
+    flange : (4, 4) at these joint values
+    angle : rad, below which neighbouring axes are parallel
+    """
+    m = len(directions)
+    z = directions / np.linalg.norm(directions, axis=1)[:, None]
+    a, alpha, offset, d = np.zeros(m - 1), np.zeros(m - 1), np.zeros(m), np.zeros(m)
+    x, foot = _any_across(z[0]), points[0]
+    base = np.eye(4)
+    for k in range(m - 1):
+        cross, gap = np.cross(z[k], z[k + 1]), points[k + 1] - points[k]
+        sine, cosine = float(np.linalg.norm(cross)), float(z[k] @ z[k + 1])
+        if math.atan2(sine, abs(cosine)) < angle:
+            start, across = foot, points[k + 1] - foot
+            normal = across - z[k] * (z[k] @ across)
+            end, alpha[k] = start + normal, 0.0 if cosine > 0 else math.pi
+        else:
+            start = points[k] + z[k] * float(np.cross(gap, z[k + 1]) @ cross) / sine**2
+            end = points[k + 1] + z[k + 1] * float(np.cross(gap, z[k]) @ cross) / sine**2
+            normal, alpha[k] = end - start, math.nan
+        a[k] = float(np.linalg.norm(normal))
+        beside = normal / a[k] if a[k] > ON_AXIS else (x if math.isfinite(alpha[k]) else cross / sine)
+        beside = beside - z[k] * (z[k] @ beside)
+        beside = beside / np.linalg.norm(beside)
+        if math.isnan(alpha[k]):
+            alpha[k] = math.atan2(float(cross @ beside), cosine)
+        if k == 0:
+            base[:3, :3], base[:3, 3] = np.stack([beside, np.cross(z[0], beside), z[0]], axis=1), start
+        else:
+            offset[k], d[k] = math.atan2(float(np.cross(x, beside) @ z[k]), float(x @ beside)), (start - foot) @ z[k]
+        x, foot = beside, end
+    if m == 1:
+        base[:3, :3], base[:3, 3] = np.stack([x, np.cross(z[0], x), z[0]], axis=1), foot
+    last = np.eye(4)
+    x = x - z[-1] * (z[-1] @ x)
+    x = x / np.linalg.norm(x)
+    last[:3, :3], last[:3, 3] = np.stack([x, np.cross(z[-1], x), z[-1]], axis=1), foot
+    ends = base, np.linalg.inv(last) @ flange
+    return Mechanism(a, alpha, np.zeros(m - 1), d, offset, np.ones(m), np.zeros(m, dtype=bool), *ends)
+
+
+def _any_across(z: Reals) -> Reals:
+    across = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    return np.asarray(across / np.linalg.norm(across))
