@@ -21,6 +21,7 @@ from er3a.comparison.mechanism import (
     Mechanism,
     Tolerances,
     is_identity,
+    is_same_mechanism,
     match,
     mechanism_of,
     poses,
@@ -270,7 +271,7 @@ def _named(robot: Robot, found: EntryDifference) -> Difference:
     column, link = found.column, found.link
     angle = column in ("alpha", "beta", "theta")
     scale = np.degrees(1.0) if angle else 1000.0
-    one, other = scale * found.one, scale * found.other
+    one, other = (float(np.round(scale * value, 9)) + 0.0 for value in (found.one, found.other))
     alike = tuple(_name(robot, *each) for each in found.alike)
     return Difference(_name(robot, column, link), one, other, other - one, "deg" if angle else "mm", alike)
 
@@ -416,8 +417,7 @@ def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances
     for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)) if several else ():
         there = mechanism_of(other)
         for code, amount, unit, repaired in _repaired(table, other):
-            again = match(mechanism_of(repaired), there, tolerances)
-            if not again.differences and not again.unexplained:
+            if is_same_mechanism(mechanism_of(repaired), there, tolerances):
                 yield Cause(code, side, (), amount, unit)  # type: ignore[arg-type]
                 return
     for each in found.differences:
@@ -469,8 +469,7 @@ def _swapped_in_a_row(robot: Robot, other: Robot, tolerances: Tolerances) -> tup
             continue
         a, d = np.array(robot.a), np.array(robot.d)
         a[k], d[k] = d[k], a[k]
-        again = match(mechanism_of(robot.replace(a=a, d=d)), there, tolerances)
-        if not again.differences and not again.unexplained:
+        if is_same_mechanism(mechanism_of(robot.replace(a=a, d=d)), there, tolerances):
             return f"a{k + 1}", f"d{k + 1}"
     return ()
 

@@ -41,6 +41,7 @@ FAR = 3.0  # m; a normal so far along an axis is no part of an arm
 ON_AXIS = 1e-9  # m
 MOST_SENSES = 6
 MOST_ENTRIES = 4
+TURNED_END = 2  # joints reversed, that a base or flange turned counts for
 HALF_TURN = rot_x(math.pi)
 
 
@@ -210,8 +211,11 @@ def wrapped(angles: Reals) -> Reals:
 # Which way axes and normals point -------------------------------------------------------------------------------------
 
 
-def _likely_senses(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> list[tuple[Reals, Reals]]:
-    """Senses (m,) and normals (m - 1,) of the other arm, those first by which the fewest entries differ."""
+def _likely_senses(
+    one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True
+) -> list[tuple[Reals, Reals]]:
+    """Senses (m,) and normals (m - 1,) of the other arm, those first by which the fewest entries differ, then those
+    that turn the fewest bases, flanges, joints and zeros; only those by which none has to if they may not."""
     m, links = len(one.d), len(one.a)
     senses = 1.0 - 2.0 * np.array(list(itertools.product((0, 1), repeat=m)))
     near = (between(one) < NEARLY_PARALLEL) & (between(other) < NEARLY_PARALLEL)
@@ -243,11 +247,25 @@ def _likely_senses(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> 
     fixed = one.sliding & ~np.append(parallel, False) & ~np.append(False, parallel)  # their theta is geometry
     total += (moved & fixed).sum(axis=1)
     moved &= ~one.sliding
-    upright = one.base[:3, 2] @ other.base[:3, 2] * senses[:, 0] < 0
-    extra = (senses * other.direction * one.direction < 0).sum(axis=1) + moved.sum(axis=1) + upright
+    extra = (senses * other.direction * one.direction < 0).sum(axis=1) + moved.sum(axis=1)
+    extra = extra + _ends_turned(one, other, senses, turned, tolerances)
     order = np.argsort(np.floor(total) + 0.01 * extra + 1e-3 * (total % 1), kind="stable")
-    best = order[np.floor(total[order]) <= np.floor(total).min() + 1][: MOST_SENSES * (4 if one.sliding.any() else 1)]
+    most = np.floor(total).min() + 1 if may_differ or inexact.any() else 0
+    best = order[np.floor(total[order]) <= most][: MOST_SENSES * (4 if one.sliding.any() else 1)]
     return [(senses[k], normals[k]) for k in best]
+
+
+def _ends_turned(one: Mechanism, other: Mechanism, senses: Reals, turned: Reals, tolerances: Tolerances) -> Reals:
+    """``TURNED_END`` for each of base and flange that turns, (S,), by senses (S, m) and turns (S, m) of zeros."""
+    total = np.zeros(len(senses))
+    for k, own, theirs in ((0, one.base, other.base), (-1, one.flange, other.flange)):
+        over, c, s = senses[:, k], np.cos(turned[:, k]), np.sin(turned[:, k])
+        turn = np.zeros((len(senses), 3, 3))  # Rx(0 or pi) Rz of the base, Rz Rx of the flange
+        turn[:, 0, 0], turn[:, 1, 1], turn[:, 2, 2] = c, over * c, over
+        turn[:, 0, 1], turn[:, 1, 0] = (-s, over * s) if k == 0 else (-over * s, s)
+        R = theirs[:3, :3] @ turn @ own[:3, :3].T if k == 0 else own[:3, :3].T @ turn @ theirs[:3, :3]
+        total += TURNED_END * (np.trace(R, axis1=1, axis2=2) < 1 + 2 * math.cos(tolerances.angle))
+    return total
 
 
 def _beside_a_slide(sliding: Flags) -> Flags:
@@ -328,13 +346,23 @@ def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
 
     Both need the same number of rows, of the same kinds.
     """
+    found = _best_match(one, other, tolerances)
+    assert found is not None
+    return found
+
+
+def is_same_mechanism(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
+    """Whether no entry of geometry differs; much faster than :func:`match` where many do."""
+    found = _best_match(one, other, tolerances, may_differ=False)
+    return found is not None and not found.differences and not found.unexplained
+
+
+def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True) -> Match | None:
     angles = np.maximum(between(one), between(other))
     near = angles < NEARLY_PARALLEL
     exact = by_normals(one), by_normals(other)
     best: Match | None = None
-    for senses, normals in _likely_senses(*exact, tolerances):
-        if best is not None and best.rank[0] == 0:
-            break
+    for senses, normals in _likely_senses(*exact, tolerances, may_differ=may_differ):
         pairs = [(exact[0], with_senses(exact[1], senses, normals))]
         if (near & (angles > EXACTLY_PARALLEL)).any():
             local = without_far_normals(one), without_far_normals(other)
@@ -344,7 +372,8 @@ def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
             found = _settled(first, second, senses, tolerances)
             if best is None or found.rank < best.rank:
                 best = found
-    assert best is not None
+        if not may_differ and best is not None and best.rank[0] == 0:
+            break
     return best
 
 
@@ -396,7 +425,10 @@ def _settled(one: Mechanism, other: Mechanism, senses: Reals, tolerances: Tolera
     placed = one.base @ np.linalg.inv(base), np.linalg.inv(one.flange) @ flange
     reverses = one.direction * other.direction < 0
     moved = np.abs(zeros) > np.where(one.sliding, tolerances.length, tolerances.angle)
-    layers = int(reverses.sum() + moved.sum() + sum(not is_identity(T, tolerances) for T in placed))
+    ends = sum(
+        int(np.linalg.norm(T[:3, 3]) > tolerances.length) + TURNED_END * (turn_of(T) > tolerances.angle) for T in placed
+    )
+    layers = int(reverses.sum() + moved.sum()) + ends
     lengths = [abs(each.other - each.one) for each in entries]
     return Match(
         tuple(differences),
@@ -620,3 +652,57 @@ def _shifts_chosen(
             best = apart, y + free @ step
     assert best is not None
     return sides(best[1])
+
+
+# From axes ------------------------------------------------------------------------------------------------------------
+
+
+def mechanism_from_axes(directions: Reals, points: Reals, flange: Reals, angle: float) -> Mechanism:
+    """The arm that turns about given lines, all joints at 0 where they are given.
+
+    Parameters
+    ----------
+    directions, points : (m, 3), of positive rotation, and on each line, m, in the base's frame
+    flange : (4, 4) at these joint values
+    angle : rad, below which neighbouring axes are parallel
+    """
+    m = len(directions)
+    z = directions / np.linalg.norm(directions, axis=1)[:, None]
+    a, alpha, offset, d = np.zeros(m - 1), np.zeros(m - 1), np.zeros(m), np.zeros(m)
+    x, foot = _any_across(z[0]), points[0]
+    base = np.eye(4)
+    for k in range(m - 1):
+        cross, gap = np.cross(z[k], z[k + 1]), points[k + 1] - points[k]
+        sine, cosine = float(np.linalg.norm(cross)), float(z[k] @ z[k + 1])
+        if math.atan2(sine, abs(cosine)) < angle:
+            start, across = foot, points[k + 1] - foot
+            normal = across - z[k] * (z[k] @ across)
+            end, alpha[k] = start + normal, 0.0 if cosine > 0 else math.pi
+        else:
+            start = points[k] + z[k] * float(np.cross(gap, z[k + 1]) @ cross) / sine**2
+            end = points[k + 1] + z[k + 1] * float(np.cross(gap, z[k]) @ cross) / sine**2
+            normal, alpha[k] = end - start, math.nan
+        a[k] = float(np.linalg.norm(normal))
+        beside = normal / a[k] if a[k] > ON_AXIS else (x if math.isfinite(alpha[k]) else cross / sine)
+        beside = beside - z[k] * (z[k] @ beside)
+        beside = beside / np.linalg.norm(beside)
+        if math.isnan(alpha[k]):
+            alpha[k] = math.atan2(float(cross @ beside), cosine)
+        if k == 0:
+            base[:3, :3], base[:3, 3] = np.stack([beside, np.cross(z[0], beside), z[0]], axis=1), start
+        else:
+            offset[k], d[k] = math.atan2(float(np.cross(x, beside) @ z[k]), float(x @ beside)), (start - foot) @ z[k]
+        x, foot = beside, end
+    if m == 1:
+        base[:3, :3], base[:3, 3] = np.stack([x, np.cross(z[0], x), z[0]], axis=1), foot
+    last = np.eye(4)
+    x = x - z[-1] * (z[-1] @ x)
+    x = x / np.linalg.norm(x)
+    last[:3, :3], last[:3, 3] = np.stack([x, np.cross(z[-1], x), z[-1]], axis=1), foot
+    ends = base, np.linalg.inv(last) @ flange
+    return Mechanism(a, alpha, np.zeros(m - 1), d, offset, np.ones(m), np.zeros(m, dtype=bool), *ends)
+
+
+def _any_across(z: Reals) -> Reals:
+    across = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    return np.asarray(across / np.linalg.norm(across))

@@ -25,13 +25,15 @@ from er3a.diagnosis.conclusions import (
     Resolution,
     TooSmallToTell,
 )
+from er3a.diagnosis.conventions import Conventions, conventions_of
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, least_greatest, moved
 from er3a.diagnosis.ranking import UNITS, Case, Ranking, case_of, rank_case, usable
-from er3a.kinematics.table_batch import Tables, frames_of, robot_of
+from er3a.kinematics.table_batch import Tables, frames_of, robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
+from er3a.references.predict import predict_tables
 from er3a.references.quantities import MM, Pose, Side, Unit
-from er3a.references.reference import Reference, ReferenceSet, expected_of, lengths_of, vectors_of
+from er3a.references.reference import Reference, ReferenceSet, expected_of, lengths_of, quantities_of, vectors_of
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0
@@ -180,7 +182,7 @@ class Hypothesis(ByValue, Displayed):
 
     Attributes
     ----------
-    faults : one, or two
+    faults : one, or two; of conventions (zeros, directions, base, flange) as many as differ
     residual_before, residual_after : greatest difference over the references of that unit; coordinates of one point are
         taken together, as a distance
     unit : mm, or deg where all lengths agree before and after
@@ -239,6 +241,7 @@ class Diagnosis(ByValue, Displayed):
     references : how many it rests on; tried : how many hypotheses were evaluated
     ranking : None where there is nothing to explain
     hypotheses : best first
+    left : (references,), differences that the best one leaves, in their units; None where there is none
     """
 
     conclusion: Conclusion
@@ -246,6 +249,7 @@ class Diagnosis(ByValue, Displayed):
     tried: int
     ranking: Ranking | None
     hypotheses: tuple[Hypothesis, ...]
+    left: Reals | None = None
 
     @property
     def names_fault(self) -> bool:
@@ -284,8 +288,64 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     if not ranking:
         return Diagnosis(NothingToExplain(len(stated), resolution_of(case)), len(stated), 0, None, ())
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
+    tried = len(ranking.pool.faults)
+    chosen = conventions_of(robot, stated, MEETS) if _may_be_chosen(robot, hypotheses) else None
+    if chosen is not None:
+        difference = predict_tables(tables_of(chosen.corrected), chosen.corrected, quantities_of(stated))[0]
+        left = difference - expected_of(stated)[0]
+        first = _defined_otherwise(ranking, chosen, left, hypotheses)
+        if first.explains or not (hypotheses and hypotheses[0].explains):
+            conclusion = _concluded(first, ())
+            if conclusion is not None:
+                return Diagnosis(conclusion, len(stated), tried, ranking, (first, *hypotheses), left)
     conclusion = _conclusion(case, ranking, hypotheses)
-    return Diagnosis(conclusion, len(stated), len(ranking.pool.faults), ranking, hypotheses)
+    left = ranking.pool.difference[ranking.groups[0][0]] if ranking.groups else None
+    return Diagnosis(conclusion, len(stated), tried, ranking, hypotheses, left)
+
+
+def _may_be_chosen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> bool:
+    """Whether conventions may be what is wrong: no one or two faults explain, or those that do move base or flange."""
+    if not hypotheses or not hypotheses[0].explains:
+        return True
+    ends = {f"{column}{row}" for column in ("d", "offset") for row in (1, robot.rows)}
+    return all(entry_of(fault) in ends for fault in hypotheses[0].faults)
+
+
+def _defined_otherwise(ranking: Ranking, chosen: Conventions, left: Reals, others: Sequence[Hypothesis]) -> Hypothesis:
+    """The hypothesis that the table is the references' arm, with other conventions."""
+    before, bound, units = residuals(ranking, ranking.before)
+    after, _, _ = residuals(ranking, left)
+    of_unit = np.array([each == "mm" for each in units])
+    unit: Unit = "mm"
+    if not of_unit.any() or not (before[of_unit] > bound[of_unit]).any():
+        missed = [each for each, own, allowed in zip(units, before, bound) if own > allowed]
+        unit = missed[0] if missed else units[0]
+        of_unit = np.array([each == unit for each in units])
+    _, uncertainty = expected_of(ranking.references)
+    half_widths = float(np.abs(left / uncertainty).max())
+    alike = others[0] if others and others[0].explains else None
+    return Hypothesis(
+        faults=chosen.faults,
+        residual_before=float(before[of_unit].max()),
+        residual_after=float(after[of_unit].max()),
+        unit=unit,
+        explains=half_widths <= MEETS,
+        half_widths=half_widths,
+        indistinguishable_from=(alike.faults, *alike.indistinguishable_from) if alike else (),
+        to_decide=None,
+        score=0.0,
+        corrected=chosen.corrected,
+    )
+
+
+def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> Conclusion | None:
+    """What the best hypothesis amounts to; None if it explains neither all nor most."""
+    figures = best.residual_before, best.residual_after, best.unit
+    if best.explains:
+        return MostLikelyFault(best.faults, *figures, alternatives)
+    if best.residual_after < MOSTLY * best.residual_before:
+        return MainFault(best.faults, *figures, alternatives)
+    return None
 
 
 def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) -> Conclusion:
@@ -295,16 +355,12 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
         missed = int((relative > MEETS).sum())
         return NoFaultStandsOut(missed, len(relative), float(relative.max()), tried)
     best = hypotheses[0]
+    if best.explains and (factor := told_from(case, ranking)) is not None:
+        candidates = (best.faults, *best.indistinguishable_from)
+        return TooSmallToTell(candidates, best.residual_before, factor * best.residual_before, best.unit)
     figures = best.residual_before, best.residual_after, best.unit
-    if best.explains:
-        factor = told_from(case, ranking)
-        if factor is not None:
-            candidates = (best.faults, *best.indistinguishable_from)
-            return TooSmallToTell(candidates, best.residual_before, factor * best.residual_before, best.unit)
-        return MostLikelyFault(best.faults, *figures, best.indistinguishable_from)
-    if best.residual_after < MOSTLY * best.residual_before:
-        return MainFault(best.faults, *figures, best.indistinguishable_from)
-    return NoFewFaultsExplain(tried, *figures, _least_left(ranking, best.unit))
+    named = _concluded(best, best.indistinguishable_from)
+    return named or NoFewFaultsExplain(tried, *figures, _least_left(ranking, best.unit))
 
 
 def _least_left(ranking: Ranking, unit: Unit) -> float:

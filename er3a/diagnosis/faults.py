@@ -29,6 +29,8 @@ FaultKind = Literal[
     "convention",
     "length",
     "scale",
+    "base",
+    "flange",
 ]
 Misread = Literal["metres_as_millimetres", "millimetres_as_metres", "radians_as_degrees", "degrees_as_radians"]
 Entries = Literal["a", "d", "lengths", "alpha", "offset", "limits", "angles"]
@@ -179,6 +181,25 @@ class WrongScale:
     code: Literal["wrong_scale"] = "wrong_scale"
 
 
+@dataclass(frozen=True)
+class BaseElsewhere:
+    """The references' base stands elsewhere than the table's: ``shift_mm`` of the arm in the base's frame, and a turn."""
+
+    shift_mm: tuple[float, float, float]
+    turn_deg: float
+    kind: ClassVar[FaultKind] = "base"
+    code: Literal["base_elsewhere"] = "base_elsewhere"
+
+
+@dataclass(frozen=True)
+class FlangeElsewhere:
+    """The references' flange stands elsewhere than the table's: ``shift_mm`` in the flange's frame."""
+
+    shift_mm: tuple[float, float, float]
+    kind: ClassVar[FaultKind] = "flange"
+    code: Literal["flange_elsewhere"] = "flange_elsewhere"
+
+
 Fault = (
     WrongUnit
     | WrongAlphaSign
@@ -194,9 +215,14 @@ Fault = (
     | WrongLimit
     | WrongLength
     | WrongScale
+    | BaseElsewhere
+    | FlangeElsewhere
 )
 Faults = tuple[Fault, ...]
-"""One fault, or two."""
+"""One fault, or two; of conventions (zeros, directions, base, flange) any number."""
+
+CONVENTIONS = WrongOffset, ReversedDirection, BaseElsewhere, FlangeElsewhere
+"""What can be chosen without changing the arm."""
 
 SIGNIFICANT_GIVEN, SIGNIFICANT_FITTED = 6, 4
 

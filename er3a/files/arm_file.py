@@ -29,7 +29,7 @@ def read_arm(
     source: str,
     *,
     convention: Convention = "standard",
-    length_unit: LengthUnit = "mm",
+    length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit = "deg",
     base: str | None = None,
     tip: str | None = None,
@@ -41,7 +41,8 @@ def read_arm(
     ----------
     source : a robot's name, or a path that ends in .csv, .yaml, .urdf or .xacro
     convention : of a D-H table; a column ``convention`` in it counts more
-    length_unit, angle_unit : of a D-H table whose columns are named mm and deg all the same
+    length_unit, angle_unit : of a D-H table whose columns are named mm and deg all the same; with no ``length_unit``
+        it is what the lengths can be
     base, tip, xacro : of a URDF, as :func:`er3a.import_urdf` and ``er3a.formats.xacro`` have them
 
     Raises
@@ -52,7 +53,7 @@ def read_arm(
     path = Path(source)
     if path.suffix == ".csv":
         content, notes = read_dh_table(
-            path, robot_name(path), convention, length_unit=length_unit, angle_unit=angle_unit
+            path, robot_name(path), convention, length_unit=length_unit, angle_unit=angle_unit, as_printed=True
         )
         return ReadArm(robot_of(content), True, notes)
     if path.suffix in (".urdf", ".xacro", ".xml"):

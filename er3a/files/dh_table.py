@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Literal
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
-from er3a.files.robot_file import RobotFile
+from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.files.units import MOST_DEG
 from er3a.files.yaml_file import parse
 from er3a.robots.robot import CONVENTIONS, MOST_JOINTS, Convention, Grade
@@ -45,7 +45,10 @@ MILLIMETRES: dict[LengthUnit, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
 DEGREES: dict[AngleUnit, float] = {"deg": 1.0, "rad": math.degrees(1.0)}
 OTHER_UNITS: dict[str, tuple[str, float]] = {unit: ("mm", scale) for unit, scale in MILLIMETRES.items() if unit != "mm"}
 OTHER_UNITS |= {"rad": ("deg", DEGREES["rad"])}
-SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
+SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres
+LONGEST_ARM_IN = 200.0  # inches; a length of five metres
+ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3)
+"""What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
 ASSUMED_SLIDE_MM = 1000.0
 
 
@@ -54,15 +57,19 @@ def read_dh_table(
     name: str,
     convention: Convention = "standard",
     *,
-    length_unit: LengthUnit = "mm",
+    length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit = "deg",
+    as_printed: bool = False,
 ) -> tuple[RobotFile, tuple[str, ...]]:
     """A robot file made of a D-H table.
 
     Parameters
     ----------
     name : of the robot
-    length_unit, angle_unit : what the numbers of a table are in whose columns are named mm and deg all the same
+    length_unit, angle_unit : what the numbers of a table are in whose columns are named mm and deg all the same; with
+        no ``length_unit`` they are mm unless they can't be
+    as_printed : read values that look like another unit's all the same, with a note on what they were taken for; else
+        they are refused
 
     Returns
     -------
@@ -78,10 +85,12 @@ def read_dh_table(
     names = {_usual_unit(column)[0]: column for column in read_header(path)}
     known = NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in names}
     rows = read_csv(path, {names.get(column, column): kind for column, kind in known.items()})
+    converted = {column: scale for column, name in names.items() if (scale := _usual_unit(name)[1]) is not None}
     rows = [{_usual_unit(column)[0]: value for column, value in row.items()} for row in rows]
-    asked = {"mm": MILLIMETRES[length_unit], "deg": DEGREES[angle_unit]}
-    scales = {column: _usual_unit(name)[1] or asked.get(_unit_of(column), 1.0) for column, name in names.items()}
-    _convert(path, rows, scales)
+    for row in rows:
+        row |= {column: row[column] * scale for column, scale in converted.items() if row[column] is not None}
+    short = any(0 < abs(row[key]) < SHORTEST_PLAIN_LENGTH_MM for row in rows for key in ("a_mm", "d_mm"))
+    notes = list(_in_own_units(path, rows, length_unit, angle_unit, as_printed, {*converted}))
     given = set(names)
     if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
@@ -97,7 +106,6 @@ def read_dh_table(
     for row in rows:
         _check_kind(path, row, given)
     kinds = {_unit(row) for row in rows}
-    notes = []
     if convention == "standard" and "convention" not in given:
         notes.append("the table was read as standard D-H; --convention modified if it is Craig's")
     if not given & {"offset_deg", "direction"}:
@@ -108,7 +116,10 @@ def read_dh_table(
         notes.append(f"no limits in the table: 0 to {ASSUMED_SLIDE_MM:g} mm were assumed for all joints that slide")
     if any(f"speed_{unit}_s" not in given for unit in kinds):
         notes.append("no speeds in the table: those that the study assumes stand in for them")
-    return parse(RobotFile, _content(rows, given, name, convention, path.name), path), tuple(notes)
+    content = _content(rows, given, name, convention, path.name)
+    if as_printed and (short or length_unit):
+        content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
+    return parse(RobotFile, content, path), tuple(notes)
 
 
 def _unit_of(column: str) -> str:
@@ -122,23 +133,55 @@ def _usual_unit(column: str) -> tuple[str, float | None]:
     return (column if scale is None else re.sub(r"_(m|in|rad)(_s)?$", rf"_{unit}\2", column)), scale
 
 
-def _convert(path: Path, rows: list[dict[str, Any]], scales: dict[str, float]) -> None:
-    """Take all values to mm and degrees; refuse lengths that are another unit's, and degrees that were read twice."""
-    lengths = [column for column in ("a_mm", "d_mm") if scales[column] == 1.0]
-    longest = max((abs(row[column]) for row in rows for column in lengths), default=0.0)
-    if 0 < longest < SHORTEST_ARM_MM and len(lengths) == 2 and not any(_unit(row) == "mm" for row in rows):
-        problem = f"the longest length is {longest:g} mm, which can only be metres or inches"
-        remedy = "Name the columns a_m, d_m (or a_in, d_in), or give --length-unit m (or in)"
-        raise InputError(path, "columns a_mm, d_mm", problem, remedy)
+def _in_own_units(
+    path: Path,
+    rows: list[dict[str, Any]],
+    length_unit: LengthUnit | None,
+    angle_unit: AngleUnit,
+    as_printed: bool,
+    own: set[str],
+) -> Iterator[str]:
+    """Take all values to mm and degrees. Lengths that are another unit's, and degrees that were read twice, are
+    refused, or with ``as_printed`` taken for what they are, with a note. ``own``: columns that said their unit."""
+    lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
+    unit = length_unit or "mm"
+    if length_unit is None and lengths and not any(_unit(row) == "mm" for row in rows):
+        unit = _likely_unit(lengths)
+        if unit != "mm":
+            word = {"m": "metres", "in": "inches"}[unit]
+            if not as_printed:
+                problem = f"the lengths, {max(lengths):g} mm at most, are those of an arm in {word}"
+                remedy = f"Name the columns a_{unit} and d_{unit}, or give --length-unit {unit} (or mm)"
+                raise InputError(path, "columns a_mm, d_mm", problem, remedy)
+            yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
+    scales = {"mm": MILLIMETRES[unit], "deg": DEGREES[angle_unit]}
+    in_degrees = angle_unit == "deg" and "alpha_deg" not in own
+    twice = [row for row in rows if in_degrees and abs(row["alpha_deg"]) > MOST_DEG]
     for row in rows:
-        for column, scale in scales.items():
-            if isinstance(row[column], float):
-                row[column] *= scale
-        alpha = row["alpha_deg"]
-        if abs(alpha) > MOST_DEG:
-            once = math.radians(alpha)
-            problem = f"{alpha:g} deg is more than ten turns: it is {once:.6g} deg that were converted twice"
-            raise InputError(path, f"row {row['row']}, column alpha_deg", problem, f"Write {once:.6g}")
+        for column, value in row.items():
+            if column not in own and isinstance(value, float):
+                row[column] = value * scales.get(_unit_of(column), 1.0)
+    for row in twice:
+        alpha, once = row["alpha_deg"], math.radians(row["alpha_deg"])
+        problem = f"{alpha:g} deg is more than ten turns: it is {once:.6g} deg that were converted twice"
+        if not as_printed:
+            remedy = f"Write {once:.6g}; er3a compare reads it so"
+            raise InputError(path, f"row {row['row']}, column alpha_deg", problem, remedy)
+        row["alpha_deg"] = once
+        yield f"row {row['row']}, column alpha_deg: {problem}"
+
+
+def _likely_unit(lengths: list[float]) -> LengthUnit:
+    """What lengths are in: inches if they are round millimetres in inches alone, else metres if all are below 10."""
+
+    def is_round(scale: float) -> bool:
+        off = [[abs(x * scale - round(x * scale / step) * step) for x in lengths] for step, _, _ in ROUND_MM]
+        return any(len(set(lengths)) >= least and max(gaps) < near for gaps, (_, near, least) in zip(off, ROUND_MM))
+
+    if max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0):
+        if max(lengths) >= SHORTEST_ARM_MM or not is_round(1000.0):
+            return "in"
+    return "m" if max(lengths) < SHORTEST_ARM_MM else "mm"
 
 
 def _unit(row: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Written, read_csv
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.shipped import names, own_or_shipped
-from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
+from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
 from er3a.references.quantities import Quantity
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
@@ -32,12 +32,14 @@ _WORD, _NUMBER, _OPTIONAL, _JOINT = (
 )
 STATED_AS = "stated_as"
 STANDARD_DEVIATION = "standard_deviation"
+UNITS_CHECKED = "units_checked"
 UNCERTAINTIES = ("uncertainty_mm", "uncertainty_deg", "uncertainty_deg_s")
 _SOURCE = {
     "source": _WORD,
     "grade": CsvColumn(str, choices=tuple(GRADES)),
     "origin": _WORD,
     STATED_AS: CsvColumn(str, optional=True, choices=("half_width", STANDARD_DEVIATION), always=False),
+    UNITS_CHECKED: CsvColumn(str, optional=True, choices=("yes",), always=False),
 }
 _POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
 _XYZ = ("x_mm", "y_mm", "z_mm")
@@ -241,6 +243,7 @@ def row_of(kind: str, fields: Mapping[str, Any]) -> Row:
     values = FORMATS[kind].gather(dict(fields))
     values["line"] = values.pop("row")
     values["gaussian"] = values.pop(STATED_AS) == STANDARD_DEVIATION
+    del values[UNITS_CHECKED]
     return KINDS[kind](**values)
 
 
@@ -324,8 +327,9 @@ class Mistaken:
     remedy: str
 
 
-METRES = Mistaken("mm", "metres", "Multiply by 1000")
-RADIANS = Mistaken("deg", "radians", "Convert to degrees")
+AS_WRITTEN = f"if the values are meant as they are written, add a column {UNITS_CHECKED} that says yes"
+METRES = Mistaken("mm", "metres", f"Multiply by 1000; {AS_WRITTEN}")
+RADIANS = Mistaken("deg", "radians", f"Convert to degrees; {AS_WRITTEN}")
 
 
 def load_references(name_or_folder: str | Path) -> ReferenceSet:
@@ -419,6 +423,9 @@ def _check_row(path: Path, format: Format, fields: Fields) -> None:
 
 
 def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
+    """Refuse values in metres or radians, but where a person has checked the units of every row."""
+    if all(fields[UNITS_CHECKED] for fields in table):
+        return
     _check_span(path, table, LENGTHS, LEAST_SPAN_MM, METRES)
     if format.mixed_lengths:
         _check_mixed(path, table, LENGTHS, SHORTEST_BESIDE_LONG_MM, LONG_MM, METRES)
@@ -457,13 +464,17 @@ def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
 
 
 def _check_angles(path: Path, table: list[Fields]) -> None:
+    """Refuse poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
+    all_small = max(_sizes(table, list(POSE))) < WIDEST_IN_RADIANS
     for fields in table:
         for column in POSE:
             steps = fields[column] / STEP_IN_RADIANS
             if round(steps) and abs(fields[column]) < WIDEST_IN_RADIANS and abs(steps - round(steps)) < NEAR_STEP:
-                problem = f"{fields[column]:g} deg looks like radians"
-                remedy = f"Write {round(steps) * 15:g}"
-                raise InputError(path, f"row {fields['row']}, column {column}", problem, remedy)
+                where, degrees = f"row {fields['row']}, column {column}", f"{round(steps) * 15:g}"
+                if all_small:
+                    problem = f"{fields[column]:g} deg looks like radians"
+                    raise InputError(path, where, problem, f"Write {degrees}; {AS_WRITTEN}")
+                suspect(f"{path}: {where}: {fields[column]:g} deg may be radians; those would be {degrees}")
 
 
 def _check_repeats(path: Path, rows: tuple[Row, ...]) -> None:

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.diagnosis.conclusions import Conclusion, NoFaultStandsOut, NoFewFaultsExplain
 from er3a.diagnosis.ranking import rank
 from er3a.geometry.transforms import rotation_angle
 from er3a.identifiability.entries import TableNumber, continuous_of, document_of, entries_of, shifted
@@ -64,6 +65,17 @@ class InconsistentWithOwnText:
     against: tuple[str, ...]
     missed: int
     code: Literal["inconsistent_with_own_text"] = "inconsistent_with_own_text"
+
+
+def is_unexplained(conclusion: Conclusion | None) -> bool:
+    """Whether references are missed by a table, and neither one or two faults nor any zeros, directions, base and
+    flange explain it; False without a diagnosis."""
+    return isinstance(conclusion, NoFaultStandsOut | NoFewFaultsExplain)
+
+
+def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bool:
+    """Whether references describe another arm than a table: most of them are missed, and nothing explains it."""
+    return failed > total / 2 and is_unexplained(conclusion)
 
 
 def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRobotDescribed | None:

@@ -22,7 +22,9 @@ from er3a.diagnosis.conclusions import (
     TooSmallToTell,
 )
 from er3a.diagnosis.faults import (
+    BaseElsewhere,
     Fault,
+    FlangeElsewhere,
     ReversedDirection,
     SwappedEntries,
     WrongAlpha,
@@ -111,6 +113,7 @@ def test_every_repair_and_free_number_has_a_sentence_of_its_own():
     table = tables_of(load_robot("er3a_c60_article"))
     faults = [repair.fault for repair in repairs_of(table, load_references("er3a_c60").references)]
     faults += [number.fault(float(number.value(table)[0]), 0.01) for number in free_numbers(6)]
+    faults += [BaseElsewhere((0.0, 0.0, -330.0), 0.0), FlangeElsewhere((0.0, 0.0, 50.0))]
     assert {type(fault) for fault in faults} == set(get_args(Fault))
     assert len({say(fault) for fault in faults}) == len(set(faults)) == len(faults)
 

@@ -23,7 +23,9 @@ def compare(
     b: Annotated[str, typer.Argument(metavar="B", help="what it is compared with: as A, or a folder of such files")],
     *,
     convention: Annotated[str, typer.Option(help="of D-H tables: standard | modified")] = "standard",
-    length_unit: Annotated[str, typer.Option(help="of D-H tables: mm | m | in")] = "mm",
+    length_unit: Annotated[
+        str | None, typer.Option(help="of D-H tables: mm | m | in; else mm, unless the lengths can't be")
+    ] = None,
     angle_unit: Annotated[str, typer.Option(help="of D-H tables: deg | rad")] = "deg",
     base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
@@ -46,7 +48,7 @@ def compare(
         "--angle-unit": ("deg", "rad"),
     }
     for (option, choices), given in zip(known.items(), (convention, length_unit, angle_unit)):
-        if given not in choices:
+        if given is not None and given not in choices:
             raise Er3aError(f"{option} is '{given}'; known: {', '.join(choices)}")
     for option, value in (("--tolerance-mm", tolerance_mm), ("--tolerance-deg", tolerance_deg)):
         if not 0 < value < 1000:
@@ -73,6 +75,9 @@ def compare(
         tolerance_deg=tolerance_deg,
     )
     name, found = ranked[0]
+    for source, read in ((a, first), (name, others[name])):
+        for note in read.notes:
+            print_note(f"{source}: {note}")
     if output is not None and found.corrected is not None:
         from er3a.files.robot_writer import write_robot
 

@@ -52,7 +52,7 @@ def new(
     robot: Annotated[str | None, typer.Option(help="the arm, by the name or the file of a robot of er3a")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
     convention: Annotated[Convention | None, typer.Option(help="of the table of --dh; standard if none")] = None,
-    length_unit: Annotated[LengthUnit, typer.Option(help="of that table, where its columns don't say")] = "mm",
+    length_unit: Annotated[LengthUnit | None, typer.Option(help="of that table, where its columns don't say")] = None,
     angle_unit: Annotated[AngleUnit, typer.Option(help="of that table, where its columns don't say")] = "deg",
 ):
     """Write a study to start from: robot file, targets and paths that the arm can do, a scene, a README."""

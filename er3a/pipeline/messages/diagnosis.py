@@ -20,7 +20,9 @@ from er3a.diagnosis.conclusions import (
     TooSmallToTell,
 )
 from er3a.diagnosis.faults import (
+    BaseElsewhere,
     Faults,
+    FlangeElsewhere,
     ReversedDirection,
     ShiftedRows,
     SwappedEntries,
@@ -120,6 +122,12 @@ TEXTS = texts(
         "wrong_length#missing": "{column} missing, {fits} mm fits",
         "wrong_length#given": "{column} is {given_mm:.6g} mm, {fits} mm fits",
         "wrong_scale": "wrong scale: a factor of {factor:.6g} fits",
+        "base_elsewhere#shifted": "the base is defined elsewhere: the arm stands ({x:g}, {y:g}, {z:g}) mm from there",
+        "base_elsewhere#turned": (
+            "the base is defined elsewhere: the arm stands ({x:g}, {y:g}, {z:g}) mm from there, turned by {turn_deg:g} "
+            "deg"
+        ),
+        "flange_elsewhere": "the flange is defined elsewhere: ({x:g}, {y:g}, {z:g}) mm from there",
         "flange_position_decides#share": (
             "the flange's position at joints ({pose}) deg would distinguish {share:.0%} of the pairs, by up to {most}"
         ),
@@ -187,11 +195,9 @@ TEXTS = texts(
 
 
 def both(faults: Faults) -> str:
-    """One fault or two as one text."""
-    if len(faults) == 1:
-        return say(faults[0])
-    first, second = map(say, faults)
-    return sentence("faults", fault=first, second_fault=second)
+    """Faults as one text."""
+    *others, last = map(say, faults)
+    return sentence("faults", fault=", ".join(others), second_fault=last) if others else last
 
 
 def shown(value: float) -> str:
@@ -288,6 +294,18 @@ def _(found: WrongLength) -> str:
 def _(found: WrongScale) -> str:
     fault = say_as(found)
     return _at(word("wrong_unit", ENTRIES, "lengths"), fault)
+
+
+@say.register
+def _(found: BaseElsewhere) -> str:
+    x, y, z = found.shift_mm
+    return say_as(found, "turned" if found.turn_deg >= LEAST_SHOWN else "shifted", x=x, y=y, z=z)
+
+
+@say.register
+def _(found: FlangeElsewhere) -> str:
+    x, y, z = found.shift_mm
+    return say_as(found, x=x, y=y, z=z)
 
 
 @say.register

@@ -114,15 +114,23 @@ def of_comparison() -> str:
 
 
 def decision(
-    table: str, failed: Sequence[str], instead: str | None = None, geometry: tuple[int, int] | None = None
+    table: str,
+    failed: Sequence[str],
+    instead: str | None = None,
+    geometry: tuple[int, int] | None = None,
+    *,
+    same_arm: bool = False,
 ) -> str:
     """What to do with a robot's model, from validation's status and the titles of the stages that failed.
 
     ``instead`` is a model of the same arm that evidence does not contradict; ``geometry``: how many of how many lengths
-    and twists of a table that is not contradicted independent documents settle.
+    and twists of a table that is not contradicted independent documents settle; ``same_arm``: the evidence is of this
+    arm, defined otherwise.
     """
     if table == "not_examined":
         return tr("Its table has not been examined yet: run the stage validation before you use it.")
+    if table == "fail" and same_arm:
+        return tr("This is the robot, but its zeros, directions, base or flange are others: correct them first.")
     if table == "fail" and instead:
         return tr("Never use this table: evidence contradicts it. Use {robot} instead.", robot=instead)
     if table == "fail":

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import er3a.pipeline.messages.diagnosis  # noqa: F401
+from er3a.diagnosis.conclusions import TooSmallToTell
+from er3a.diagnosis.faults import ReversedDirection, WrongOffset
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_WORDS, quoted
@@ -14,6 +16,7 @@ from er3a.pipeline.stages.validation.model import (
     Confirmed,
     Contradicted,
     Contradiction,
+    DefinedOtherwise,
     JudgedTable,
     LeftOpen,
     ModelUnsound,
@@ -104,6 +107,15 @@ TEXTS = texts(
         "validation.missed#another_arm": (
             "This is not the arm that the {grades} data in {own_set} describe: the {quantity} is {measured}, not "
             "{expected}; {checks}."
+        ),
+        "validation.defined_otherwise": (
+            "Its geometry is that of the {grades} data in {own_set}: the same arm, defined otherwise ({checks})."
+        ),
+        "validation.defined_otherwise#joints": (
+            "Whoever commands joints by this table moves the arm to other places than these data mean."
+        ),
+        "validation.defined_otherwise#places": (
+            "Where base and flange are is a choice: positions can be compared once both sides make the same one."
         ),
         "chain#or": "{value} or {values}",
         "chain#and": "{value} and {values}",
@@ -253,6 +265,15 @@ def _(found: Contradicted) -> str:
     return joined(
         [_missed(found, "contradicted"), say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " "
     )
+
+
+@say.register
+def _(found: DefinedOtherwise) -> str:
+    faults = () if found.diagnosis is None or isinstance(found.diagnosis, TooSmallToTell) else found.diagnosis.faults
+    joints = any(isinstance(fault, WrongOffset | ReversedDirection) for fault in faults)
+    head = say_as(found, grades=_grades(found.grades), own_set=found.reference_set, checks=counted_checks(found.counts))
+    meaning = say_as(found, "joints" if joints else "places")
+    return joined([head, say(found.diagnosis) if found.diagnosis else "", meaning, *_of_claims(found)], " ")
 
 
 @say.register

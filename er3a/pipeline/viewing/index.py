@@ -38,7 +38,7 @@ from er3a.pipeline.results import (
     result_records,
 )
 from er3a.pipeline.stages.registry import STAGES, all_messages
-from er3a.pipeline.stages.validation.model import LeftOpen
+from er3a.pipeline.stages.validation.model import DefinedOtherwise, LeftOpen
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
@@ -504,7 +504,11 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "expected": expected,
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "decision": decision(
-            table, failed, table_instead(study, name, results.parent), _geometry(heads.get("validation"))
+            table,
+            failed,
+            table_instead(study, name, results.parent),
+            _geometry(heads.get("validation")),
+            same_arm="validation" in heads and isinstance(heads["validation"].finding, DefinedOtherwise),
         ),
     }
 

@@ -21,6 +21,7 @@ from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.stages.validation.checks import checks_of_set, round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.entry import ValidationSettings
@@ -108,7 +109,7 @@ def _corrections(reference_set: str, found: Calibration) -> Corrections:
 def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[SetDiagnosis, ...], Residuals]:
     """Diagnose a table against each reference set."""
     found = [(references.name, diagnosis_of(robot, references)) for references in sets]
-    tables = [_residuals(name, diagnosis.ranking) for name, diagnosis in found if diagnosis.ranking]
+    tables = [_residuals(name, diagnosis.ranking, diagnosis.left) for name, diagnosis in found if diagnosis.ranking]
     records = [_set_diagnosis(robot, references, diagnosis) for references, (_, diagnosis) in zip(sets, found)]
     return tuple(records), Residuals.stacked(tables)
 
@@ -128,10 +129,9 @@ def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis)
     )
 
 
-def _residuals(reference_set: str, ranking: Ranking) -> Residuals:
+def _residuals(reference_set: str, ranking: Ranking, left: Reals | None) -> Residuals:
     before, bound, units = residuals(ranking, ranking.before)
-    best = ranking.pool.difference[ranking.groups[0][0]] if ranking.groups else ranking.before
-    after, _, _ = residuals(ranking, best)
+    after, _, _ = residuals(ranking, ranking.before if left is None else left)
     vectors = [[ranking.references[place] for place in places] for places in vectors_of(ranking.references)]
     return Residuals.of_rows(
         (

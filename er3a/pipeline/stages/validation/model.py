@@ -288,7 +288,14 @@ class AnotherArm(_Missed):
     code: Literal["validation.another_arm"] = "validation.another_arm"
 
 
-Validated = Confirmed | LeftOpen | NothingToCompare | ModelUnsound | Contradicted | AnotherArm
+@dataclass(frozen=True)
+class DefinedOtherwise(_Missed):
+    """The documents describe this arm, with zeros, directions, base or flange that ``diagnosis`` names."""
+
+    code: Literal["validation.defined_otherwise"] = "validation.defined_otherwise"
+
+
+Validated = Confirmed | LeftOpen | NothingToCompare | ModelUnsound | Contradicted | AnotherArm | DefinedOtherwise
 
 
 MODEL_GROUPS: tuple[ModelGroup, ...] = get_args(ModelGroup)

@@ -28,6 +28,7 @@ from er3a.pipeline.stages.validation.evidence_section import OTHER_TITLES, evide
 from er3a.pipeline.stages.validation.model import (
     Axes,
     Check,
+    DefinedOtherwise,
     KeyPoses,
     ModelCheck,
     ReferenceCheck,
@@ -323,7 +324,8 @@ def _head(study: Study, stored: Stored[ValidationResults]) -> Head:
     if head.status != "fail":
         return head
     instead = table_instead(study, stored.robot, stored.folder.parents[1]) if stored.folder else None
-    return replace(head, text=joined([decision(head.status, (), instead), head.text], " "))
+    same_arm = isinstance(head.finding, DefinedOtherwise)
+    return replace(head, text=joined([decision(head.status, (), instead, same_arm=same_arm), head.text], " "))
 
 
 def _set_story(found: SetSummary, checks: Iterable[Judged], poses: KeyPoses) -> SetStory:

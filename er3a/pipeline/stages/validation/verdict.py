@@ -8,13 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from er3a.diagnosis.conclusions import NoFaultStandsOut, NoFewFaultsExplain
+from er3a.diagnosis.conclusions import TooSmallToTell
+from er3a.diagnosis.faults import CONVENTIONS
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName, PartStatus, parts_of, together
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts, count_checks
-from er3a.identifiability.statements import NOT_OFF, ToolOff, inconsistent_with_own_text, not_the_robot_described
+from er3a.identifiability.statements import (
+    NOT_OFF,
+    ToolOff,
+    inconsistent_with_own_text,
+    is_another_arm,
+    is_unexplained,
+    not_the_robot_described,
+)
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
@@ -25,6 +33,7 @@ from er3a.pipeline.stages.validation.model import (
     Conflict,
     Contradicted,
     Contradiction,
+    DefinedOtherwise,
     KeyPoses,
     LeftOpen,
     LikelyFault,
@@ -89,16 +98,16 @@ def set_summaries(
     for references in sets:
         counts = counts_of(check for check in checks if check.reference_set == references.name)
         weighing = counts.independent, counts.consistency
-        most_fail = sum(each.failed for each in weighing) > sum(each.total for each in weighing) / 2
+        failed, total = (sum(getattr(each, name) for each in weighing) for name in ("failed", "total"))
         diagnosis = diagnoses.get(references.name)  # there is none of arms with other than six turning joints
-        unexplained = diagnosis is not None and isinstance(diagnosis.conclusion, NoFaultStandsOut | NoFewFaultsExplain)
+        conclusion = diagnosis.conclusion if diagnosis else None
         found.append(
             SetSummary(
                 name=references.name,
                 grades=tuple(sorted({reference.grade for reference in references.references})),
                 counts=counts,
-                another_arm=most_fail and unexplained,
-                described=not_the_robot_described(robot, references) if unexplained else None,
+                another_arm=is_another_arm(failed, total, conclusion),
+                described=not_the_robot_described(robot, references) if is_unexplained(conclusion) else None,
                 own_text=inconsistent_with_own_text(robot, references),
                 zero_pose_flange_off_mm=_zero_pose_error(poses, references.name),
             )
@@ -233,7 +242,7 @@ def _missed(
     failed: list[ReferenceCheck],
     sets: tuple[SetSummary, ...],
     named: Mapping[str, LikelyFault],
-) -> Contradicted | AnotherArm:
+) -> Contradicted | AnotherArm | DefinedOtherwise:
     quoted = most_telling(failed)
     common |= {
         "reference_set": quoted.reference_set,
@@ -244,7 +253,12 @@ def _missed(
         "diagnosis": named.get(quoted.reference_set),
     }
     own = next(each for each in sets if each.name == quoted.reference_set)
-    return AnotherArm(**common, described=own.described) if own.another_arm else Contradicted(**common)
+    if own.another_arm:
+        return AnotherArm(**common, described=own.described)
+    found = named.get(quoted.reference_set)
+    faults = () if found is None or isinstance(found, TooSmallToTell) else found.faults
+    chosen = bool(faults) and all(isinstance(fault, CONVENTIONS) for fault in faults)
+    return DefinedOtherwise(**common) if chosen else Contradicted(**common)
 
 
 def _zero_pose_error(poses: KeyPoses, set_name: str) -> float | None:
