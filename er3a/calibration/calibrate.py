@@ -292,7 +292,8 @@ class Calibration(ByValue, Displayed):
             errors = self.beyond.errors
             meant = seen.shifted(errors.amounts(seen.row_values, seen.points(errors.robot)))
         off = meant.predict(robot, (), np.zeros((1, 0)))[0] - seen.values_mm
-        return np.sqrt(np.bincount(seen.pose_of, weights=off**2, minlength=len(measurements)))
+        distances: Reals = np.sqrt(np.bincount(seen.pose_of, weights=off**2, minlength=len(measurements)))
+        return distances
 
     def sheet(self) -> Sheet:
         """A row for each estimated entry."""
@@ -312,8 +313,9 @@ def _with_errors(model: Beyond, q: Reals) -> Reals:
     errors, flat = model.errors, q.reshape(-1, q.shape[-1])
     x = row_values(model.robot, flat)
     points = np.broadcast_to(errors.robot.tool[:3, 3], (len(x), 3))
-    T = frames_of(tables_of(model.robot), model.robot, x + errors.amounts(x, points))[0][:, -1] @ model.robot.tool
-    return T.reshape(*q.shape[:-1], 4, 4)
+    flange = frames_of(tables_of(model.robot), model.robot, x + errors.amounts(x, points))[0][:, -1]
+    T: Reals = (flange @ model.robot.tool).reshape(*q.shape[:-1], 4, 4)
+    return T
 
 
 def calibrate(
@@ -382,10 +384,9 @@ def _without_outliers(
             return (*given, ())
     if used.all():
         return (*given, ())
-    rest = given[0].predict(found_robot := corrected(robot, found.kept, found.amounts), (), np.zeros((1, 0)))[0]
-    del found_robot
-    squares = np.bincount(given[0].pose_of, weights=(rest - given[0].values_mm) ** 2)
-    distances = np.sqrt(squares)
+    here = corrected(robot, found.kept, found.amounts)
+    rest = given[0].predict(here, (), np.zeros((1, 0)))[0] - given[0].values_mm
+    distances = np.sqrt(np.bincount(given[0].pose_of, weights=rest**2))
     outliers = tuple(Outlier(int(given[0].lines[k]), float(distances[k])) for k in np.flatnonzero(~used))
     return observations, level, found, outliers
 

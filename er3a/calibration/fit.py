@@ -124,9 +124,7 @@ class Fit:
         return float(np.sqrt((self.after @ self.after) / max(len(self.after) - self.J.shape[1], 1)))
 
 
-def fit(
-    robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()
-) -> Fit:
+def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:
     """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
 
     Raises

@@ -28,7 +28,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
 PARTS = 10
-SEEDS = 1, 2
+SEEDS = 1, 2, 3, 4
 SURE = 1e-4
 """How improbable a term's share has to be if there is only noise; some 25 terms are tried."""
 LEAST_POSES = 40
@@ -92,13 +92,13 @@ class _Linear:
 
     def errors(self, columns: list[int]) -> list[Reals]:
         """(n,) for each way of leaving out: what the fits without a coordinate's part leave of it."""
-        square, prior = np.ix_(columns, columns), np.diag(self._prior[columns])
+        square, prior = np.ix_(np.array(columns), np.array(columns)), np.diag(self._prior[columns])
         found = []
         for parts in self.parts:
             errors = np.empty_like(self.rest)
             for out, information, right in parts:
                 amounts = np.linalg.solve(information[square] + prior, right[columns])
-                errors[out] = self.rest[out] - self.J[np.ix_(out, columns)] @ amounts
+                errors[out] = self.rest[out] - self.J[out][:, columns] @ amounts
             found.append(errors)
         return found
 
@@ -108,7 +108,7 @@ class _Linear:
 
     def fitted(self, columns: list[int]) -> tuple[Reals, float]:
         """Amounts (c,) from all coordinates, and what they leave, squared."""
-        information = self.whole[0][np.ix_(columns, columns)] + np.diag(self._prior[columns])
+        information = self.whole[0][np.ix_(np.array(columns), np.array(columns))] + np.diag(self._prior[columns])
         amounts = np.linalg.solve(information, self.whole[1][columns])
         rest = self.rest - self.J[:, columns] @ amounts
         return amounts / self.scale[columns], float(rest @ rest)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
@@ -26,7 +27,7 @@ from er3a.robots.robot import Robot
 
 TermKind = Literal["ratio", "once", "twice", "sag"]
 KINDS: tuple[TermKind, ...] = get_args(TermKind)
-TYPICAL = 5e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma
+TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma
 
 
 @dataclass(frozen=True)
@@ -106,9 +107,7 @@ class JointErrors(ByValue):
         return found
 
 
-def term_jacobian(
-    here: Robot, robot: Robot, terms: Sequence[JointTerm], observations: PointObservations
-) -> Reals:
+def term_jacobian(here: Robot, robot: Robot, terms: Sequence[JointTerm], observations: PointObservations) -> Reals:
     """Derivative (n, c) of measured coordinates (mm) by the coefficients of terms, at a corrected robot ``here``;
     ``robot`` as of :class:`JointErrors`."""
     x = observations.row_values
@@ -121,11 +120,9 @@ def term_jacobian(
 def places_of(terms: Sequence[JointTerm], first: int = 0) -> list[list[int]]:
     """Places of each term's coefficients among those of all, counted from ``first``."""
     ends = first + np.cumsum([0, *(term.count for term in terms)])
-    return [list(range(start, end)) for start, end in zip(ends, ends[1:])]
+    return [list(range(start, end)) for start, end in pairwise(ends)]
 
 
 def wrong_way(term: JointTerm, coefficients: Reals) -> bool:
     """Whether a load would have to lift the arm."""
     return term.kind == "sag" and float(coefficients[0]) < 0
-
-
