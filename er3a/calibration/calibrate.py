@@ -17,17 +17,17 @@ import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.calibration import outcomes
-from er3a.calibration.fit import SCALE, Fit, Subspace, fit, jacobian, subspace
-from er3a.calibration.left_out import LeftOut, TriedTerm, can_leave_out, choose_terms, left_out
+from er3a.calibration.fit import SCALE, Fit, Subspace, covariance_by_poses, fit, jacobian, subspace
+from er3a.calibration.left_out import Choice, LeftOut, TriedTerm, can_leave_out, choose_terms, left_out
 from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
 from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions, PlacementName
 from er3a.calibration.parameters import LEVELS, Parameter, corrected, parameters_of, placements_of
 from er3a.calibration.residuals import ResidualStructure, structure_of
-from er3a.calibration.terms import JointErrors, JointTerm, TermKind, places_of
+from er3a.calibration.terms import JointErrors, TermKind, places_of
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import frames_of, tables_of
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import ReferenceSet
 from er3a.robots.robot import Robot
@@ -38,7 +38,10 @@ CLOSE = 0.9
 MOST_SCATTER = 3.0
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
+FARTHEST = 0.5
+"""Share of the farthest from which on points are set aside in one go."""
 MOST_OUT = 0.1
+OUTLIER_ROUNDS = 3
 MEDIAN_TO_DEVIATION = 1.4826
 
 
@@ -342,87 +345,24 @@ def calibrate(
         if the positions determine too little, or no corrections make the table fit
     """
     observations = observed(measurements, robot, fixed)
+    if isinstance(observations, PointObservations):
+        return _from_points(robot, observations)
     level = choose_level(robot, observations)
     found = fit(robot, level.kept, observations)
-    if not isinstance(observations, PointObservations):
-        return _result(robot, level, observations, found)
-    observations, level, found, outliers = _without_outliers(robot, observations, level, found)
-    if not observations.deviation_known:
-        deviation = found.scatter
-        observations = observations.with_deviation(deviation)
-        found = _in_deviations(found, deviation)
-    return _result(robot, level, observations, found, outliers)
+    return _result(robot, level, observations, found)
 
 
-def _in_deviations(found: Fit, deviation: float) -> Fit:
-    """A fit with a deviation of 1 mm as one with another."""
-    return replace(found, before=found.before / deviation, after=found.after / deviation, J=found.J / deviation)
-
-
-def _without_outliers(
-    robot: Robot, observations: PointObservations, level: Level, found: Fit
-) -> tuple[PointObservations, Level, Fit, tuple[Outlier, ...]]:
-    """Set points aside, the farthest first, that are out by far more than noise goes; none if that are many."""
-    given, used = (observations, level, found), np.ones(len(observations.row_values), dtype=bool)
-    while len(found.after) > 2 * len(found.kept):
-        after = np.abs(found.after)
-        deviation = MEDIAN_TO_DEVIATION * float(np.median(after))
-        if observations.deviation_known:
-            deviation = max(deviation, 1.0)
-        out = np.zeros(len(observations.row_values))
-        np.maximum.at(out, observations.pose_of, after)
-        if not (far := out > max(FAR_OUT * deviation, 0.5 * out.max())).any():
-            break
-        used[np.flatnonzero(used)[far]] = False
-        if (~used).mean() > MOST_OUT:
-            return (*given, ())
-        observations = observations.take(~far)
-        try:
-            level = choose_level(robot, observations)
-            found = fit(robot, level.kept, observations)
-        except CalibrationError:
-            return (*given, ())
-    if used.all():
-        return (*given, ())
-    here = corrected(robot, found.kept, found.amounts)
-    rest = given[0].predict(here, (), np.zeros((1, 0)))[0] - given[0].values_mm
-    distances = np.sqrt(np.bincount(given[0].pose_of, weights=rest**2))
-    outliers = tuple(Outlier(int(given[0].lines[k]), float(distances[k])) for k in np.flatnonzero(~used))
-    return observations, level, found, outliers
-
-
-def _estimates(robot: Robot, found: Fit, quantile: float) -> tuple[tuple[Estimate, ...], Reals]:
-    """Estimates of the table's numbers, and the covariance of all."""
-    covariance = found.covariance
-    error = np.sqrt(np.diag(covariance))
-    return tuple(
-        Estimate(
-            parameter,
-            parameter.nominal(robot),
-            float(amount * parameter.in_unit),
-            float(own * parameter.in_unit),
-            quantile,
-        )
-        for parameter, amount, own in zip(found.kept, found.amounts, error)
-    ), covariance
-
-
-def _result(
-    robot: Robot, level: Level, observations: Observations, found: Fit, outliers: tuple[Outlier, ...] = ()
-) -> Calibration:
-    quantile = INTERVAL_95
-    if not observations.deviation_known:
-        quantile = float(scipy.special.stdtrit(len(found.after) - len(found.kept), 0.975))
-    estimates, covariance = _estimates(robot, found, quantile)
+def _result(robot: Robot, level: Level, observations: Observations, found: Fit) -> Calibration:
+    """What the table alone has of a calibration."""
+    covariance = _covariance(observations, found)
     error = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(error, error)
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
     kept, deviation = found.kept, observations.deviation_mm
-    here = corrected(robot, kept, found.amounts)
-    result = Calibration(
-        robot=here,
+    return Calibration(
+        robot=corrected(robot, kept, found.amounts),
         level=level.name,
-        estimates=estimates,
+        estimates=_estimates(robot, found, error, _quantile(observations, found)),
         correlation=correlation,
         held=level.subspace.held,
         close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
@@ -433,19 +373,127 @@ def _result(
         rms_after_mm=float(np.sqrt(np.mean((found.after * deviation) ** 2))),
         scatter=found.scatter,
         more=level.more,
-        deviation_mm=None if observations.deviation_known else float(deviation[0]),
-        outliers=outliers,
     )
-    if not isinstance(observations, PointObservations):
-        return result
-    choice = choose_terms(robot, here, kept, observations)
+
+
+def _covariance(observations: Observations, found: Fit) -> Reals:
+    """By the stated deviations; where none was stated, by what remains at each pose."""
+    if isinstance(observations, PointObservations) and not observations.deviation_known:
+        return covariance_by_poses(found, observations.pose_of)
+    return found.covariance
+
+
+def _quantile(observations: Observations, found: Fit) -> float:
+    if observations.deviation_known:
+        return INTERVAL_95
+    return float(scipy.special.stdtrit(len(found.after) - found.J.shape[1], 0.975))
+
+
+def _estimates(robot: Robot, found: Fit, error: Reals, quantile: float) -> tuple[Estimate, ...]:
+    return tuple(
+        Estimate(
+            parameter,
+            parameter.nominal(robot),
+            float(amount * parameter.in_unit),
+            float(own * parameter.in_unit),
+            quantile,
+        )
+        for parameter, amount, own in zip(found.kept, found.amounts, error)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Points that are used, the table alone, and the table with the terms that are chosen (the same if there are
+    none)."""
+
+    observations: PointObservations
+    level: Level
+    table: Fit
+    choice: Choice
+    whole: Fit
+
+    @property
+    def off_mm(self) -> Reals:
+        """What the whole model leaves, mm (n,)."""
+        off: Reals = self.whole.after * self.observations.deviation_mm
+        return off
+
+
+def _model(robot: Robot, observations: PointObservations) -> _Model:
+    level = choose_level(robot, observations)
+    table = fit(robot, level.kept, observations)
+    if not observations.deviation_known:
+        observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
+        table = fit(robot, level.kept, observations)
+    choice = choose_terms(robot, corrected(robot, table.kept, table.amounts), table.kept, observations)
+    whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
+    return _Model(observations, level, table, choice, whole)
+
+
+def _from_points(robot: Robot, every: PointObservations) -> Calibration:
+    used = _without_outliers(robot, every)
+    model = _model(robot, every.take(used))
+    for _ in range(OUTLIER_ROUNDS):
+        again = _out_of(every, _off_mm(robot, every, model), model.off_mm) <= 1.0
+        if (again == used).all() or (~again).mean() > MOST_OUT:
+            break
+        used, model = again, _model(robot, every.take(again))
+    distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model) ** 2))
+    observations, terms = model.observations, model.choice.terms
     return replace(
-        result,
-        left_out=_left_out(observations, found),
-        residuals=_structure(observations, found),
-        tried=choice.tried,
-        beyond=_beyond(robot, found, observations, choice.terms, quantile) if choice.terms else None,
+        _result(robot, model.level, observations, model.table),
+        deviation_mm=None if observations.deviation_known else float(observations.deviation_mm[0]),
+        outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
+        left_out=_left_out(observations, model.table),
+        residuals=_structure(observations, model.table),
+        tried=model.choice.tried,
+        beyond=_beyond(robot, observations, model.whole) if terms else None,
     )
+
+
+def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
+    """Points (P,) that are used for a first model: those far out are set aside, the farthest first, because they bend
+    the table; all are used if they are many."""
+    all_used = np.ones(len(every.row_values), dtype=bool)
+    used, observations = all_used.copy(), every
+    while True:
+        try:
+            found = fit(robot, choose_level(robot, observations).kept, observations)
+        except CalibrationError:
+            if observations is every:
+                raise
+            return all_used
+        if len(found.after) <= 2 * len(found.kept):
+            return all_used
+        off = found.after * observations.deviation_mm
+        out = _out_of(observations, off, off)
+        far = out > max(1.0, FARTHEST * out.max())
+        if not far.any():
+            return used
+        used[np.flatnonzero(used)[far]] = False
+        if (~used).mean() > MOST_OUT:
+            return all_used
+        observations = observations.take(~far)
+
+
+def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> Reals:
+    """By how many times (P,) points are farther off than noise goes; its deviation by the median of ``usual_mm``, which
+    knows of no outliers, or as stated if that is more."""
+    deviation = MEDIAN_TO_DEVIATION * float(np.median(np.abs(usual_mm)))
+    noise = np.maximum(deviation, observations.deviation_mm) if observations.deviation_known else deviation
+    out = np.zeros(len(observations.row_values))
+    np.maximum.at(out, observations.pose_of, np.abs(off_mm) / (FAR_OUT * noise))
+    return out
+
+
+def _off_mm(robot: Robot, every: PointObservations, model: _Model) -> Reals:
+    """What the whole model leaves of all points, mm (n,)."""
+    here = corrected(robot, model.whole.kept, model.whole.amounts)
+    errors = JointErrors(robot, model.whole.terms, model.whole.coefficients)
+    shifted = every.shifted(errors.amounts(every.row_values, every.points(robot)))
+    off: Reals = shifted.predict(here, (), np.zeros((1, 0)))[0] - every.values_mm
+    return off
 
 
 def _left_out(observations: PointObservations, found: Fit) -> LeftOut | None:
@@ -458,21 +506,11 @@ def _structure(observations: PointObservations, found: Fit) -> ResidualStructure
     return structure_of(residuals, observations.row_values, observations.lines)
 
 
-def _beyond(
-    robot: Robot,
-    table: Fit,
-    observations: PointObservations,
-    terms: tuple[JointTerm, ...],
-    quantile: float,
-) -> Beyond:
-    found = fit(robot, table.kept, observations, terms)
-    scatter = found.scatter if not observations.deviation_known else 1.0
-    estimates, covariance = _estimates(robot, found, quantile * scatter)
-    error = np.sqrt(np.diag(covariance)) * scatter
-    count = len(found.kept)
+def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond:
+    error, count = np.sqrt(np.diag(_covariance(observations, found))), len(found.kept)
     return Beyond(
         robot=corrected(robot, found.kept, found.amounts),
-        errors=JointErrors(robot, terms, found.coefficients),
+        errors=JointErrors(robot, found.terms, found.coefficients),
         terms=tuple(
             TermEstimate(
                 term.kind,
@@ -480,9 +518,9 @@ def _beyond(
                 tuple((1000 * found.coefficients[own]).tolist()),
                 tuple((1000 * error[count:][own]).tolist()),
             )
-            for term, own in zip(terms, places_of(terms))
+            for term, own in zip(found.terms, places_of(found.terms))
         ),
-        estimates=estimates,
+        estimates=_estimates(robot, found, error, _quantile(observations, found)),
         rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
         left_out=_left_out(observations, found),
         residuals=_structure(observations, found),

@@ -6,6 +6,8 @@ References
 ----------
 .. [1] J. M. Hollerbach, C. W. Wampler, "The calibration index and taxonomy for robot kinematic calibration methods",
    Int. J. of Robotics Research 15(6), 1996.
+.. [2] R. M. Bell, D. F. McCaffrey, "Bias reduction in standard errors for linear regression with multi-stage samples",
+   Survey Methodology 28(2), 2002.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from er3a.calibration.observations import Observations, PointObservations
 from er3a.calibration.outcomes import CalibrationError, Held, MovesNothing, NoCorrectionFits, NotToldApart
 from er3a.calibration.parameters import Parameter, corrected, parallel_pairs
 from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
 STEP = 1e-5
@@ -30,6 +32,7 @@ STEPS = 30
 SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE = 1e-9  # of the weighted differences, of measured points
 HALVINGS = 12
+LEAST_OWN = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +125,24 @@ class Fit:
     def scatter(self) -> float:
         """Root mean square of what remains, in standard deviations, per degree of freedom."""
         return float(np.sqrt((self.after @ self.after) / max(len(self.after) - self.J.shape[1], 1)))
+
+
+def covariance_by_poses(found: Fit, pose_of: Integers) -> Reals:
+    """Covariance (k + c, k + c) of the estimates from the residuals themselves, pose by pose: right also where what
+    remains is no white noise of one size, but what a model misses at poses that could have been others.
+
+    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p`` [2]_, so that those which the fit has
+    drawn to itself count in full.
+    """
+    C = found.covariance
+    order = np.argsort(pose_of, kind="stable")
+    middle = np.zeros_like(C)
+    for rows in np.split(order, np.flatnonzero(np.diff(pose_of[order])) + 1):
+        J = found.J[rows]
+        size, axes = np.linalg.eigh(np.eye(len(rows)) - J @ C @ J.T)
+        push = J.T @ (axes @ ((axes.T @ found.after[rows]) / np.sqrt(np.maximum(size, LEAST_OWN))))
+        middle += np.outer(push, push)
+    return np.asarray(C @ middle @ C, np.float64)
 
 
 def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:
