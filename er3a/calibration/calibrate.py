@@ -279,6 +279,10 @@ class Calibration(ByValue, Displayed):
         table, if there are any; else as ``er3a.forward(found.robot, q)``."""
         return forward(self.robot, q) if self.beyond is None else _with_errors(self.beyond, np.asarray(q, float))
 
+    def without_terms(self) -> Calibration:
+        """The same with the table alone."""
+        return replace(self, beyond=None)
+
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
         """How far the model (as of :meth:`forward`) is from other measurements, (P,): over their measured coordinates.
 

@@ -110,8 +110,8 @@ def mesh(
 def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
-    output: Annotated[Path, typer.Option(help="the robot file to write")],
     *,
+    output: Annotated[Path | None, typer.Option(help="the robot file to write; none by default")] = None,
     fixed: Annotated[list[Placement] | None, typer.Option(help="what the robot's file places right")] = None,
     held_back: Annotated[Path | None, typer.Option(help="a CSV of positions that the fit is not to see")] = None,
     as_json: AsJson = False,
@@ -138,15 +138,17 @@ def calibrate(
             found = calibrate_robot(arm, source, [each.value for each in fixed or ()])
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
-    write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, calibrated"), output)
+    if output:
+        write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, calibrated"), output)
     distances = found.distances_mm(others) if others else None
     if as_json:
-        print_json({"output": str(output), **calibration_record(found, distances)})
+        print_json({"output": str(output) if output else None, **calibration_record(found, distances)})
         return
     print(lines_of(found))
     if distances is not None:
         print(held_back_line(distances))
-    print(f"{output}: written")
+    if output:
+        print(f"{output}: written")
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
