@@ -23,6 +23,7 @@ PAGES = (
     "speed",
     "diagnosis",
     "calibration",
+    "real_arms",
     "hand_eye",
     "workspace",
     "paths",

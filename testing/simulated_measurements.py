@@ -7,9 +7,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.calibration.calibrate import Measurement, Parameter, calibrate, moved
+from er3a.calibration.calibrate import calibrate
+from er3a.calibration.observations import Measurement
+from er3a.calibration.parameters import Parameter, corrected
 from er3a.kinematics.forward import forward
-from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import MM, Pose
 from er3a.robots.robot import Robot
@@ -43,7 +44,7 @@ def covered(
     inside = np.zeros((runs, len(kept)), dtype=bool)
     for run in range(runs):
         truth = random.normal(0.0, size)
-        arm = robot_of(moved(tables_of(robot), kept, truth[None]), 0, robot)
+        arm = corrected(robot, kept, truth)
         q = random.uniform(robot.lower, robot.upper, (poses, 6))
         found = calibrate(robot, measured(arm, q, deviation_mm, random))
         by_parameter = {estimate.parameter: estimate for estimate in found.estimates}

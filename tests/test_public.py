@@ -20,7 +20,7 @@ import pytest
 
 import er3a
 from er3a.by_value import Displayed, Sheet, as_html, as_text
-from er3a.calibration.calibrate import Measurement
+from er3a.calibration.observations import Measurement
 from er3a.collision.scene import Box, Plane, Scene
 from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.files.reference_sets import load_references

@@ -1,282 +1,48 @@
 """Corrections to a table from measured positions, by weighted least squares.
 
-Only parameters that the measurements can tell apart are estimated; the others keep the table's values. Gauss-Newton
-steps on the weighted differences, then the covariance ``inv(J^T W J)`` of the estimates [1]_.
-
-References
-----------
-.. [1] J. M. Hollerbach, C. W. Wampler, "The calibration index and taxonomy for robot kinematic calibration methods",
-   Int. J. of Robotics Research 15(6), 1996.
+Base and tool are estimated with the table's entries where points were measured, because a tracker's frame is no arm's
+base and a reflector is not where the drawing has it. Only parameters that the measurements can tell apart are
+estimated; the others keep the table's values. Errors of joints that no table holds are estimated beside it where they
+lower the error at poses left out (:mod:`er3a.calibration.left_out`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
+import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.calibration import outcomes
-from er3a.calibration.outcomes import (
-    CalibrationError,
-    Held,
-    LevelName,
-    MorePositions,
-    MovesNothing,
-    NoPositions,
-    NotToldApart,
-)
-from er3a.errors import InputError
-from er3a.kinematics.table_batch import Tables, join, robot_of, tables_of
-from er3a.numerics.arrays import Reals
-from er3a.numerics.quasi_random import quasi_random_points
-from er3a.references.predict import predict_tables
-from er3a.references.quantities import (
-    COORDINATES,
-    MM,
-    ZERO_POSE,
-    CarriedCoordinate,
-    PointCoordinate,
-    Pose,
-    Quantity,
-    SectionCoordinate,
-)
-from er3a.references.reference import ReferenceSet, expected_of, quantities_of
+from er3a.calibration.fit import SCALE, Fit, Subspace, covariance_by_poses, fit, jacobian, subspace
+from er3a.calibration.left_out import Choice, LeftOut, TriedTerm, can_leave_out, choose_terms, left_out
+from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
+from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions, PlacementName
+from er3a.calibration.parameters import LEVELS, Parameter, corrected, parameters_of, placements_of
+from er3a.calibration.residuals import ResidualStructure, structure_of
+from er3a.calibration.terms import JointErrors, TermKind, places_of
+from er3a.kinematics.chain import row_values
+from er3a.kinematics.forward import forward
+from er3a.kinematics.table_batch import frames_of, tables_of
+from er3a.numerics.arrays import Flags, Reals
+from er3a.references.quantities import Pose
+from er3a.references.reference import ReferenceSet
 from er3a.robots.robot import Robot
 
-LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")
-PARALLEL_RAD = np.radians(1.0)
-STEP = 1e-5
-SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
-NO_EFFECT = 1e-6
-DEPENDENT = 1e-3
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One entry of the table.
-
-    Attributes
-    ----------
-    column : a, alpha, beta, d or offset; joint : 1 to 6
-    """
-
-    column: str
-    joint: int
-
-    @property
-    def name(self) -> str:
-        """Such as ``d4``."""
-        return f"{self.column}{self.joint}"
-
-    @property
-    def unit(self) -> Literal["mm", "deg"]:
-        """mm or deg."""
-        return "mm" if self.column in ("a", "d") else "deg"
-
-    @property
-    def in_unit(self) -> float:
-        """Factor from m or rad to the unit."""
-        return MM if self.unit == "mm" else 180 / np.pi
-
-
-@dataclass(frozen=True, eq=False)
-class Subspace:
-    """What references determine.
-
-    Attributes
-    ----------
-    kept : places of the parameters that are estimated
-    held : why the others keep their values
-    singular_values : of the scaled Jacobian over all parameters (one standard deviation per mm or mrad), descending
-    """
-
-    kept: tuple[int, ...]
-    held: tuple[Held, ...]
-    singular_values: Reals
-
-
-def parameters_of(robot: Robot, level: LevelName) -> tuple[Parameter, ...]:
-    """The entries of a level, in the order in which they are preferred where some can't be told apart.
-
-    ``lengths`` are those that are not 0. ``all_entries`` has Hayati's beta beside alpha wherever neighbouring axes are
-    parallel: their common normal, on which the other four entries rest, is undefined there.
-    """
-    joints = range(1, 7)
-    lengths = [Parameter(column, j) for column in "ad" for j in joints if getattr(robot, column)[j - 1]]
-    offsets = [Parameter("offset", j) for j in joints]
-    if level == LEVELS[0]:
-        return tuple(lengths)
-    if level == LEVELS[1]:
-        return (*lengths, *offsets)
-    turns = [Parameter("alpha", j) for j in joints]
-    hayati = [Parameter("beta", row) for row, _ in parallel_pairs(robot)]
-    others = [Parameter(column, j) for column in "ad" for j in reversed(joints) if not getattr(robot, column)[j - 1]]
-    return (*lengths, *offsets, *turns, *hayati, *others)
-
-
-def parallel_pairs(robot: Robot) -> list[tuple[int, tuple[int, int]]]:
-    """Rows whose alpha stands between two parallel joint axes (within 1 deg), each with the two joints."""
-    shift = 1 if robot.convention == "modified" else 0
-    pairs = []
-    for joint in range(1, 6):
-        row = joint + shift
-        if abs(np.sin(robot.alpha[row - 1])) < np.sin(PARALLEL_RAD):
-            pairs.append((row, (joint, joint + 1)))
-    return pairs
-
-
-def moved(tables: Tables, parameters: Sequence[Parameter], amounts: Reals) -> Tables:
-    """One table of the batch for each row of amounts (H, p), in m and rad, added to the entries."""
-    for parameter, amount in zip(parameters, amounts.T):
-        entry = getattr(tables, parameter.column)[:, [parameter.joint - 1]]
-        tables = tables.with_column(parameter.column, [parameter.joint - 1], entry + amount[:, None])
-    return tables
-
-
-def jacobian(tables: Tables, robot: Robot, parameters: Sequence[Parameter], quantities: Sequence[Quantity]) -> Reals:
-    """Derivative (n, p) of quantities with respect to entries, in the quantities' units per m or rad, by central
-    differences at a table (a batch of one); exact to about 1e-8."""
-    count = len(parameters)
-    steps = STEP * np.concatenate([np.eye(count), -np.eye(count)])
-    values = predict_tables(moved(join([tables] * (2 * count)), parameters, steps), robot, quantities)
-    slopes: Reals = (values[:count] - values[count:]).T / (2 * STEP)
-    return slopes
-
-
-def subspace(
-    robot: Robot, parameters: Sequence[Parameter], quantities: Sequence[Quantity], deviation: Reals
-) -> Subspace:
-    """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
-    one that lies in the span of those before it (to 0.1 % of its length) is held.
-
-    Parameters
-    ----------
-    deviation : (n,), standard deviation of the measured quantities
-    """
-    J = SCALE * jacobian(tables_of(robot), robot, parameters, quantities) / deviation[:, None]
-    norms = np.linalg.norm(J, axis=0)
-    kept: list[int] = []
-    held: list[Held] = []
-    basis: Reals = np.empty((len(J), 0))
-    for k, norm in enumerate(norms):
-        rest = J[:, k] - basis @ (basis.T @ J[:, k])
-        rest -= basis @ (basis.T @ rest)
-        if norm > NO_EFFECT * norms.max() and np.linalg.norm(rest) > DEPENDENT * norm:
-            kept.append(k)
-            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
-            continue
-        still = norm <= NO_EFFECT * norms.max()
-        held.append(MovesNothing(parameters[k].name) if still else _told_apart_from(robot, parameters, k, kept, J))
-    singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
-    return Subspace(tuple(kept), tuple(held), singular_values)
-
-
-def _told_apart_from(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: Reals) -> NotToldApart:
-    """Which entries act on the measured points as entry ``k`` does."""
-    share = np.linalg.lstsq(J[:, kept], J[:, k], rcond=None)[0] * np.linalg.norm(J[:, kept], axis=0)
-    partners = [parameters[i] for i, part in zip(kept, share) if abs(part) > DEPENDENT * np.linalg.norm(J[:, k])]
-    between = [
-        joints for row, joints in parallel_pairs(robot)
-        if parameters[k].column == "d" and {parameters[k].joint, partners[-1].joint} == set(joints)
-    ]  # fmt: skip
-    entries = (parameters[k].name, *(partner.name for partner in partners))
-    return NotToldApart(entries, between[0] if between and len(partners) == 1 else None)
-
-
-LIMIT_SLACK_DEG = 0.01
-HALF_WIDTH_TO_DEVIATION = 1 / np.sqrt(3)
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """Where a point was seen.
-
-    Attributes
-    ----------
-    row : line of the file
-    pose : joint angles, deg
-    point : flange or tool (the origin of the robot's tool frame)
-    xyz_mm : base frame; None for coordinates that weren't measured
-    deviation_mm : standard deviation of each coordinate
-    """
-
-    row: int
-    pose: Pose
-    point: Literal["flange", "tool"]
-    xyz_mm: tuple[float | None, float | None, float | None]
-    deviation_mm: float
-
-
-@dataclass(frozen=True, eq=False)
-class Observations:
-    """Measured coordinates of points.
-
-    Attributes
-    ----------
-    quantities : n coordinates at poses
-    values_mm, deviation_mm : (n,), what was measured, and its standard deviation
-    """
-
-    quantities: tuple[Quantity, ...]
-    values_mm: Reals
-    deviation_mm: Reals
-
-    def __len__(self) -> int:
-        return len(self.quantities)
-
-    @property
-    def poses(self) -> int:
-        """Number of poses."""
-        return len({quantity.seen_at for quantity in self.quantities})
-
-
-def observed(measurements: Sequence[Measurement] | ReferenceSet, robot: Robot) -> Observations:
-    """Measurements coordinate by coordinate, or a reference set's coordinates at single poses.
-
-    Of a set, official, CAD and export data count, if there are any; a standard deviation is the half-width over root 3,
-    as for a value that may lie anywhere within (GUM 4.3.7).
-
-    Raises
-    ------
-    InputError
-        for measurements outside the joint limits
-    """
-    if isinstance(measurements, ReferenceSet):
-        stated = [r for r in measurements.checkable if isinstance(r.quantity, PointCoordinate | SectionCoordinate)]
-        stated = [r for r in stated if r.authoritative] or stated
-        expected, uncertainty = expected_of(stated)
-        return Observations(quantities_of(stated), expected, HALF_WIDTH_TO_DEVIATION * uncertainty)
-    check_poses(measurements, robot)
-    x, y, z = robot.tool[:3, 3] * MM
-    offsets = {"tool": (float(x), float(y), float(z)), "flange": (0.0, 0.0, 0.0)}
-    rows = [
-        (CarriedCoordinate(each.pose, offsets[each.point], coordinate), value, each.deviation_mm)
-        for each in measurements
-        for coordinate, value in zip(COORDINATES, each.xyz_mm)
-        if value is not None
-    ]
-    quantities = tuple(quantity for quantity, _, _ in rows)
-    return Observations(quantities, np.array([row[1] for row in rows]), np.array([row[2] for row in rows]))
-
-
-def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | Path | None = None) -> None:
-    """Refuse poses outside the joint limits: :class:`InputError` naming row and joint."""
-    lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
-    for measurement in measurements:
-        for joint, angle in enumerate(measurement.pose):
-            if not lower[joint] - LIMIT_SLACK_DEG <= angle <= upper[joint] + LIMIT_SLACK_DEG:
-                limits = f"{lower[joint]:g} .. {upper[joint]:g}"
-                problem = f"{angle:g} deg is outside the limits {limits} of joint {joint + 1}"
-                remedy = "Check the angle, its sign and its unit, or the robot's limits"
-                raise InputError(path, f"row {measurement.row}, column q{joint + 1}_deg", problem, remedy)
-
-
-RICH_POSES = 64
 SHOWN_POSES = 3
+INTERVAL_95 = 1.959963984540054
+CLOSE = 0.9
+MOST_SCATTER = 3.0
+FAR_OUT = 6.0
+"""Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
+FARTHEST = 0.5
+"""Share of the farthest from which on points are set aside in one go."""
+MOST_OUT = 0.1
+OUTLIER_ROUNDS = 3
+MEDIAN_TO_DEVIATION = 1.4826
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +52,7 @@ class Level:
     Attributes
     ----------
     name : one of ``LEVELS``
-    parameters : its entries; subspace : which of them the observations determine
+    parameters : its entries, behind those of base and tool; subspace : which of them the observations determine
     more : what a fuller level would take; None if all entries are estimated
     """
 
@@ -295,10 +61,15 @@ class Level:
     subspace: Subspace
     more: MorePositions | None
 
+    @property
+    def kept(self) -> list[Parameter]:
+        """Those that are estimated."""
+        return [self.parameters[i] for i in self.subspace.kept]
+
 
 def choose_level(robot: Robot, observations: Observations) -> Level:
     """The fullest level that the observations determine as far as positions of these points ever can, with numbers to
-    spare.
+    spare; at each, base and tool are tried with the table first.
 
     Raises
     ------
@@ -307,46 +78,28 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     """
     if not len(observations):
         raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
-    rich = _rich(robot, observations.quantities)
-    deviation = np.full(len(rich), np.median(observations.deviation_mm))
+    rich = observations.rich(robot)
+    placed = placements_of(observations.free)
     more: list[MorePositions] = []
     for name in LEVELS[::-1]:
-        parameters = parameters_of(robot, name)
-        here = subspace(robot, parameters, observations.quantities, observations.deviation_mm)
-        best = subspace(robot, parameters, rich, deviation)
-        if len(best.kept) == len(here.kept) and len(observations) > len(here.kept):
-            return Level(name, parameters, here, more[-1] if more else None)
-        more.append(_what_more(robot, name, parameters, here, best, observations))
+        for first in (placed, ()) if placed else ((),):
+            parameters = (*first, *parameters_of(robot, name))
+            here, best = subspace(robot, parameters, observations), subspace(robot, parameters, rich)
+            if len(best.kept) == len(here.kept) and len(observations) > len(here.kept):
+                return Level(name, parameters, here, more[-1] if more else None)
+            more.append(_what_more(robot, name, parameters, (here, best), observations))
     problem = f"{len(observations)} coordinates determine too little; positions to be added: {more[-1].least} at least"
     raise CalibrationError(more[-1], problem)
-
-
-def _rich(robot: Robot, quantities: Sequence[Quantity]) -> tuple[Quantity, ...]:
-    """The same points at poses all over the joint range."""
-    points = dict.fromkeys(
-        replace(quantity, coordinate=c, pose=ZERO_POSE)
-        if isinstance(quantity, CarriedCoordinate | PointCoordinate)
-        else PointCoordinate(ZERO_POSE, "wrist_centre", c)
-        for quantity in quantities
-        for c in COORDINATES
-    )
-    return tuple(replace(point, pose=pose) for pose in _spread(robot) for point in points)
-
-
-def _spread(robot: Robot) -> list[Pose]:
-    low, high = np.degrees(robot.lower), np.degrees(robot.upper)
-    rows = np.round(quasi_random_points(low, high, RICH_POSES) / 5) * 5 + 0.0
-    return [cast(Pose, tuple(row)) for row in rows.tolist()]
 
 
 def _what_more(
     robot: Robot,
     level: LevelName,
     parameters: tuple[Parameter, ...],
-    here: Subspace,
-    best: Subspace,
+    subspaces: tuple[Subspace, Subspace],
     observations: Observations,
 ) -> MorePositions:
+    here, best = subspaces
     lacking = len(best.kept) - len(here.kept)
     return MorePositions(
         coordinates=len(observations),
@@ -356,17 +109,16 @@ def _what_more(
         level=level,
         least=-(-max(lacking, len(best.kept) + 1 - len(observations)) // 3),
         entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
-        examples_deg=_examples(robot, [parameters[k] for k in best.kept], observations.quantities),
+        examples_deg=_examples(robot, [parameters[k] for k in best.kept], observations),
     )
 
 
-def _examples(robot: Robot, kept: list[Parameter], quantities: Sequence[Quantity]) -> tuple[Pose, ...]:
+def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -> tuple[Pose, ...]:
     """Poses that add most to what is known: greedily the greatest gain in ln det of the information matrix."""
-    poses = _spread(robot)
-    candidates = [PointCoordinate(pose, "flange", c) for pose in poses for c in COORDINATES]
-    table = tables_of(robot)
-    blocks = SCALE * jacobian(table, robot, kept, candidates).reshape(len(poses), 3, len(kept))
-    known = SCALE * jacobian(table, robot, kept, quantities)
+    poses = spread(robot)
+    candidates = observations.flange_at(robot, poses)
+    blocks = SCALE * jacobian(robot, kept, candidates).reshape(len(poses), 3, len(kept))
+    known = SCALE * jacobian(robot, kept, observations)
     information = known.T @ known + 1e-9 * np.eye(len(kept))
     chosen = []
     for _ in range(SHOWN_POSES):
@@ -377,27 +129,21 @@ def _examples(robot: Robot, kept: list[Parameter], quantities: Sequence[Quantity
     return tuple(chosen)
 
 
-STEPS = 30
-SMALL_STEP = 1e-12  # m and rad
-HALVINGS = 12
-INTERVAL_95 = 1.959963984540054
-CLOSE = 0.9
-MOST_SCATTER = 3.0
-
-
 @dataclass(frozen=True)
 class Estimate:
-    """One estimated entry, in mm or deg.
+    """One estimated number, in mm or deg.
 
     Attributes
     ----------
     nominal : the table's value; correction : to be added to it; standard_error : of the correction
+    quantile : half-width of its 95 % interval in standard errors
     """
 
     parameter: Parameter
     nominal: float
     correction: float
     standard_error: float
+    quantile: float = INTERVAL_95
 
     @property
     def name(self) -> str:
@@ -412,7 +158,7 @@ class Estimate:
     @property
     def half_width(self) -> float:
         """Half-width of the 95 % interval."""
-        return INTERVAL_95 * self.standard_error
+        return self.quantile * self.standard_error
 
 
 @dataclass(frozen=True)
@@ -424,13 +170,60 @@ class Close:
     correlation: float
 
 
+@dataclass(frozen=True)
+class Outlier:
+    """A measurement that was set aside: its line in the file, and how far it is from the model that the others fit."""
+
+    row: int
+    distance_mm: float
+
+
+@dataclass(frozen=True)
+class TermEstimate:
+    """A term beyond the table, in units of 1/1000 (rad, m; each per rad, m of what it is multiplied by).
+
+    Attributes
+    ----------
+    coefficients, standard_errors : one for a ratio and for sag; of sine and cosine once and twice a turn
+    """
+
+    kind: TermKind
+    joint: int
+    coefficients: tuple[float, ...]
+    standard_errors: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Beyond(ByValue):
+    """A model with errors of joints that no table holds, fitted together with a table of its own.
+
+    Attributes
+    ----------
+    robot : its table, base and tool; it is right with the terms alone
+    errors : by how much joints miss what they are meant to do
+    terms : their coefficients
+    estimates : the table's corrections
+    rms_mm : of what remains
+    left_out : at poses left out; None of too few poses
+    residuals : what remains: noise, or structure
+    """
+
+    robot: Robot
+    errors: JointErrors
+    terms: tuple[TermEstimate, ...]
+    estimates: tuple[Estimate, ...]
+    rms_mm: float
+    left_out: LeftOut | None
+    residuals: ResidualStructure | None
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(ByValue, Displayed):
     """A table's corrections.
 
     Attributes
     ----------
-    robot : with the corrected table
+    robot : with the corrected table, base and tool: the best without any terms
     level : which entries were estimated
     estimates : one per identifiable entry; correlation : (k, k), of their errors
     held : why the other entries of the level keep their values
@@ -438,8 +231,14 @@ class Calibration(ByValue, Displayed):
     coordinates, poses : how many measured coordinates at how many poses
     rms_before_mm, rms_after_mm : of the differences to the measurements
     scatter : root mean square of what remains, in standard deviations, per degree of freedom: near 1 if table and
-        stated deviations are right
+        stated deviations are right; 1 if the deviation was estimated
     more : what it takes to estimate more entries; None if all are estimated
+    deviation_mm : standard deviation of a coordinate, estimated from what remains; None if it was stated
+    outliers : measurements that were set aside
+    left_out : at poses left out, by the table alone; None of reference sets and of too few poses
+    residuals : what remains: noise, or structure; None as for ``left_out``
+    tried : terms beyond the table, in the order in which they were taken, then those that were not
+    beyond : the model with those that were taken; None if there are none
     """
 
     robot: Robot
@@ -455,6 +254,12 @@ class Calibration(ByValue, Displayed):
     rms_after_mm: float
     scatter: float
     more: outcomes.MorePositions | None
+    deviation_mm: float | None = None
+    outliers: tuple[Outlier, ...] = ()
+    left_out: LeftOut | None = None
+    residuals: ResidualStructure | None = None
+    tried: tuple[TriedTerm, ...] = ()
+    beyond: Beyond | None = None
 
     @property
     def fits(self) -> bool:
@@ -469,22 +274,63 @@ class Calibration(ByValue, Displayed):
         beyond = tuple(each.name for each in self.estimates if abs(each.correction) > each.half_width)
         return outcomes.CorrectionsFound(beyond) if beyond else outcomes.NoCorrectionFound(len(self.estimates))
 
+    def forward(self, q: Reals) -> Reals:
+        """Pose of the tool (..., 4, 4), m, for commanded joint values (..., n), rad or m: with the terms beyond the
+        table, if there are any; else as ``er3a.forward(found.robot, q)``."""
+        return forward(self.robot, q) if self.beyond is None else _with_errors(self.beyond, np.asarray(q, float))
+
+    def without_terms(self) -> Calibration:
+        """The same with the table alone."""
+        return replace(self, beyond=None)
+
+    def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
+        """How far the model (as of :meth:`forward`) is from other measurements, (P,): over their measured coordinates.
+
+        Raises
+        ------
+        InputError
+            for poses of another arm, or outside its limits
+        """
+        robot = self.robot if self.beyond is None else self.beyond.robot
+        seen = observed(measurements, robot)
+        assert isinstance(seen, PointObservations)
+        meant = seen
+        if self.beyond:
+            errors = self.beyond.errors
+            meant = seen.shifted(errors.amounts(seen.row_values, seen.points(errors.robot)))
+        off = meant.predict(robot, (), np.zeros((1, 0)))[0] - seen.values_mm
+        distances: Reals = np.sqrt(np.bincount(seen.pose_of, weights=off**2, minlength=len(measurements)))
+        return distances
+
     def sheet(self) -> Sheet:
         """A row for each estimated entry."""
         rows = ((each.name, each.nominal, each.correction, each.half_width, each.unit) for each in self.estimates)
-        shown, left_out = first_rows(rows, len(self.estimates))
+        shown, left = first_rows(rows, len(self.estimates))
         rms = f"rms {shortly(self.rms_before_mm)} -> {shortly(self.rms_after_mm)} mm"
         return Sheet(
             f"Calibration of {self.robot.name} with {self.coordinates} coordinates at {self.poses} poses: {rms}",
             ("entry", "nominal", "correction", "+-95 %", "unit"),
             shown,
-            left_out,
+            left,
             (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
         )
 
 
-def calibrate(robot: Robot, measurements: Sequence[Measurement] | ReferenceSet) -> Calibration:
-    """Estimate corrections to a robot's table from positions of its flange or tool.
+def _with_errors(model: Beyond, q: Reals) -> Reals:
+    errors, flat = model.errors, q.reshape(-1, q.shape[-1])
+    x = row_values(model.robot, flat)
+    points = np.broadcast_to(errors.robot.tool[:3, 3], (len(x), 3))
+    flange = frames_of(tables_of(model.robot), model.robot, x + errors.amounts(x, points))[0][:, -1]
+    T: Reals = (flange @ model.robot.tool).reshape(*q.shape[:-1], 4, 4)
+    return T
+
+
+def calibrate(
+    robot: Robot,
+    measurements: Sequence[Measurement] | ReferenceSet,
+    fixed: Sequence[PlacementName] = (),
+) -> Calibration:
+    """Estimate corrections to a robot's table, base and tool from positions of its flange or tool.
 
     Of lengths, lengths and joint offsets, or all entries, the fullest set is estimated that the positions determine.
 
@@ -492,6 +338,8 @@ def calibrate(robot: Robot, measurements: Sequence[Measurement] | ReferenceSet) 
     ----------
     robot : the table to start from
     measurements : measured positions, or a reference set, whose key poses are used then
+    fixed : ``"base"``, ``"tool"``: to be taken from the robot's file. Reference sets fix both; the tool is fixed unless
+        its point was measured
 
     Raises
     ------
@@ -500,81 +348,184 @@ def calibrate(robot: Robot, measurements: Sequence[Measurement] | ReferenceSet) 
     CalibrationError
         if the positions determine too little, or no corrections make the table fit
     """
-    observations = observed(measurements, robot)
+    observations = observed(measurements, robot, fixed)
+    if isinstance(observations, PointObservations):
+        return _from_points(robot, observations)
     level = choose_level(robot, observations)
-    kept = [level.parameters[i] for i in level.subspace.kept]
-    return _result(robot, level, kept, observations, _fit(robot, kept, observations))
+    found = fit(robot, level.kept, observations)
+    return _result(robot, level, observations, found)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Amounts (k,) in m and rad, weighted differences (n,) before and after, and the weighted Jacobian (n, k)."""
-
-    amounts: Reals
-    before: Reals
-    after: Reals
-    J: Reals
-
-
-def _fit(robot: Robot, kept: list[Parameter], observations: Observations) -> _Fit:
-    given, quantities, deviation = tables_of(robot), observations.quantities, observations.deviation_mm
-
-    def weighted(table: Tables) -> Reals:
-        difference: Reals = (predict_tables(table, robot, quantities)[0] - observations.values_mm) / deviation
-        return difference
-
-    amounts = np.zeros(len(kept))
-    table, rest = given, weighted(given)
-    before = rest
-    for _ in range(STEPS):
-        J = jacobian(table, robot, kept, quantities)
-        step = np.linalg.lstsq(J / deviation[:, None], -rest, rcond=None)[0]
-        for _ in range(HALVINGS):
-            table = moved(given, kept, (amounts + step)[None])
-            new = weighted(table)
-            if new @ new <= rest @ rest * (1 + 1e-9):
-                break
-            step = step / 2
-        amounts, rest = amounts + step, new
-        if np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(amounts).max():
-            return _Fit(amounts, before, rest, J / deviation[:, None])
-    rest_mm = float(np.sqrt(np.mean((rest * deviation) ** 2)))
-    raise outcomes.CalibrationError(
-        outcomes.NoCorrectionFits(STEPS, rest_mm),
-        f"no corrections make the table fit: after {STEPS} steps the positions are still {rest_mm:.3g} mm off. The "
-        "table has a gross fault or is another arm's; er3a.diagnose names single faults",
-    )
-
-
-def _result(robot: Robot, level: Level, kept: list[Parameter], observations: Observations, fit: _Fit) -> Calibration:
-    J, deviation = fit.J, observations.deviation_mm
-    scale = np.linalg.norm(J, axis=0)
-    covariance = np.linalg.inv((J / scale).T @ (J / scale)) / np.outer(scale, scale)
+def _result(robot: Robot, level: Level, observations: Observations, found: Fit) -> Calibration:
+    """What the table alone has of a calibration."""
+    covariance = _covariance(observations, found)
     error = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(error, error)
-    estimates = tuple(
-        Estimate(
-            parameter,
-            float(getattr(robot, parameter.column)[parameter.joint - 1] * parameter.in_unit),
-            float(amount * parameter.in_unit),
-            float(own * parameter.in_unit),
-        )
-        for parameter, amount, own in zip(kept, fit.amounts, error)
-    )
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
-    freedom = len(fit.after) - len(kept)
+    kept, deviation = found.kept, observations.deviation_mm
     return Calibration(
-        robot=robot_of(moved(tables_of(robot), kept, fit.amounts[None]), 0, robot),
+        robot=corrected(robot, kept, found.amounts),
         level=level.name,
-        estimates=estimates,
+        estimates=_estimates(robot, found, error, _quantile(observations, found)),
         correlation=correlation,
         held=level.subspace.held,
         close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
         singular_values=level.subspace.singular_values,
         coordinates=len(observations),
         poses=observations.poses,
-        rms_before_mm=float(np.sqrt(np.mean((fit.before * deviation) ** 2))),
-        rms_after_mm=float(np.sqrt(np.mean((fit.after * deviation) ** 2))),
-        scatter=float(np.sqrt((fit.after @ fit.after) / freedom)),
+        rms_before_mm=float(np.sqrt(np.mean((found.before * deviation) ** 2))),
+        rms_after_mm=float(np.sqrt(np.mean((found.after * deviation) ** 2))),
+        scatter=found.scatter,
         more=level.more,
+    )
+
+
+def _covariance(observations: Observations, found: Fit) -> Reals:
+    """By the stated deviations; where none was stated, by what remains at each pose."""
+    if isinstance(observations, PointObservations) and not observations.deviation_known:
+        return covariance_by_poses(found, observations.pose_of)
+    return found.covariance
+
+
+def _quantile(observations: Observations, found: Fit) -> float:
+    if observations.deviation_known:
+        return INTERVAL_95
+    return float(scipy.special.stdtrit(len(found.after) - found.J.shape[1], 0.975))
+
+
+def _estimates(robot: Robot, found: Fit, error: Reals, quantile: float) -> tuple[Estimate, ...]:
+    return tuple(
+        Estimate(
+            parameter,
+            parameter.nominal(robot),
+            float(amount * parameter.in_unit),
+            float(own * parameter.in_unit),
+            quantile,
+        )
+        for parameter, amount, own in zip(found.kept, found.amounts, error)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Points that are used, the table alone, and the table with the terms that are chosen (the same if there are
+    none)."""
+
+    observations: PointObservations
+    level: Level
+    table: Fit
+    choice: Choice
+    whole: Fit
+
+    @property
+    def off_mm(self) -> Reals:
+        """What the whole model leaves, mm (n,)."""
+        off: Reals = self.whole.after * self.observations.deviation_mm
+        return off
+
+
+def _model(robot: Robot, observations: PointObservations) -> _Model:
+    level = choose_level(robot, observations)
+    table = fit(robot, level.kept, observations)
+    if not observations.deviation_known:
+        observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
+        table = fit(robot, level.kept, observations)
+    choice = choose_terms(robot, corrected(robot, table.kept, table.amounts), table.kept, observations)
+    whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
+    return _Model(observations, level, table, choice, whole)
+
+
+def _from_points(robot: Robot, every: PointObservations) -> Calibration:
+    used = _without_outliers(robot, every)
+    model = _model(robot, every.take(used))
+    for _ in range(OUTLIER_ROUNDS):
+        again = _out_of(every, _off_mm(robot, every, model), model.off_mm) <= 1.0
+        if (again == used).all() or (~again).mean() > MOST_OUT:
+            break
+        used, model = again, _model(robot, every.take(again))
+    distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model) ** 2))
+    observations, terms = model.observations, model.choice.terms
+    return replace(
+        _result(robot, model.level, observations, model.table),
+        deviation_mm=None if observations.deviation_known else float(observations.deviation_mm[0]),
+        outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
+        left_out=_left_out(observations, model.table),
+        residuals=_structure(observations, model.table),
+        tried=model.choice.tried,
+        beyond=_beyond(robot, observations, model.whole) if terms else None,
+    )
+
+
+def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
+    """Points (P,) that are used for a first model: those far out are set aside, the farthest first, because they bend
+    the table; all are used if they are many."""
+    all_used = np.ones(len(every.row_values), dtype=bool)
+    used, observations = all_used.copy(), every
+    while True:
+        try:
+            found = fit(robot, choose_level(robot, observations).kept, observations)
+        except CalibrationError:
+            if observations is every:
+                raise
+            return all_used
+        if len(found.after) <= 2 * len(found.kept):
+            return all_used
+        off = found.after * observations.deviation_mm
+        out = _out_of(observations, off, off)
+        far = out > max(1.0, FARTHEST * out.max())
+        if not far.any():
+            return used
+        used[np.flatnonzero(used)[far]] = False
+        if (~used).mean() > MOST_OUT:
+            return all_used
+        observations = observations.take(~far)
+
+
+def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> Reals:
+    """By how many times (P,) points are farther off than noise goes; its deviation by the median of ``usual_mm``, which
+    knows of no outliers, or as stated if that is more."""
+    deviation = MEDIAN_TO_DEVIATION * float(np.median(np.abs(usual_mm)))
+    noise = np.maximum(deviation, observations.deviation_mm) if observations.deviation_known else deviation
+    out = np.zeros(len(observations.row_values))
+    np.maximum.at(out, observations.pose_of, np.abs(off_mm) / (FAR_OUT * noise))
+    return out
+
+
+def _off_mm(robot: Robot, every: PointObservations, model: _Model) -> Reals:
+    """What the whole model leaves of all points, mm (n,)."""
+    here = corrected(robot, model.whole.kept, model.whole.amounts)
+    errors = JointErrors(robot, model.whole.terms, model.whole.coefficients)
+    shifted = every.shifted(errors.amounts(every.row_values, every.points(robot)))
+    off: Reals = shifted.predict(here, (), np.zeros((1, 0)))[0] - every.values_mm
+    return off
+
+
+def _left_out(observations: PointObservations, found: Fit) -> LeftOut | None:
+    return left_out(observations, found) if can_leave_out(observations, found.J.shape[1]) else None
+
+
+def _structure(observations: PointObservations, found: Fit) -> ResidualStructure | None:
+    residuals = np.zeros(observations.seen.shape)
+    residuals[observations.seen] = found.after * observations.deviation_mm
+    return structure_of(residuals, observations.row_values, observations.lines)
+
+
+def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond:
+    error, count = np.sqrt(np.diag(_covariance(observations, found))), len(found.kept)
+    return Beyond(
+        robot=corrected(robot, found.kept, found.amounts),
+        errors=JointErrors(robot, found.terms, found.coefficients),
+        terms=tuple(
+            TermEstimate(
+                term.kind,
+                term.joint,
+                tuple((1000 * found.coefficients[own]).tolist()),
+                tuple((1000 * error[count:][own]).tolist()),
+            )
+            for term, own in zip(found.terms, places_of(found.terms))
+        ),
+        estimates=_estimates(robot, found, error, _quantile(observations, found)),
+        rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
+        left_out=_left_out(observations, found),
+        residuals=_structure(observations, found),
     )

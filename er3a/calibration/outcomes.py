@@ -11,6 +11,13 @@ from er3a.references.quantities import Pose
 LevelName = Literal["lengths", "lengths_and_offsets", "all_entries"]
 """Which entries are estimated: lengths that aren't 0, joint offsets besides, or all."""
 
+PlacementName = Literal["base", "tool"]
+"""Where the arm stands, and which point of the tool was measured: estimated too, unless they are fixed."""
+
+TermVerdict = Literal["taken", "not_lower", "noise", "wrong_way"]
+"""Whether a term beyond the table was taken; or left, because poses left out are not met better with it, because noise
+may have made it, or because a load would have to lift the arm."""
+
 
 @dataclass(frozen=True)
 class MovesNothing:

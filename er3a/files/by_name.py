@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,32 +14,48 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from er3a.calibration import calibrate as calibration
-from er3a.calibration.calibrate import Calibration, Measurement, check_poses
+from er3a.calibration.calibrate import Calibration
+from er3a.calibration.observations import PLACEMENTS, Measurement, check_poses
+from er3a.calibration.outcomes import PlacementName
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
-from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, read_csv
+from er3a.errors import ArgumentError, InputError
+from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
+from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
-from er3a.robots.robot import Robot, Source
+from er3a.robots.robot import MOST_JOINTS, Robot, Source
 
 _NUMBER = CsvColumn(float)
-COLUMNS = {
-    **{f"q{joint}_deg": _NUMBER for joint in range(1, 7)},
-    "point": CsvColumn(str, choices=("flange", "tool")),
-    **{f"{c}_mm": CsvColumn(float, optional=True) for c in "xyz"},
-    "standard_deviation_mm": _NUMBER,
-}
+JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
+
+
+def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:
+    """Columns of a table of measured positions for joints in these units, deg or mm."""
+    return {
+        **{f"q{joint}_{unit}": _NUMBER for joint, unit in enumerate(units, 1)},
+        "point": CsvColumn(str, choices=("flange", "tool")),
+        **{f"{c}_mm": CsvColumn(float, optional=True) for c in "xyz"},
+        "standard_deviation_mm": CsvColumn(float, always=False),
+    }
+
+
+COLUMNS = measurement_columns(["deg"] * 6)
 POSES_TO_JUDGE_UNITS = 3
 APART_DEVIATIONS = 8.0
 
 
-def load_measurements(path: str | Path) -> tuple[Measurement, ...]:
-    """Read measured positions.
+def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Measurement, ...]:
+    """Read measured positions: joint values ``q1_deg`` ... (``q3_mm`` of a joint that slides), ``point`` (flange or
+    tool), ``x_mm``, ``y_mm``, ``z_mm``, and, if it is known, ``standard_deviation_mm``.
+
+    Parameters
+    ----------
+    robot : whose joints the columns have to be; else as many as the header has
 
     Raises
     ------
@@ -47,44 +64,57 @@ def load_measurements(path: str | Path) -> tuple[Measurement, ...]:
         values that can only be metres or radians, or rows that contradict each other
     """
     path = Path(path)
-    table = read_csv(path, COLUMNS)
+    units = _units_in(path) if robot is None else ["mm" if slides else "deg" for slides in robot.slides]
+    table = read_csv(path, measurement_columns(units))
     if not table:
         raise InputError(path, None, "the table has a header but no rows", "Add a row for each measured position")
     rows = []
     for fields in table:
-        xyz = tuple(fields[f"{c}_mm"] for c in "xyz")
+        xyz, deviation = tuple(fields[f"{c}_mm"] for c in "xyz"), fields["standard_deviation_mm"]
         if xyz == (None, None, None):
             raise InputError(path, f"row {fields['row']}, column x_mm", "no coordinate is given", "Give one at least")
-        if fields["standard_deviation_mm"] <= 0:
-            problem = f"{fields['standard_deviation_mm']:g} is not positive"
-            where = f"row {fields['row']}, column standard_deviation_mm"
-            raise InputError(path, where, problem, "Write the measuring device's standard deviation")
-        pose = tuple(fields[f"q{joint}_deg"] for joint in range(1, 7))
-        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, fields["standard_deviation_mm"]))
-    _check_units(path, rows)
+        if deviation is not None and deviation <= 0:
+            where, problem = f"row {fields['row']}, column standard_deviation_mm", f"{deviation:g} is not positive"
+            remedy = "Write the measuring device's standard deviation, or leave the column out to have it estimated"
+            raise InputError(path, where, problem, remedy)
+        pose = tuple(fields[f"q{joint}_{unit}"] for joint, unit in enumerate(units, 1))
+        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation))
+    _check_units(path, rows, units)
     _check_contradictions(path, rows)
     return tuple(rows)
 
 
-def _check_units(path: Path, rows: list[Measurement]) -> None:
+def _units_in(path: Path) -> list[str]:
+    """Units of the joints that a header names; six angles if it names none."""
+    named = {int(found[1]): found[2] for name in read_header(path) if (found := JOINT_COLUMN.fullmatch(name))}
+    if max(named, default=0) > MOST_JOINTS:
+        column = f"q{max(named)}_{named[max(named)]}"
+        raise InputError(path, f"column {column}", f"er3a knows arms of {MOST_JOINTS} joints at most", "Remove it")
+    return [named.get(joint, "deg") for joint in range(1, max(named, default=6) + 1)]
+
+
+def _check_units(path: Path, rows: list[Measurement], units: Sequence[str]) -> None:
     for row in rows:
         span = max(abs(value) for value in row.xyz_mm if value is not None)
         if None not in row.xyz_mm and span < LEAST_SPAN_MM:
             problem = f"the point is {span:g} mm from the base's origin at most, which can only be metres"
             raise InputError(path, f"row {row.row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
-    widest = max(abs(angle) for row in rows for angle in row.pose)
+    angles = [abs(value) for row in rows for value, unit in zip(row.pose, units) if unit == "deg"]
+    widest = max(angles, default=0.0)
     if len({row.pose for row in rows}) >= POSES_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS:
         problem = f"the widest angle is {widest:g} deg, which can only be radians"
-        raise InputError(path, "columns q1_deg to q6_deg", problem, "Convert to degrees")
+        raise InputError(path, f"columns q1_deg to q{len(units)}_deg", problem, "Convert to degrees")
 
 
 def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
     by_pose: dict[tuple[Pose, str], list[Measurement]] = {}
     for row in rows:
+        if row.deviation_mm is None:
+            return
         by_pose.setdefault((row.pose, row.point), []).append(row)
     for same in (rows for rows in by_pose.values() if len(rows) > 1):
         xyz = np.array([row.xyz_mm for row in same], dtype=float)  # None becomes NaN, which is never far from anything
-        deviation = np.array([row.deviation_mm for row in same])
+        deviation = np.array([row.deviation_mm for row in same], dtype=float)
         for n, row in enumerate(same):
             apart = np.abs(xyz[:n] - xyz[n])
             far = np.argwhere(apart > APART_DEVIATIONS * np.hypot(deviation[:n], deviation[n])[:, None])
@@ -143,13 +173,16 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
     return evidence_of(robot, stated, Documents(documents), tolerance)
 
 
-def calibrate(robot: Robot, measurements: Sequence[Measurement] | ReferenceSet | str | Path) -> Calibration:
-    """Estimate corrections to a robot's table; see :func:`er3a.calibration.calibrate.calibrate`.
+def calibrate(
+    robot: Robot, measurements: Sequence[Measurement] | ReferenceSet | str | Path, fixed: Sequence[PlacementName] = ()
+) -> Calibration:
+    """Estimate corrections to a robot's table, base and tool; see :func:`er3a.calibration.calibrate.calibrate`.
 
     Parameters
     ----------
-    measurements : a CSV file of measured positions (:mod:`er3a.files.by_name`), its rows, or a reference set,
+    measurements : a CSV file of measured positions (:func:`er3a.load_measurements`), its rows, or a reference set,
         whose key poses are used then
+    fixed : ``"base"``, ``"tool"``: to be taken as the robot's file has them; by default both are free
 
     Returns
     -------
@@ -162,13 +195,20 @@ def calibrate(robot: Robot, measurements: Sequence[Measurement] | ReferenceSet |
     CalibrationError
         if the positions determine too little, or no corrections make the table fit
     """
+    if isinstance(fixed, str) or not set(fixed) <= set(PLACEMENTS):
+        raise ArgumentError("fixed", fixed, f"several of {', '.join(map(repr, PLACEMENTS))}")
     if isinstance(measurements, str | Path):
-        path, measurements = measurements, load_measurements(measurements)
+        path, measurements = measurements, load_measurements(measurements, robot)
         check_poses(measurements, robot, path)
-    found = calibration.calibrate(robot, measurements)
+    found = calibration.calibrate(robot, measurements, fixed)
     text = f"Calibrated with {found.coordinates} measured coordinates, starting from the table of {robot.name}"
     source = Source(text, "inferred")
-    return replace(found, robot=found.robot.replace(sources={**robot.sources, "dh": source, "zero": source}))
+    named = ["dh", "zero"] + [name for name in PLACEMENTS if not np.array_equal(*_both(found.robot, robot, name))]
+    return replace(found, robot=found.robot.replace(sources=dict(robot.sources) | dict.fromkeys(named, source)))
+
+
+def _both(first: Robot, second: Robot, name: str) -> tuple[Reals, Reals]:
+    return getattr(first, name), getattr(second, name)
 
 
 def load_table(path: str | Path) -> pd.DataFrame:

@@ -410,7 +410,7 @@ class RobotFile(StrictModel):
             small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
             suspect(f"dh.rows, zero.rows: {small} deg may be radians")
         for key in ("base", "flange", "tool"):
-            check_placement(key, getattr(self, key))
+            check_placement(key, getattr(self, key), self.dh.calibrated)
         longest, least = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows), LEAST_LONGEST_MM
         if self.dh.calibrated:  # lengths that were derived may all be short
             placed = [abs(value) for each in (self.base, self.flange, self.tool) if each for value in each.xyz_mm]
@@ -482,11 +482,12 @@ def coupling_matrix(group: Coupling, rows: int, joints: int) -> Reals:
     return matrix
 
 
-def check_placement(field: str, placement: Placement | None) -> None:
-    """Refuse a placement that is too far away, as ``ValueError`` with ``field: problem | remedy``; warn of units."""
+def check_placement(field: str, placement: Placement | None, calibrated: bool = False) -> None:
+    """Refuse a placement that is too far away, as ``ValueError`` with ``field: problem | remedy``; warn of units, but
+    not of lengths below 2 mm that were calibrated."""
     if placement is None:
         return
-    if RESIDUE_MM < max(abs(value) for value in placement.xyz_mm) < SHORTEST_PLAIN_LENGTH_MM:
+    if RESIDUE_MM < max(map(abs, placement.xyz_mm)) < SHORTEST_PLAIN_LENGTH_MM and not calibrated:
         suspect(f"{field}.xyz_mm: {placement.xyz_mm} mm may be metres")
     if look_like_radians(placement.rpy_deg):
         suspect(f"{field}.rpy_deg: {placement.rpy_deg} deg may be radians")

@@ -103,7 +103,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         "dh": sourced("dh")
         | {
             "convention": robot.convention,
-            "calibrated": _short(lengths) or bool(robot.beta.any()),
+            "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base),
             "rows": dh_rows,
         },
         "zero": sourced("zero") | {"rows": zero_rows},
@@ -142,6 +142,11 @@ def _short(lengths_mm: np.ndarray) -> bool:
     """Whether a table has lengths so short that a person's would be taken for metres."""
     short = (lengths_mm > 0) & (lengths_mm < SHORTEST_PLAIN_LENGTH_MM)
     return bool(short.any() or 0 < lengths_mm.max() < LEAST_LONGEST_MM)
+
+
+def _shifted(base: np.ndarray) -> bool:
+    """Whether a base is where only a calibration puts it, less than 2 mm off."""
+    return bool(0 < np.abs(base[:3, 3]).max() * 1000 < SHORTEST_PLAIN_LENGTH_MM)
 
 
 def _limit_rows(robot: Robot) -> list[dict]:

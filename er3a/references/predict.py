@@ -226,11 +226,11 @@ class TablesState:
 
 
 def joints_of(robot: Robot, poses: Sequence[Pose]) -> Reals:
-    """Poses as they are written (six values) as joint values (P, n) in rad or m; further joints are at 0."""
-    written = np.array(poses, float).reshape(-1, len(ZERO_POSE))
-    q = np.zeros((len(written), robot.joints))
-    count = min(robot.joints, written.shape[1])
-    q[:, :count] = written[:, :count]
+    """Poses as they are written as joint values (P, n) in rad or m; joints that a pose does not name are at 0."""
+    q = np.zeros((len(poses), robot.joints))
+    for row, pose in zip(q, poses):
+        count = min(robot.joints, len(pose))
+        row[:count] = pose[:count]
     return meant(robot, q)
 
 

@@ -19,7 +19,8 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 
-Pose = tuple[float, float, float, float, float, float]
+Pose = tuple[float, ...]
+"""Joint values as they are written: deg, or mm of joints that slide."""
 Vector = tuple[float, float, float]
 Unit = Literal["mm", "deg", "deg/s"]
 Coordinate = Literal["x", "y", "z"]

@@ -3,7 +3,7 @@
 To the twelve numbers of both poses come the table's entries. The samples can't tell all of them apart: the first
 joint's d and offset move the arm as the base's frame does, in which a fixed camera or board stands; the last rows move
 the flange, on which the other of the two is. So the twelve numbers come first, then the entries in the order of
-preference of :mod:`er3a.calibration.calibrate`; one whose effect lies in the span of those before it (to 0.1 % of its
+preference of :mod:`er3a.calibration.parameters`; one whose effect lies in the span of those before it (to 0.1 % of its
 size) keeps its value, and is told with those that act as it does. What is left is estimated by Gauss-Newton steps, with
 the weights and intervals of :mod:`er3a.vision.likelihood`.
 """
@@ -17,19 +17,11 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue
-from er3a.calibration.calibrate import (
-    CLOSE,
-    DEPENDENT,
-    NO_EFFECT,
-    SCALE,
-    Close,
-    Estimate,
-    Parameter,
-    parallel_pairs,
-    parameters_of,
-)
-from er3a.calibration.calibrate import moved as moved_tables
+from er3a.calibration.calibrate import CLOSE, Close, Estimate
+from er3a.calibration.fit import DEPENDENT, NO_EFFECT, SCALE
 from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
+from er3a.calibration.parameters import Parameter, parallel_pairs, parameters_of
+from er3a.calibration.parameters import moved as moved_tables
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
 from er3a.numerics.arrays import Reals

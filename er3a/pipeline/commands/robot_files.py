@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -26,6 +27,13 @@ from er3a.pipeline.commands.options import (
 )
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
+
+
+class Placement(StrEnum):
+    """What a calibration takes from the robot's file."""
+
+    BASE = "base"
+    TOOL = "tool"
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
@@ -109,30 +117,45 @@ def mesh(
 def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
-    output: Annotated[Path, typer.Option(help="the robot file to write")],
+    *,
+    output: Annotated[Path | None, typer.Option(help="the robot file to write; none by default")] = None,
+    fixed: Annotated[list[Placement] | None, typer.Option(help="what the robot's file places right")] = None,
+    held_back: Annotated[Path | None, typer.Option(help="a CSV of positions that the fit is not to see")] = None,
     as_json: AsJson = False,
 ):
-    """Estimate corrections to a robot's table from measured positions, and write the corrected robot file."""
+    """Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot file.
+
+    Errors of joints beyond the table (ratio, once and twice a turn, sag) are fitted where poses left out are met
+    better with them; the table in the file is the best without them.
+    """
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
+    from er3a.files.by_name import load_measurements
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
-    from er3a.pipeline.messages.diagnosis import calibration_record, lines_of
+    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, lines_of
     from er3a.pipeline.messages.say import say
 
     source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
+    arm = load_robot(robot)
+    others = load_measurements(held_back, arm) if held_back else None
     try:
         with shown_work(f"{robot}: corrections are estimated"):
-            found = calibrate_robot(load_robot(robot), source)
+            found = calibrate_robot(arm, source, [each.value for each in fixed or ()])
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
-    write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, calibrated"), output)
+    if output:
+        write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, calibrated"), output)
+    distances = found.distances_mm(others) if others else None
     if as_json:
-        print_json({"output": str(output), **calibration_record(found)})
+        print_json({"output": str(output) if output else None, **calibration_record(found, distances)})
         return
     print(lines_of(found))
-    print(f"{output}: written")
+    if distances is not None:
+        print(held_back_line(distances))
+    if output:
+        print(f"{output}: written")
 
 
 @app.command(rich_help_panel=ROBOT_FILES)

@@ -1,10 +1,9 @@
-"""Faults of a table, what a diagnosis concludes, what to measure next, and calibrations."""
+"""Faults of a table, what a diagnosis concludes, what to measure next, and what calibrations ask for."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from er3a.calibration.calibrate import Calibration
 from er3a.calibration.outcomes import (
     Misfit,
     MorePositions,
@@ -81,7 +80,6 @@ LEVELS = {
     "lengths_and_offsets": N_("lengths and joint offsets"),
     "all_entries": N_("all entries"),
 }
-MUCH_SCATTER = 2.0
 
 
 TEXTS = texts(
@@ -425,54 +423,6 @@ def _(found: MorePositions) -> str:
 @say.register
 def _(found: Misfit) -> str:
     return say_as(found, level=level(found.level))
-
-
-def lines_of(found: Calibration) -> str:
-    """A calibration as lines of text for a terminal."""
-    lines = [
-        f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
-        f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "
-        f"scatter {found.scatter:.2f} standard deviations",
-        f"{'entry':<9}{'table':>12}{'correction':>14}{'95 % interval':>16}",
-    ]
-    for each in found.estimates:
-        values = as_text(each.nominal, ">12.4f") + as_text(each.correction, ">+14.4f") + f"{each.half_width:>12.4f}"
-        lines.append(f"{each.name:<9}{values} {each.unit}")
-    lines += [f"not estimated: {say(reason)}" for reason in found.held]
-    lines += [
-        f"strongly correlated: {pair.first} and {pair.second} ({as_text(pair.correlation, '.2f')})"
-        for pair in found.close
-    ]
-    if found.scatter > MUCH_SCATTER:
-        lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
-    if found.more:
-        lines.append(f"to estimate more: {say(found.more)}")
-    return "\n".join(lines)
-
-
-def calibration_record(found: Calibration) -> dict[str, object]:
-    """A calibration as plain data, for another program; corrections in mm and deg with half their 95 % interval."""
-    return {
-        "level": found.level,
-        "coordinates": found.coordinates,
-        "poses": found.poses,
-        "rms_before_mm": found.rms_before_mm,
-        "rms_after_mm": found.rms_after_mm,
-        "scatter": found.scatter,
-        "fits": found.fits,
-        "entries": [
-            {
-                "name": each.name,
-                "nominal": each.nominal,
-                "correction": each.correction,
-                "half_width": each.half_width,
-                "unit": each.unit,
-            }
-            for each in found.estimates
-        ],
-        "held": [say(reason) for reason in found.held],
-        "more": say(found.more) if found.more else None,
-    }
 
 
 def _with_and(words: Sequence[str]) -> str:

@@ -1,0 +1,202 @@
+"""Which numbers measurements can tell apart, and their values by weighted least squares.
+
+Gauss-Newton steps on the weighted differences; the covariance of the estimates is ``inv(J^T W J)`` [1]_.
+
+References
+----------
+.. [1] J. M. Hollerbach, C. W. Wampler, "The calibration index and taxonomy for robot kinematic calibration methods",
+   Int. J. of Robotics Research 15(6), 1996.
+.. [2] R. M. Bell, D. F. McCaffrey, "Bias reduction in standard errors for linear regression with multi-stage samples",
+   Survey Methodology 28(2), 2002.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from er3a.calibration.observations import Observations, PointObservations
+from er3a.calibration.outcomes import CalibrationError, Held, MovesNothing, NoCorrectionFits, NotToldApart
+from er3a.calibration.parameters import Parameter, corrected, parallel_pairs
+from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
+from er3a.numerics.arrays import Integers, Reals
+from er3a.robots.robot import Robot
+
+STEP = 1e-5
+SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
+NO_EFFECT = 1e-6
+DEPENDENT = 1e-3
+STEPS = 30
+SMALL_STEP = 1e-12  # m and rad
+SMALL_CHANGE = 1e-9  # of the weighted differences, of measured points
+HALVINGS = 12
+LEAST_OWN = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Subspace:
+    """What measurements determine.
+
+    Attributes
+    ----------
+    kept : places of the parameters that are estimated
+    held : why the others keep their values
+    singular_values : of the scaled Jacobian over all parameters (one standard deviation per mm or mrad), descending
+    """
+
+    kept: tuple[int, ...]
+    held: tuple[Held, ...]
+    singular_values: Reals
+
+
+def jacobian(robot: Robot, parameters: Sequence[Parameter], observations: Observations) -> Reals:
+    """Derivative (n, p) of observed values (mm) by parameters (m, rad), by central differences; exact to about 1e-8."""
+    count = len(parameters)
+    steps = STEP * np.concatenate([np.eye(count), -np.eye(count)])
+    values = observations.predict(robot, parameters, steps)
+    slopes: Reals = (values[:count] - values[count:]).T / (2 * STEP)
+    return slopes
+
+
+def subspace(robot: Robot, parameters: Sequence[Parameter], observations: Observations) -> Subspace:
+    """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
+    one that lies in the span of those before it (to 0.1 % of its length) is held."""
+    J = SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None]
+    norms = np.linalg.norm(J, axis=0)
+    kept: list[int] = []
+    held: list[Held] = []
+    basis: Reals = np.empty((len(J), 0))
+    for k, norm in enumerate(norms):
+        rest = J[:, k] - basis @ (basis.T @ J[:, k])
+        rest -= basis @ (basis.T @ rest)
+        if norm > NO_EFFECT * norms.max() and np.linalg.norm(rest) > DEPENDENT * norm:
+            kept.append(k)
+            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+            continue
+        still = norm <= NO_EFFECT * norms.max()
+        held.append(MovesNothing(parameters[k].name) if still else _told_apart_from(robot, parameters, k, kept, J))
+    singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
+    return Subspace(tuple(kept), tuple(held), singular_values)
+
+
+def _told_apart_from(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: Reals) -> NotToldApart:
+    """Which entries act on the measured points as entry ``k`` does."""
+    share = np.linalg.lstsq(J[:, kept], J[:, k], rcond=None)[0] * np.linalg.norm(J[:, kept], axis=0)
+    partners = [parameters[i] for i, part in zip(kept, share) if abs(part) > DEPENDENT * np.linalg.norm(J[:, k])]
+    between = [
+        joints for row, joints in parallel_pairs(robot)
+        if parameters[k].column == "d" and {parameters[k].joint, partners[-1].joint} == set(joints)
+    ]  # fmt: skip
+    entries = (parameters[k].name, *(partner.name for partner in partners))
+    return NotToldApart(entries, between[0] if between and len(partners) == 1 else None)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A least squares' solution.
+
+    Attributes
+    ----------
+    kept, terms : what was fitted
+    amounts : (k,), added to what the robot has, in m and rad; coefficients : (c,), of the terms
+    before, after : (n,), differences to the measurements in standard deviations
+    J : (n, k + c), weighted derivatives
+    """
+
+    kept: tuple[Parameter, ...]
+    terms: tuple[JointTerm, ...]
+    amounts: Reals
+    coefficients: Reals
+    before: Reals
+    after: Reals
+    J: Reals
+
+    @property
+    def covariance(self) -> Reals:
+        """(k + c, k + c), of the estimates; coefficients of terms are taken to be about as large as ``TYPICAL``."""
+        prior = np.r_[np.zeros(len(self.amounts)), np.full(len(self.coefficients), TYPICAL**-2)]
+        scale = np.linalg.norm(self.J, axis=0)
+        information = (self.J / scale).T @ (self.J / scale) + np.diag(prior / scale**2)
+        return np.asarray(np.linalg.inv(information) / np.outer(scale, scale), np.float64)
+
+    @property
+    def scatter(self) -> float:
+        """Root mean square of what remains, in standard deviations, per degree of freedom."""
+        return float(np.sqrt((self.after @ self.after) / max(len(self.after) - self.J.shape[1], 1)))
+
+
+def covariance_by_poses(found: Fit, pose_of: Integers) -> Reals:
+    """Covariance (k + c, k + c) of the estimates from the residuals themselves, pose by pose: right also where what
+    remains is no white noise of one size, but what a model misses at poses that could have been others.
+
+    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p`` [2]_, so that those which the fit has
+    drawn to itself count in full.
+    """
+    C = found.covariance
+    order = np.argsort(pose_of, kind="stable")
+    middle = np.zeros_like(C)
+    for rows in np.split(order, np.flatnonzero(np.diff(pose_of[order])) + 1):
+        J = found.J[rows]
+        size, axes = np.linalg.eigh(np.eye(len(rows)) - J @ C @ J.T)
+        push = J.T @ (axes @ ((axes.T @ found.after[rows]) / np.sqrt(np.maximum(size, LEAST_OWN))))
+        middle += np.outer(push, push)
+    return np.asarray(C @ middle @ C, np.float64)
+
+
+def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:
+    """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
+
+    Raises
+    ------
+    CalibrationError
+        if the steps don't end
+    """
+    kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
+    nothing = np.zeros((1, len(kept)))
+    prior = np.full(sum(term.count for term in terms), 1 / TYPICAL)
+
+    def with_errors(coefficients: Reals) -> Observations:
+        if not (terms and isinstance(observations, PointObservations)):
+            return observations
+        errors = JointErrors(robot, terms, coefficients)
+        return observations.shifted(errors.amounts(observations.row_values, observations.points(robot)))
+
+    def weighted(here: Robot, coefficients: Reals) -> Reals:
+        values = with_errors(coefficients).predict(here, kept, nothing)[0]
+        return np.concatenate([(values - observations.values_mm) / deviation, prior * coefficients])
+
+    def slopes(here: Robot, coefficients: Reals) -> Reals:
+        seen = with_errors(coefficients)
+        J = jacobian(here, kept, seen) / deviation[:, None]
+        if not (terms and isinstance(observations, PointObservations)):
+            return J
+        by_terms = term_jacobian(here, robot, terms, observations) / deviation[:, None]
+        return np.block([[J, by_terms], [np.zeros((len(prior), len(kept))), np.diag(prior)]])
+
+    n, k = len(observations), len(kept)
+    unknowns, here = np.zeros(k + len(prior)), robot
+    rest = weighted(here, unknowns[k:])
+    before = rest[:n]
+    for _ in range(STEPS):
+        J = slopes(here, unknowns[k:])
+        step = np.linalg.lstsq(J, -rest, rcond=None)[0]
+        gain = np.linalg.norm(J @ step)
+        for _ in range(HALVINGS):
+            trial = unknowns + step
+            here = corrected(robot, kept, trial[:k])
+            new = weighted(here, trial[k:])
+            if new @ new <= rest @ rest * (1 + 1e-9):
+                break
+            step = step / 2
+        unknowns, rest = trial, new
+        still = isinstance(observations, PointObservations) and gain < SMALL_CHANGE * np.linalg.norm(rest)
+        if still or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
+            return Fit(kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], J[:n])
+    rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
+    raise CalibrationError(
+        NoCorrectionFits(STEPS, rest_mm),
+        f"no corrections make the table fit: after {STEPS} steps the positions are still {rest_mm:.3g} mm off. The "
+        "table has a gross fault or is another arm's; er3a.diagnose names single faults",
+    )

@@ -1,0 +1,278 @@
+"""What was measured, and what tables say of it: coordinates of points, or of quantities of a reference set."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from er3a.calibration.outcomes import PlacementName
+from er3a.calibration.parameters import MM, Parameter, moved, placed
+from er3a.errors import InputError
+from er3a.kinematics.chain import row_values
+from er3a.kinematics.table_batch import frames_of, join, tables_of
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.quasi_random import quasi_random_points
+from er3a.references.predict import predict_tables
+from er3a.references.quantities import (
+    COORDINATES,
+    ZERO_POSE,
+    CarriedCoordinate,
+    PointCoordinate,
+    Pose,
+    Quantity,
+    SectionCoordinate,
+)
+from er3a.references.reference import ReferenceSet, expected_of, quantities_of
+from er3a.robots.joint_limits import meant, shown
+from er3a.robots.robot import Robot
+
+LIMIT_SLACK = 0.01  # deg, mm
+PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
+HALF_WIDTH_TO_DEVIATION = 1 / np.sqrt(3)
+RICH_POSES = 64
+AT_ONCE = 8_000  # poses of tables whose frames are held at once
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Where a point was seen.
+
+    Attributes
+    ----------
+    row : line of the file
+    pose : one value for each joint, deg, or mm of those that slide
+    point : flange or tool (the origin of the robot's tool frame)
+    xyz_mm : base frame; None for coordinates that weren't measured
+    deviation_mm : standard deviation of each coordinate; None if it is unknown
+    """
+
+    row: int
+    pose: tuple[float, ...]
+    point: Literal["flange", "tool"]
+    xyz_mm: tuple[float | None, float | None, float | None]
+    deviation_mm: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class QuantityObservations:
+    """Coordinates of a reference set, in the frame of the arm's base by definition.
+
+    Attributes
+    ----------
+    quantities : n coordinates at poses
+    values_mm, deviation_mm : (n,), what was measured, and its standard deviation
+    """
+
+    quantities: tuple[Quantity, ...]
+    values_mm: Reals
+    deviation_mm: Reals
+    free: tuple[PlacementName, ...] = ()
+    deviation_known: bool = True
+
+    def __len__(self) -> int:
+        return len(self.quantities)
+
+    @property
+    def poses(self) -> int:
+        """Number of poses."""
+        return len({quantity.seen_at for quantity in self.quantities})
+
+    def predict(self, robot: Robot, parameters: Sequence[Parameter], amounts: Reals) -> Reals:
+        """Values (H, n), mm, by the robot's table with each row of amounts (H, p), in m and rad, added."""
+        tables = moved(join([tables_of(robot)] * len(amounts)), parameters, amounts)
+        return predict_tables(tables, robot, self.quantities)
+
+    def rich(self, robot: Robot) -> QuantityObservations:
+        """The same points at poses all over the joint range."""
+        points = dict.fromkeys(
+            replace(quantity, coordinate=c, pose=ZERO_POSE)
+            if isinstance(quantity, CarriedCoordinate | PointCoordinate)
+            else PointCoordinate(ZERO_POSE, "wrist_centre", c)
+            for quantity in self.quantities
+            for c in COORDINATES
+        )
+        return self._of(tuple(replace(point, pose=pose) for pose in spread(robot) for point in points))
+
+    def flange_at(self, robot: Robot, poses: Sequence[Pose]) -> QuantityObservations:
+        """The flange at poses."""
+        return self._of(tuple(PointCoordinate(pose, "flange", c) for pose in poses for c in COORDINATES))
+
+    def _of(self, quantities: tuple[Quantity, ...]) -> QuantityObservations:
+        deviation = np.full(len(quantities), np.median(self.deviation_mm))
+        return QuantityObservations(quantities, np.zeros(len(quantities)), deviation)
+
+
+@dataclass(frozen=True, eq=False)
+class PointObservations:
+    """Measured coordinates of points that the flange carries.
+
+    Attributes
+    ----------
+    row_values : (P, m), rad or m, what the rows of the table move by
+    on_tool : (P,) bool, whether the tool's point was measured
+    seen : (P, 3) bool, the n coordinates that were measured
+    values_mm, deviation_mm : (n,), what was measured, and its standard deviation (1 if unknown)
+    deviation_known : whether the deviations were stated
+    lines : (P,), of the file
+    free : what is placed by the measurements, too
+    """
+
+    row_values: Reals
+    on_tool: Flags
+    seen: Flags
+    values_mm: Reals
+    deviation_mm: Reals
+    deviation_known: bool
+    lines: Integers
+    free: tuple[PlacementName, ...]
+
+    def __len__(self) -> int:
+        return len(self.values_mm)
+
+    @property
+    def poses(self) -> int:
+        """Number of poses."""
+        return len(np.unique(self.row_values, axis=0))
+
+    @property
+    def pose_of(self) -> Integers:
+        """(n,), the place of each coordinate's point among the P."""
+        return np.nonzero(self.seen)[0]
+
+    def predict(self, robot: Robot, parameters: Sequence[Parameter], amounts: Reals) -> Reals:
+        """Values (H, n), mm, by the robot with each row of amounts (H, p), in m and rad, added to its table, base and
+        tool."""
+        own, base_inverse = tables_of(robot), np.linalg.inv(robot.base)
+        step = max(1, AT_ONCE // max(len(self.row_values), 1))
+        values = np.empty((len(amounts), len(self)))
+        for start in range(0, len(amounts), step):
+            part = amounts[start : start + step]
+            T = frames_of(moved(join([own] * len(part)), parameters, part), robot, self.row_values)[:, :, -1]
+            for k, row in enumerate(part):
+                S, shift = placed(parameters, row)
+                world = robot.base @ S @ base_inverse
+                points = self.points(robot) + self.on_tool[:, None] * shift
+                xyz = np.einsum("pij,pj->pi", T[k, :, :3, :3], points) + T[k, :, :3, 3]
+                values[start + k] = MM * (xyz @ world[:3, :3].T + world[:3, 3])[self.seen]
+        return values
+
+    def points(self, robot: Robot) -> Reals:
+        """Where the measured points are in the flange's frame (P, 3), m."""
+        return np.where(self.on_tool[:, None], robot.tool[:3, 3], 0.0)
+
+    def take(self, used: Flags) -> PointObservations:
+        """Those of some points (P,)."""
+        own = used[self.pose_of]
+        return replace(
+            self,
+            row_values=self.row_values[used],
+            on_tool=self.on_tool[used],
+            seen=self.seen[used],
+            values_mm=self.values_mm[own],
+            deviation_mm=self.deviation_mm[own],
+            lines=self.lines[used],
+        )
+
+    def shifted(self, amounts: Reals) -> PointObservations:
+        """With amounts (P, m), rad or m, added to what the rows move by."""
+        return replace(self, row_values=self.row_values + amounts)
+
+    def with_deviation(self, deviation_mm: float) -> PointObservations:
+        """With one standard deviation, estimated from what a fit leaves."""
+        return replace(self, deviation_mm=np.full(len(self), deviation_mm))
+
+    def rich(self, robot: Robot) -> PointObservations:
+        """The same points at poses all over the joint range."""
+        points = np.unique(self.on_tool)
+        return self._at(robot, np.repeat(np.array(spread(robot)), len(points), axis=0), np.tile(points, RICH_POSES))
+
+    def flange_at(self, robot: Robot, poses: Sequence[Pose]) -> PointObservations:
+        """The flange at poses."""
+        return self._at(robot, np.array(poses), np.zeros(len(poses), dtype=bool))
+
+    def _at(self, robot: Robot, poses: Reals, on_tool: Flags) -> PointObservations:
+        count = len(poses)
+        return replace(
+            self,
+            row_values=row_values(robot, meant(robot, poses)),
+            on_tool=on_tool,
+            seen=np.ones((count, 3), dtype=bool),
+            values_mm=np.zeros(3 * count),
+            deviation_mm=np.full(3 * count, np.median(self.deviation_mm)),
+            lines=np.zeros(count, dtype=np.int64),
+        )
+
+
+Observations = QuantityObservations | PointObservations
+
+
+def observed(
+    measurements: Sequence[Measurement] | ReferenceSet, robot: Robot, fixed: Sequence[PlacementName] = ()
+) -> Observations:
+    """Measurements coordinate by coordinate, or a reference set's coordinates at single poses.
+
+    Of a set, official, CAD and export data count, if there are any; a standard deviation is the half-width over root 3,
+    as for a value that may lie anywhere within (GUM 4.3.7).
+
+    Parameters
+    ----------
+    fixed : what of base and tool is where the robot's file has it; the tool is free only if its point was measured
+
+    Raises
+    ------
+    InputError
+        for measurements outside the joint limits, or of an arm with another number of joints
+    """
+    if isinstance(measurements, ReferenceSet):
+        stated = [r for r in measurements.checkable if isinstance(r.quantity, PointCoordinate | SectionCoordinate)]
+        stated = [r for r in stated if r.authoritative] or stated
+        expected, uncertainty = expected_of(stated)
+        return QuantityObservations(quantities_of(stated), expected, HALF_WIDTH_TO_DEVIATION * uncertainty)
+    check_poses(measurements, robot)
+    xyz = np.array([each.xyz_mm for each in measurements], dtype=float).reshape(-1, 3)
+    seen = np.isfinite(xyz)
+    on_tool = np.array([each.point == "tool" for each in measurements], dtype=bool)
+    known = all(each.deviation_mm is not None for each in measurements)
+    deviation = np.array([each.deviation_mm if known else 1.0 for each in measurements], dtype=float)
+    poses = np.array([each.pose for each in measurements], dtype=float).reshape(-1, robot.joints)
+    return PointObservations(
+        row_values=row_values(robot, meant(robot, poses)),
+        on_tool=on_tool,
+        seen=seen,
+        values_mm=xyz[seen],
+        deviation_mm=np.broadcast_to(deviation[:, None], seen.shape)[seen],
+        deviation_known=known,
+        lines=np.array([each.row for each in measurements], dtype=np.int64),
+        free=tuple(name for name in PLACEMENTS if name not in fixed and (name == "base" or on_tool.any())),
+    )
+
+
+def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | Path | None = None) -> None:
+    """Refuse poses of another arm, or outside the joint limits: :class:`InputError` naming row and joint."""
+    lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
+    units = ["mm" if slides else "deg" for slides in robot.slides]
+    for measurement in measurements:
+        if (count := len(measurement.pose)) != robot.joints:
+            column = f"q{max(count, robot.joints)}_{'deg' if count > robot.joints else units[-1]}"
+            problem = f"{count} joint values; {robot.name} has {robot.joints} joints"
+            raise InputError(path, f"row {measurement.row}, column {column}", problem, f"Give {robot.joints}")
+        for joint, value in enumerate(measurement.pose):
+            if robot.continuous[joint] or lower[joint] - LIMIT_SLACK <= value <= upper[joint] + LIMIT_SLACK:
+                continue
+            problem = (
+                f"{value:g} {units[joint]} is outside the limits {lower[joint]:g} .. {upper[joint]:g} of joint "
+                f"{joint + 1}"
+            )
+            remedy = "Check the value, its sign and its unit, or the robot's limits"
+            raise InputError(path, f"row {measurement.row}, column q{joint + 1}_{units[joint]}", problem, remedy)
+
+
+def spread(robot: Robot) -> list[Pose]:
+    """Poses all over the joint range, in whole multiples of 5 deg or mm."""
+    low, high = shown(robot, robot.lower), shown(robot, robot.upper)
+    rows = np.round(quasi_random_points(low, high, RICH_POSES) / 5) * 5 + 0.0
+    return [tuple(row) for row in rows.tolist()]

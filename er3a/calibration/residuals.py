@@ -1,0 +1,110 @@
+"""Whether what a calibration leaves is noise: by neighbours in joint space, by the order of measuring, joint by joint.
+
+Noise knows no neighbours: over random orders of the poses, the mean product of residual vectors at neighbouring poses
+scatters about 0, and the share of orders that reach the measured value is its probability [1]_. Structure is named by
+the joint whose angle explains most: residuals against a polynomial of it, by an F test for all joints tried.
+
+References
+----------
+.. [1] P. A. P. Moran, "Notes on continuous stochastic phenomena", Biometrika 37, 1950; permutation test of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from scipy.spatial import cKDTree
+
+from er3a.numerics.arrays import Integers, Reals
+
+ORDERS = 499
+NEIGHBOURS = 4
+DEGREE = 4
+SURE = 0.01
+LEAST_POSES = 40
+
+
+@dataclass(frozen=True)
+class ResidualStructure:
+    """What residuals have beside noise.
+
+    Attributes
+    ----------
+    neighbours, neighbours_probability : correlation of residuals at neighbouring poses, and how probable as much of it
+        is if they are noise
+    order, order_probability : the same of poses one after the other in the file: drift, or how they were come to
+    joint : whose value explains most of the residuals; share : of their squares beyond chance
+    joint_probability : of so much by chance, for all joints
+    worst_row, worst_mm : line of the file with the greatest residual
+    """
+
+    neighbours: float
+    neighbours_probability: float
+    order: float
+    order_probability: float
+    joint: int
+    share: float
+    joint_probability: float
+    worst_row: int
+    worst_mm: float
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether none of the three tests finds structure, at 1 % together."""
+        return min(self.neighbours_probability, self.order_probability, self.joint_probability) > SURE / 3
+
+
+def structure_of(residuals_mm: Reals, row_values: Reals, lines: Integers) -> ResidualStructure | None:
+    """Structure of residuals (P, 3), mm, at poses (P, m); None of fewer than 40."""
+    count = len(residuals_mm)
+    if count < LEAST_POSES:
+        return None
+    spread = row_values.std(axis=0)
+    moving = row_values[:, spread > 0] / spread[spread > 0]
+    near = cKDTree(moving).query(moving, k=NEIGHBOURS + 1)[1][:, 1:]
+    after = np.arange(1, count)[:, None]
+    neighbours, by_neighbours = _correlation(residuals_mm, np.arange(count), near)
+    order, by_order = _correlation(residuals_mm, np.arange(count - 1), after)
+    shares = [_explained(residuals_mm, values) for values in row_values.T]
+    joint = min(range(len(shares)), key=lambda k: shares[k][1])
+    distance = np.linalg.norm(residuals_mm, axis=1)
+    return ResidualStructure(
+        neighbours=neighbours,
+        neighbours_probability=by_neighbours,
+        order=order,
+        order_probability=by_order,
+        joint=joint + 1,
+        share=shares[joint][0],
+        joint_probability=min(1.0, shares[joint][1] * len(shares)),
+        worst_row=int(lines[distance.argmax()]),
+        worst_mm=float(distance.max()),
+    )
+
+
+def _correlation(residuals: Reals, first: Integers, second: Integers) -> tuple[float, float]:
+    """Of residuals at poses ``first`` (K,) and at those beside them, ``second`` (K, n), and its probability."""
+    square, random = float(np.mean(np.sum(residuals**2, axis=1))) or 1.0, np.random.default_rng(0)
+
+    def of(rows: Reals) -> float:
+        return float(np.mean(np.einsum("ki,kni->kn", rows[first], rows[second]))) / square
+
+    found = of(residuals)
+    others = [of(residuals[random.permutation(len(residuals))]) for _ in range(ORDERS)]
+    return found, (1 + sum(other >= found for other in others)) / (ORDERS + 1)
+
+
+def _explained(residuals: Reals, values: Reals) -> tuple[float, float]:
+    """Share of the residuals' squares, beyond chance, that a polynomial of a joint's value explains; probability."""
+    span = float(np.ptp(values))
+    if span == 0:
+        return 0.0, 1.0
+    basis = np.polynomial.legendre.legvander(2 * (values - values.min()) / span - 1, DEGREE)
+    left = residuals - basis @ np.linalg.lstsq(basis, residuals, rcond=None)[0]
+    count, numbers = residuals.size, 3 * (DEGREE + 1)
+    whole, rest = float((residuals**2).sum()), float((left**2).sum())
+    ratio = (whole - rest) / numbers / (rest / (count - numbers))
+    return max(0.0, 1 - (rest / (count - numbers)) / (whole / count)), float(
+        scipy.special.fdtrc(numbers, count - numbers, ratio)
+    )

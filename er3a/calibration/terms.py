@@ -1,0 +1,128 @@
+"""Errors of joints that no table holds: of a gear's ratio, once and twice a turn, and sag under a load.
+
+A row that is meant to move by x moves by ``x + sum_k c_k s_k``: ``s = x`` for its ratio, ``(sin x, cos x)`` and ``(sin
+2x, cos 2x)`` for what returns with each turn and half turn (eccentric gears, encoders), and ``-dh/dx`` for sag, h the
+height (m) of the measured point: the torque of a unit weight there, by its Jacobian [1]_. A weight that sinks lowers
+the arm, so the compliance c can't be negative.
+
+References
+----------
+.. [1] B. W. Mooring, Z. S. Roth, M. R. Driels, *Fundamentals of Manipulator Calibration*, 1991, chapter 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+
+from er3a.by_value import ByValue
+from er3a.calibration.observations import PointObservations
+from er3a.kinematics.table_batch import frames_of, tables_of
+from er3a.numerics.arrays import Reals
+from er3a.robots.robot import Robot
+
+TermKind = Literal["ratio", "once", "twice", "sag"]
+KINDS: tuple[TermKind, ...] = get_args(TermKind)
+TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma
+
+
+@dataclass(frozen=True)
+class JointTerm:
+    """One kind of error of the joint of one row, from 1."""
+
+    kind: TermKind
+    joint: int
+
+    @property
+    def count(self) -> int:
+        """How many coefficients it has."""
+        return 2 if self.kind in ("once", "twice") else 1
+
+    def shapes(self, x: Reals, climb: Reals) -> Reals:
+        """(P, count), what the coefficients are multiplied by.
+
+        Parameters
+        ----------
+        x : (P, m), what the rows are meant to move by
+        climb : (P, m), derivative of the measured point's height by it
+        """
+        own = x[:, self.joint - 1]
+        if self.kind == "ratio":
+            return own[:, None]
+        if self.kind == "sag":
+            return -climb[:, [self.joint - 1]]
+        turns = 1 if self.kind == "once" else 2
+        return np.column_stack([np.sin(turns * own), np.cos(turns * own)])
+
+
+def candidates(robot: Robot) -> tuple[JointTerm, ...]:
+    """The terms that are tried; joints that slide have no turns."""
+    return tuple(
+        JointTerm(kind, row + 1)
+        for kind in KINDS
+        for row in range(robot.rows)
+        if kind in ("ratio", "sag") or not robot.sliding[row]
+    )
+
+
+def effects(robot: Robot, row_values: Reals, points: Reals) -> Reals:
+    """How points (P, 3), m, in the flange's frame move with what the rows move by: (P, m, 3), m per rad or m."""
+    T = frames_of(tables_of(robot), robot, row_values)[0]
+    p = np.einsum("pij,pj->pi", T[:, -1, :3, :3], points) + T[:, -1, :3, 3]
+    axis, origin = T[:, :-1, :3, 2], T[:, :-1, :3, 3]
+    turning = np.cross(axis, p[:, None] - origin)
+    found: Reals = robot.direction[:, None] * np.where(robot.sliding[:, None], axis, turning)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class JointErrors(ByValue):
+    """Terms with their coefficients.
+
+    Attributes
+    ----------
+    robot : by whose table (the uncorrected one) heights are told
+    terms : which; coefficients : (c,) of all, in order
+    """
+
+    robot: Robot
+    terms: tuple[JointTerm, ...]
+    coefficients: Reals
+
+    def columns(self, x: Reals, points: Reals) -> list[tuple[int, Reals]]:
+        """For each coefficient the row (from 0) and what it is multiplied by (P,)."""
+        climb = effects(self.robot, x, points)[:, :, 2]
+        shapes = [(term, term.shapes(x, climb)) for term in self.terms]
+        return [(term.joint - 1, values[:, k]) for term, values in shapes for k in range(term.count)]
+
+    def amounts(self, x: Reals, points: Reals) -> Reals:
+        """By how much rows that are meant to move by x (P, m) move too far, (P, m), rad or m."""
+        found = np.zeros_like(x)
+        for coefficient, (row, values) in zip(self.coefficients, self.columns(x, points)):
+            found[:, row] += coefficient * values
+        return found
+
+
+def term_jacobian(here: Robot, robot: Robot, terms: Sequence[JointTerm], observations: PointObservations) -> Reals:
+    """Derivative (n, c) of measured coordinates (mm) by the coefficients of terms, at a corrected robot ``here``;
+    ``robot`` as of :class:`JointErrors`."""
+    x = observations.row_values
+    by_row = effects(here, x, observations.points(here)) * 1000
+    columns = JointErrors(robot, tuple(terms), np.empty(0)).columns(x, observations.points(robot))
+    found = [(values[:, None] * by_row[:, row])[observations.seen] for row, values in columns]
+    return np.stack(found, axis=1) if found else np.empty((len(observations), 0))
+
+
+def places_of(terms: Sequence[JointTerm], first: int = 0) -> list[list[int]]:
+    """Places of each term's coefficients among those of all, counted from ``first``."""
+    ends = first + np.cumsum([0, *(term.count for term in terms)])
+    return [list(range(start, end)) for start, end in pairwise(ends)]
+
+
+def wrong_way(term: JointTerm, coefficients: Reals) -> bool:
+    """Whether a load would have to lift the arm."""
+    return term.kind == "sag" and float(coefficients[0]) < 0

@@ -1,0 +1,169 @@
+"""A calibration as lines of text for a terminal, and as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
+from er3a.calibration.left_out import LeftOut, TriedTerm
+from er3a.calibration.residuals import ResidualStructure
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.messages.diagnosis import level
+from er3a.pipeline.messages.language import as_text
+from er3a.pipeline.messages.say import say
+
+MUCH_SCATTER = 2.0
+TERMS = {"ratio": "ratio", "once": "once a turn", "twice": "twice a turn", "sag": "sag under a load"}
+VERDICTS = {
+    "taken": "taken",
+    "not_lower": "left: poses left out are not met better",
+    "noise": "left: noise may have made it",
+    "wrong_way": "left: a load would have to lift the arm",
+}
+
+
+def lines_of(found: Calibration) -> str:
+    """A calibration as lines of text for a terminal."""
+    scatter = (
+        f"scatter {found.scatter:.2f} standard deviations"
+        if found.deviation_mm is None
+        else f"standard deviation estimated: {found.deviation_mm:.3g} mm a coordinate"
+    )
+    lines = [
+        f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
+        f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "
+        + scatter,
+        *_entry_lines(found.estimates),
+        *(f"not estimated: {say(reason)}" for reason in found.held),
+        *(
+            f"strongly correlated: {pair.first} and {pair.second} ({as_text(pair.correlation, '.2f')})"
+            for pair in found.close
+        ),
+        *(
+            f"set aside: row {each.row}, {each.distance_mm:.3g} mm from where the others put it"
+            for each in found.outliers
+        ),
+    ]
+    if found.scatter > MUCH_SCATTER:
+        lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
+    if found.left_out:
+        lines.append(f"table alone, {_left_out_line(found.left_out)}")
+    if found.residuals:
+        lines.append(f"table alone, {_residual_line(found.residuals)}")
+    lines += [_tried_line(each) for each in found.tried]
+    if found.beyond:
+        lines += _beyond_lines(found.beyond)
+    if found.more:
+        lines.append(f"to estimate more: {say(found.more)}")
+    return "\n".join(lines)
+
+
+def held_back_line(distances: Reals) -> str:
+    """How far the model is from positions that the fit has not seen, mm."""
+    mean, worst = distances.mean(), distances.max()
+    return f"held back: {len(distances)} positions, {mean:.4g} mm off on average, {worst:.4g} mm at worst"
+
+
+def _entry_lines(estimates: Sequence[Estimate]) -> list[str]:
+    lines = [f"{'entry':<9}{'table':>12}{'correction':>14}{'95 % interval':>16}"]
+    for each in estimates:
+        values = as_text(each.nominal, ">12.4f") + as_text(each.correction, ">+14.4f") + f"{each.half_width:>12.4f}"
+        lines.append(f"{each.name:<9}{values} {each.unit}")
+    return lines
+
+
+def _left_out_line(found: LeftOut) -> str:
+    return (
+        f"at poses left out: {found.mean_mm:.4g} mm on average, {found.worst_mm:.4g} mm at worst; far from all others "
+        f"{found.far_mean_mm:.4g} mm, {found.far_worst_mm:.4g} mm"
+    )
+
+
+def _residual_line(found: ResidualStructure) -> str:
+    if found.is_noise:
+        return f"what remains is noise by all three tests; greatest: {found.worst_mm:.3g} mm in row {found.worst_row}"
+    return (
+        f"what remains is more than noise: correlation {found.neighbours:.2f} between neighbouring poses (p "
+        f"{found.neighbours_probability:.2g}), {found.order:.2f} from row to row (p {found.order_probability:.2g}); "
+        f"J{found.joint} explains most, {found.share:.1%} (p {found.joint_probability:.2g}); greatest: "
+        f"{found.worst_mm:.3g} mm in row {found.worst_row}"
+    )
+
+
+def _tried_line(found: TriedTerm) -> str:
+    changes = f"{as_text(found.change, '+.1%')}, far from all others {as_text(found.far_change, '+.1%')}"
+    name = f"J{found.joint} {TERMS[found.kind]}"
+    return f"tried: {name:<20} squared error left out {changes}, p {found.probability:.1e}: {VERDICTS[found.verdict]}"
+
+
+def _beyond_lines(found: Beyond) -> list[str]:
+    lines = [f"with terms beyond the table: {found.rms_mm:.4g} mm root mean square"]
+    lines += [f"  J{each.joint} {TERMS[each.kind]}: {_coefficients(each)}" for each in found.terms]
+    if found.left_out:
+        lines.append(f"with terms, {_left_out_line(found.left_out)}")
+    if found.residuals:
+        lines.append(f"with terms, {_residual_line(found.residuals)}")
+    lines.append("the robot file holds the table alone; the terms are in --json and in found.forward(q) in Python")
+    return lines
+
+
+def _coefficients(term: TermEstimate) -> str:
+    pairs = zip(term.coefficients, term.standard_errors)
+    return ", ".join(f"{as_text(value, '+.3f')} +- {1.96 * error:.3f}" for value, error in pairs) + " (1/1000)"
+
+
+def calibration_record(found: Calibration, distances: Reals | None = None) -> dict[str, object]:
+    """A calibration as plain data, for another program; corrections in mm and deg with half their 95 % interval.
+
+    Parameters
+    ----------
+    distances : of positions held back, mm
+    """
+    return {
+        "level": found.level,
+        "coordinates": found.coordinates,
+        "poses": found.poses,
+        "rms_before_mm": found.rms_before_mm,
+        "rms_after_mm": found.rms_after_mm,
+        "scatter": found.scatter,
+        "standard_deviation_mm": found.deviation_mm,
+        "fits": found.fits,
+        "entries": _entries(found.estimates),
+        "held": [say(reason) for reason in found.held],
+        "more": say(found.more) if found.more else None,
+        "set_aside": [{"row": each.row, "distance_mm": each.distance_mm} for each in found.outliers],
+        "left_out": vars(found.left_out) if found.left_out else None,
+        "residuals": _residuals(found.residuals),
+        "tried": [vars(each) for each in found.tried],
+        "beyond": _beyond(found.beyond) if found.beyond else None,
+        "held_back": None
+        if distances is None
+        else {"positions": len(distances), "mean_mm": float(distances.mean()), "worst_mm": float(distances.max())},
+    }
+
+
+def _entries(estimates: Sequence[Estimate]) -> list[dict[str, object]]:
+    return [
+        {
+            "name": each.name,
+            "nominal": each.nominal,
+            "correction": each.correction,
+            "half_width": each.half_width,
+            "unit": each.unit,
+        }
+        for each in estimates
+    ]
+
+
+def _residuals(found: ResidualStructure | None) -> dict[str, object] | None:
+    return {**vars(found), "is_noise": found.is_noise} if found else None
+
+
+def _beyond(found: Beyond) -> dict[str, object]:
+    return {
+        "terms": [vars(each) for each in found.terms],
+        "entries": _entries(found.estimates),
+        "rms_mm": found.rms_mm,
+        "left_out": vars(found.left_out) if found.left_out else None,
+        "residuals": _residuals(found.residuals),
+    }

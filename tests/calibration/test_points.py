@@ -1,0 +1,205 @@
+"""Measured points: base, tool and standard deviation are found with the table, terms beyond it only where they are, and
+what is no noise is said."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import er3a
+from er3a.calibration.observations import Measurement
+from er3a.calibration.outcomes import NotToldApart
+from er3a.calibration.terms import JointErrors, JointTerm
+from er3a.errors import Er3aError, InputError
+from er3a.files.by_name import load_measurements
+from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import rot_x, rot_y, translation
+from er3a.pipeline.cli import app
+from er3a.robots.joint_limits import shown
+from testing.plain_calibration import distances, measured_arm, plain_fit
+from testing.real_arms import MEASUREMENTS, load
+
+TOOL = translation(0.05, 0.02, 0.1)
+
+
+def sliding_arm() -> er3a.Robot:
+    limits = np.array([2.5, 1.5, 0.4, 2.5, 1.8, 3.0])
+    return load_robot("er3_600").replace(
+        convention="standard",
+        a=np.array([0.1, 0.3, 0, 0, 0, 0]),
+        alpha=np.radians([-90, 90, 0, -90, 90, 0]),
+        d=np.array([0.4, 0.1, 0.3, 0.2, 0, 0.1]),
+        direction=np.ones(6),
+        offset=np.zeros(6),
+        lower=-limits,
+        upper=limits,
+        sliding=np.arange(6) == 2,
+        envelopes=(),
+        coupling=None,
+        combined=(),
+    )
+
+
+ARMS = {"six": lambda: load_robot("er3_600"), "seven": lambda: load_robot("lbr_iiwa_14"), "slide": sliding_arm}
+
+
+class Bench:
+    """An arm that differs from its table in all it can, with errors of joints, seen with noise."""
+
+    def __init__(self, name: str, random: np.random.Generator, errors: dict[JointTerm, list[float]] | None = None):
+        self.robot, self.random = ARMS[name]().replace(tool=TOOL), random
+        joints = self.robot.rows
+        self.truth = self.robot.replace(
+            a=self.robot.a + random.normal(0, 5e-4, joints),
+            d=self.robot.d + random.normal(0, 5e-4, joints),
+            alpha=self.robot.alpha + random.normal(0, 1e-3, joints),
+            offset=self.robot.offset + random.normal(0, 2e-3, joints),
+            base=translation(0.003, -0.002, 0.001) @ rot_x(0.004) @ rot_y(-0.003),
+            tool=translation(0.002, 0.001, -0.002) @ TOOL,
+        )
+        errors = errors or {}
+        self.errors = JointErrors(self.robot, tuple(errors), np.array([c for each in errors.values() for c in each]))
+
+    def joints(self, count: int) -> np.ndarray:
+        return self.random.uniform(
+            np.maximum(self.robot.lower, -2), np.minimum(self.robot.upper, 2), (count, self.robot.joints)
+        )
+
+    def positions(self, q: np.ndarray) -> np.ndarray:
+        """Where the points really are, mm."""
+        points = np.broadcast_to(TOOL[:3, 3], (len(q), 3))
+        return er3a.forward(self.truth, q + self.errors.amounts(q, points))[:, :3, 3] * 1000
+
+    def measured(self, count: int, noise_mm: float, out: tuple[int, ...] = ()) -> list[Measurement]:
+        q = self.joints(count)
+        xyz = self.positions(q) + self.random.normal(0, noise_mm, (count, 3))
+        xyz[list(out)] += 20 + 20 * noise_mm
+        poses = shown(self.robot, q).tolist()
+        return [Measurement(k + 2, tuple(p), "tool", tuple(x)) for k, (p, x) in enumerate(zip(poses, xyz.tolist()))]
+
+    def error(self, found) -> float:
+        """Mean distance at new poses between the model and where the points really are, mm."""
+        q = self.joints(200)
+        return float(np.linalg.norm(found.forward(q)[:, :3, 3] * 1000 - self.positions(q), axis=1).mean())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("noise", [0.01, 0.1, 2.0])
+@pytest.mark.parametrize("name", ARMS)
+def test_base_tool_table_and_deviation_are_found_and_no_term_that_is_not_there(name, noise, random):
+    bench = Bench(name, random)
+    out = (3, 77, 150)
+    found = er3a.calibrate(bench.robot, bench.measured(200, noise, out))
+    assert found.level == "all_entries"
+    assert found.beyond is None
+    assert found.tried
+    assert found.deviation_mm == pytest.approx(noise, rel=0.15)
+    assert [each.row for each in found.outliers] == [k + 2 for k in out]
+    assert bench.error(found) < 0.6 * noise
+    assert found.left_out.mean_mm == pytest.approx(2 * np.sqrt(2 / np.pi) * noise, rel=0.25)
+    assert found.residuals.is_noise
+
+
+TERMS = [
+    (JointTerm("ratio", 2), [2e-3]),
+    (JointTerm("once", 4), [1e-3, 1e-3]),
+    (JointTerm("twice", 2), [1.5e-3, 0.0]),
+    (JointTerm("sag", 2), [3e-3]),
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("term", range(len(TERMS)))
+@pytest.mark.parametrize("name", ARMS)
+def test_a_term_that_is_there_is_found_and_no_other(name, term, random):
+    own, coefficients = TERMS[term]
+    bench = Bench(name, random, {own: coefficients})
+    found = er3a.calibrate(bench.robot, bench.measured(200, 0.05))
+    assert [(each.kind, each.joint) for each in found.beyond.terms] == [(own.kind, own.joint)]
+    for value, true, error in zip(
+        found.beyond.terms[0].coefficients, coefficients, found.beyond.terms[0].standard_errors
+    ):
+        assert value == pytest.approx(1000 * true, abs=5 * error)
+    assert bench.error(found) < 0.04
+    assert not found.residuals.is_noise
+    assert found.beyond.residuals.is_noise
+
+
+def test_a_load_that_lifts_the_arm_is_no_sag(random):
+    bench = Bench("six", random, {JointTerm("sag", 2): [-3e-3]})
+    found = er3a.calibrate(bench.robot, bench.measured(200, 0.05))
+    assert ("sag", 2) not in [(each.kind, each.joint) for each in found.beyond.terms if found.beyond]
+
+
+def test_what_is_a_choice_between_base_tool_and_table_is_said(random):
+    bench = Bench("seven", random)
+    rows = bench.measured(60, 0.05)
+    free = er3a.calibrate(bench.robot, rows)
+    assert NotToldApart(("offset1", "base_rz"), None) in free.held
+    names = {each.name for each in er3a.calibrate(bench.robot, rows, fixed=["base", "tool"]).estimates}
+    assert {"d1", "offset1"} <= names
+    assert not any(name.startswith(("base", "tool")) for name in names)
+    with pytest.raises(Er3aError, match="fixed is the text 'base'"):
+        er3a.calibrate(bench.robot, rows, fixed="base")
+
+
+def test_a_stated_deviation_is_kept(random):
+    bench = Bench("six", random)
+    rows = [Measurement(r.row, r.pose, r.point, r.xyz_mm, 0.5) for r in bench.measured(60, 0.05)]
+    found = er3a.calibrate(bench.robot, rows)
+    assert found.deviation_mm is None
+    assert found.scatter < 0.2
+
+
+def test_another_number_of_joints_or_unit_is_one_clear_error(tmp_path, random):
+    bench = Bench("slide", random)
+    path = tmp_path / "slide.csv"
+    path.write_text("q1_deg,q2_deg,q3_mm,point,x_mm,y_mm,z_mm\n1,2,300,tool,400,0,0\n", encoding="utf-8")
+    assert load_measurements(path)[0].pose == (1.0, 2.0, 300.0)
+    with pytest.raises(InputError, match="q4_deg: missing"):
+        er3a.calibrate(bench.robot, path)
+    path.write_text(
+        "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,point,x_mm,y_mm,z_mm\n1,2,3,4,5,6,tool,400,0,0\n", encoding="utf-8"
+    )
+    with pytest.raises(InputError, match=r"q3_deg.*q3_mm"):
+        er3a.calibrate(bench.robot, path)
+    with pytest.raises(InputError, match=r"2 joint values; .* has 7 joints"):
+        er3a.calibrate(load_robot("lbr_iiwa_14"), [Measurement(2, (0.0, 1.0), "tool", (1.0, 2.0, 3.0))])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "model_mm"), [("ur5", 0.092), ("wam", 2.05)])
+def test_real_arms_at_poses_left_out_are_met_as_by_a_fit_without_er3a(name, model_mm):
+    robot, rows = load(name)
+    out = np.arange(len(rows)) % 5 == 2
+    found = er3a.calibrate(robot, [row for row, left in zip(rows, out) if not left])
+    others = [row for row, left in zip(rows, out) if left]
+    arm = measured_arm(MEASUREMENTS / f"{name}.yaml", MEASUREMENTS / f"{name}.csv")
+    plain = distances(arm, plain_fit(arm, ~out), out).mean()
+    table, model = found.without_terms().distances_mm(others).mean(), found.distances_mm(others).mean()
+    assert table == pytest.approx(plain, rel=0.03)
+    assert model < min(table, model_mm)
+    predicted = found.forward(np.radians([row.pose for row in others]))[:, :3, 3] * 1000
+    np.testing.assert_allclose(
+        np.linalg.norm(predicted - [row.xyz_mm for row in others], axis=1), found.distances_mm(others), atol=1e-9
+    )
+
+
+@pytest.mark.long
+def test_the_command_tells_positions_held_back(tmp_path):
+    lines = (MEASUREMENTS / "wam.csv").read_text(encoding="utf-8").splitlines()
+    used, held = tmp_path / "used.csv", tmp_path / "held.csv"
+    used.write_text("\n".join([lines[0], *lines[21:]]) + "\n", encoding="utf-8")
+    held.write_text("\n".join(lines[:21]) + "\n", encoding="utf-8")
+    words = ["calibrate", str(MEASUREMENTS / "wam.yaml"), str(used), "--held-back", str(held)]
+    told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    assert told["held_back"]["positions"] == 20
+    assert told["held_back"]["mean_mm"] < 3
+    assert told["output"] is None
+    text = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "mine.yaml")]).stdout
+    assert f"held back: 20 positions, {told['held_back']['mean_mm']:.4g} mm off on average" in text
+    assert "tried: J3 once a turn" in text
+    assert load_robot(tmp_path / "mine.yaml").joints == 7
