@@ -33,6 +33,7 @@ from er3a.program_check.program_check_findings import (
     CheckFinding,
     Level,
     MayMove,
+    MovesBesideProgram,
     NeverReached,
     NotComeTo,
     NotFollowedToEnd,
@@ -42,7 +43,7 @@ from er3a.program_check.program_check_findings import (
 )
 from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles_of
 from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
-from er3a.programs.instructions import ArmMotion, Decision, Pause, Place, PoseTarget, Unknown
+from er3a.programs.instructions import ArmMotion, Decision, MovesBeside, Pause, Place, PoseTarget, Unknown
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import FormInferred, NameTwice, NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
@@ -234,7 +235,8 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     """``end``: number of the first step that was not checked."""
     moves = (step.place for step in execution.steps[end:] if isinstance(step.instruction, ArmMotion))
     found = [NotExamined(place, "motion") for place in moves]
-    found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, NotComeTo)]
+    missed = (NotComeTo, NeverReached)
+    found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, NotFollowedToEnd)]
     files = {each.place.file: i for i, each in enumerate(located)}
     order = dict.fromkeys(found)
@@ -272,6 +274,9 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
         if isinstance(what, Unknown):
             unknown = MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
             found.append(LocatedFinding("caution", unknown, step.place, step.calls))
+        elif isinstance(what, MovesBeside):
+            beside = MovesBesideProgram(what.routine, what.kind)
+            found.append(LocatedFinding("caution", beside, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
             found.append(LocatedFinding("note", BothSidesChecked(what.condition), step.place, step.calls))
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]

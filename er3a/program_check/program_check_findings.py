@@ -198,6 +198,14 @@ class ConfigurationNotRead:
 
 
 @dataclass(frozen=True)
+class ConfigurationGuessed:
+    """Where the arm comes from is not known, nor which of its solutions is meant: the one nearest to 0 was taken."""
+
+    solutions: int
+    code: Literal["configuration_guessed"] = "configuration_guessed"
+
+
+@dataclass(frozen=True)
 class MotionCollides:
     """Bodies overlap on the way, the deepest first."""
 
@@ -303,8 +311,17 @@ class MayMove:
 
 
 @dataclass(frozen=True)
+class MovesBesideProgram:
+    """A routine moves the arm beside the program; its motions and the program's were not checked as one."""
+
+    routine: str
+    kind: Literal["thread", "interrupt"]
+    code: Literal["moves_beside"] = "moves_beside"
+
+
+@dataclass(frozen=True)
 class NeverReached:
-    """A motion that no way through the program comes to."""
+    """A motion that no way through the program comes to, so that it was not examined."""
 
     code: Literal["never_reached"] = "never_reached"
 
@@ -379,6 +396,7 @@ CheckFinding = (
     | TurnsAtStart
     | TurnNotMet
     | ConfigurationNotRead
+    | ConfigurationGuessed
     | MotionCollides
     | PairsUnexamined
     | ZoneCollides
@@ -392,6 +410,7 @@ CheckFinding = (
     | LineNotChecked
     | SpeedNotGiven
     | MayMove
+    | MovesBesideProgram
     | NeverReached
     | NotComeTo
     | RestNotChecked
@@ -416,8 +435,8 @@ FAILS = frozenset(
 )
 NOTES = frozenset(
     (
-        *("way_not_known", "frame_taken_as_flange", "configuration_not_read", "zone_without_size", "speed_not_given"),
-        *("never_reached", "both_sides_checked", "program_form_inferred", "program_other_encoding", "spline_as_line"),
+        *("way_not_known", "frame_taken_as_flange", "zone_without_size", "speed_not_given"),
+        *("both_sides_checked", "program_form_inferred", "program_other_encoding", "spline_as_line"),
     )
 )
 

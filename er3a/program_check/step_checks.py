@@ -58,6 +58,7 @@ from er3a.program_check.program_check_findings import (
     ArcGoesOn,
     ArcHasNoCircle,
     CheckFinding,
+    ConfigurationGuessed,
     ConfigurationNotRead,
     ExternalAxesLeftOut,
     FrameNotGiven,
@@ -78,11 +79,21 @@ from er3a.program_check.program_check_findings import (
     ZoneWithoutSize,
 )
 from er3a.programs.execution import Ending, Execution
-from er3a.programs.instructions import ArmMotion, JointTarget, Pause, PoseTarget, Target, Unknown, UnresolvedTarget
+from er3a.programs.instructions import (
+    ArmMotion,
+    JointTarget,
+    MovesBeside,
+    Pause,
+    PoseTarget,
+    Target,
+    Unknown,
+    UnresolvedTarget,
+)
 from er3a.robots.joint_limits import joint_shown, within
 from er3a.robots.robot import Robot
 
 FLANGE = "tool0"
+SAME_DIGITS = 6  # of angles in rad
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 
 
@@ -194,11 +205,20 @@ def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals
         rows = rows if met is None else met
         if met is None:
             findings.append(TurnNotMet(int(turn)))
-    elif given and "S" not in given and placed.motion.kind == "joint":
-        findings.append(ConfigurationNotRead(", ".join(f"{value}" for value in given.values())))
+    elif given and placed.motion.kind == "joint":
+        if _different(rows) > 1:
+            words = (f"S {value:g}" if key == "S" else f"{value}" for key, value in given.items())
+            findings.append(ConfigurationNotRead(", ".join(words)))
+    if reference is None and not findings and (different := _different(rows)) > 1:
+        findings.append(ConfigurationGuessed(different))
     start = np.zeros(rows.shape[1]) if reference is None else reference
     away = np.abs(rows - start).max(axis=1)
     return Goal(rows[int(away.argmin())], pose, True, tuple(findings))
+
+
+def _different(rows: Reals) -> int:
+    """How many solutions (k, n) there are that are not the same."""
+    return len(np.unique(np.round(rows, SAME_DIGITS), axis=0))
 
 
 def _with_signs(rows: Reals, turn: int) -> Reals | None:
@@ -609,7 +629,7 @@ class StepChecker:
             before = number
         elif isinstance(what, Pause):
             before = -1
-        elif isinstance(what, Unknown) and what.may_move:
+        elif (isinstance(what, Unknown) and what.may_move) or (isinstance(what, MovesBeside) and what.kind == "thread"):
             joints, before = None, -1
         self._joints.append(joints)
         self._before.append(before)

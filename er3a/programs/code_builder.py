@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from er3a.errors import InputError
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
@@ -16,6 +17,7 @@ from er3a.programs.program_findings import NameTwice, NotUnderstood, ProgramFind
 from er3a.programs.syntax import (
     Aggregate,
     Assign,
+    Beside,
     Binary,
     Branch,
     Call,
@@ -83,6 +85,10 @@ class CodeBuilder:
     def aside(self, place: Place, text: str) -> None:
         """An instruction that moves nothing."""
         self.add(Fixed(place, Aside(text)))
+
+    def beside(self, place: Place, what: Invocation, text: str, kind: Literal["thread", "interrupt"]) -> None:
+        """A routine that runs beside the program from here on."""
+        self.add(Beside(place, what, text, kind))
 
     def unknown(self, place: Place, text: str, may_move: bool = True) -> None:
         """An instruction that is not understood."""
@@ -401,5 +407,7 @@ def mapped(operation: Operation, each: Each) -> Operation:
             return replace(operation, of=None if of is None else each(of))
         case Doing(what=what):
             return replace(operation, what=each(what))
+        case Beside(what=what):
+            return replace(operation, what=within(what, each))
         case _:
             return operation

@@ -19,6 +19,7 @@ from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFi
 from er3a.programs.syntax import (
     Aggregate,
     Assign,
+    Beside,
     Constant,
     Doing,
     Element,
@@ -35,6 +36,8 @@ from er3a.programs.syntax import (
     RoutineParameter,
     Variable,
     Waiting,
+    expressions_of,
+    inner,
 )
 
 KRL = Lexicon(
@@ -145,10 +148,8 @@ ASIDES = frozenset(
         "ENUM",
         "STRUC",
         "CONTINUE",
-        "TRIGGER",
         "ANIN",
         "ANOUT",
-        "RESUME",
         "BRAKE",
         "TIME_BLOCK",
         "CONST_VEL",
@@ -156,6 +157,8 @@ ASIDES = frozenset(
         "STOP",
     ]
 )
+ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
+"""How the tool may turn on lines and arcs so that they are followed as they are meant."""
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
 Handler = Callable[["_Statement"], None]
 
@@ -232,7 +235,10 @@ class _Statement:
         words = self.words
         while words.next in ("DECL", "GLOBAL", "CONST"):
             words.take()
-        if words.next in ("STRUC", "ENUM", "INTERRUPT"):
+        if words.accept("INTERRUPT"):
+            _interrupt(self)
+            return
+        if words.next in ("STRUC", "ENUM"):
             self.builder.aside(self.place, self.text)
             return
         if words.accept("SIGNAL"):
@@ -260,6 +266,10 @@ class _Statement:
         if words.accept("="):
             value = words.expression()
             words.finish()
+            if isinstance(left, Variable) and left.name in ORIENTATION_TYPES:
+                followed = isinstance(value, Constant) and value.value in ORIENTATION_TYPES[left.name]
+                if not followed:
+                    self.builder.unknown(self.place, self.text, may_move=False)
             self.builder.add(Assign(self.place, left, value, self.text))
             return
         words.finish()
@@ -360,12 +370,27 @@ def _return(reading: _Statement) -> None:
 
 
 def _interrupt(reading: _Statement) -> None:
-    if reading.words.accept("DECL") and " DO " in reading.text.upper():
-        routine = re.split(r"(?i)\bDO\b", reading.text)[-1]
-        if "IR_STOPM" not in routine.upper() and "(" in routine:
-            reading.builder.unknown(reading.place, reading.text, may_move=False)  # not here, but whenever it is met
-            return
-    reading.builder.aside(reading.place, reading.text)
+    """``INTERRUPT DECL priority WHEN condition DO routine()``; ``INTERRUPT ON`` and the like change only when."""
+    if reading.words.accept("DECL"):
+        _do(reading)
+    else:
+        reading.builder.aside(reading.place, reading.text)
+
+
+def _do(reading: _Statement) -> None:
+    """A routine behind DO, which runs whenever a condition holds; or an assignment of a TRIGGER."""
+    asked = re.search(r"(?i)\bDO\b(.*?)(\bPRIO\s*=.*)?$", reading.text)
+    if asked is None:
+        raise MisreadError("no DO")
+    words = KrlWords(asked[1])
+    what = words.expression()
+    if isinstance(what, Invocation):
+        words.finish()
+        reading.builder.beside(reading.place, what, reading.text, "interrupt")
+    elif words.accept("="):
+        reading.builder.aside(reading.place, reading.text)
+    else:
+        raise MisreadError("DO calls no routine and sets nothing")
 
 
 def _goto(reading: _Statement) -> None:
@@ -398,6 +423,8 @@ HANDLERS: dict[str, Handler] = {
     "HALT": lambda reading: reading.builder.add(Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
     "INTERRUPT": _interrupt,
+    "TRIGGER": _do,
+    "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
     "PTP_SPLINE": lambda reading: _spline(reading),
     "ENDSPLINE": lambda reading: _spline(reading),
@@ -446,9 +473,20 @@ def _renamed(operation: Operation, names: Mapping[str, str]) -> Operation:
         return expression
 
     operation = mapped(operation, each)
+    if isinstance(operation, Beside):
+        function = operation.what.function
+        return replace(operation, what=replace(operation.what, function=names.get(function, function)))
     return replace(operation, target=each(operation.target)) if isinstance(operation, Assign) else operation
 
 
+CONFIG_NAMES = frozenset(
+    """
+    TOOL_DATA BASE_DATA LOAD_DATA PDAT_ACT LDAT_ACT FDAT_ACT PDEFAULT LDEFAULT FDEFAULT FHOME PHOME HOME XHOME XHOME1
+    XHOME2 XHOME3 XHOME4 XHOME5 PGNO SUCCESS DMY DEF_VEL_CP DEF_ACC_CP DEF_VEL_PTP DEF_ACC_PTP DEF_APO_CDIS
+    DEF_APO_CPTP POWER APPL_RUN
+    """.split()
+)
+"""Names that controllers keep in $config.dat, not in a program's own .dat."""
 HEAD = re.compile(r"(?i)\s*(?:GLOBAL\s+)?(DEF|DEFFCT)\s+(.*)")
 
 
@@ -463,9 +501,7 @@ def read_krl(source: ProgramText) -> Program:
     reader = _KrlReader(source)
     findings: list[ProgramFinding] = [*source.findings]
     data_file = data_file_of(source.path, ".dat")
-    if data_file is None:
-        findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
-    else:
+    if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
     shared = shared_data_of(source.path)
     if shared is not None:
@@ -480,6 +516,8 @@ def read_krl(source: ProgramText) -> Program:
             called += more_routines
             reader.data += more_data
             findings += more
+    if data_file is None and _lacks_data(routines, reader.data):
+        findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, told = linked([*called, *routines])
     return Program(
         "krl",
@@ -491,6 +529,34 @@ def read_krl(source: ProgramText) -> Program:
         (*findings, *told),
         source.lines,
     )
+
+
+def _lacks_data(routines: Iterable[Routine], data: Iterable[Assign]) -> bool:
+    """Whether a module's own routines use a name that nothing of what was read gives."""
+    given = {_root(each.target) for each in data} | CONFIG_NAMES
+    used: set[str] = set()
+    for routine in routines:
+        given |= {parameter.name for parameter in routine.parameters}
+        for operation in routine.code:
+            expressions = expressions_of(operation)
+            if isinstance(operation, Assign):
+                given.add(_root(operation.target))
+                expressions = () if operation.value is None else (operation.value,)
+            used.update(name for each in expressions for name in _names(each))
+    return any(name[0] not in "$%" for name in used - given)
+
+
+def _root(target: Expression) -> str:
+    while isinstance(target, (Member, Element)):
+        target = target.of
+    return target.name if isinstance(target, Variable) else ""
+
+
+def _names(expression: Expression) -> Iterable[str]:
+    if isinstance(expression, Variable):
+        yield expression.name
+    for each in inner(expression):
+        yield from _names(each)
 
 
 def _module(source: ProgramText) -> tuple[list[Routine], list[Assign], list[ProgramFinding]]:

@@ -28,6 +28,7 @@ from er3a.programs.syntax import (
     Expression,
     Invocation,
     Move,
+    Program,
     Record,
     Unclear,
     Value,
@@ -50,6 +51,9 @@ class RplDialect:
     local_by_default = False
     whole_division = True
     first_index = 1
+
+    def __init__(self, program: Program):
+        pass
 
     def begin(self, memory: ProgramMemory) -> None:
         """No variable is there from the start."""

@@ -71,6 +71,9 @@ REMEDIES: dict[str, str] = {
     "arrives_otherwise": N_("Teach the target again where the line arrives, or go there by a joint move."),
     "turns_at_start": N_("Turn the joint by a joint move first, or begin the line beside the singular pose."),
     "turn_not_met": N_("Correct the target's Turn (T), or teach the target again."),
+    "configuration_guessed": N_("Give start_deg of the program, or begin with a move to joint angles."),
+    "moves_beside": BY_HAND,
+    "never_reached": N_("Remove this motion, or check what leads to it as a program of its own."),
     "motion_collides": N_(
         "Go round by a via point, take another configuration or tool orientation, or move what stands in the way."
     ),
@@ -146,6 +149,21 @@ TEXTS = texts(
         "turn_not_met": "no solution within the limits has the signs that T {turn} asks for; the nearest was taken",
         "configuration_not_read": (
             "the meaning of the configuration {text} is not known; the solution nearest to the joints before was taken"
+        ),
+        "configuration_guessed": (
+            "where the arm comes from is not known: of {solutions} solutions the one nearest to 0 was taken, and what "
+            "follows is checked from there"
+        ),
+        "moves_beside": by(
+            "kind",
+            thread=(
+                "the thread {routine} moves the arm while the program goes on; its motions and the program's were "
+                "checked apart"
+            ),
+            interrupt=(
+                "the interrupt {routine} can move the arm at any time; its motions were checked apart, from where it is "
+                "not known"
+            ),
         ),
         "zone_collides": "a corner path that the blending zone allows collides: {pair}, {depth_mm:.1f} mm deep",
         "zone_not_settled": (
