@@ -205,10 +205,9 @@ def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals
         rows = rows if met is None else met
         if met is None:
             findings.append(TurnNotMet(int(turn)))
-    elif given and placed.motion.kind == "joint":
-        if _different(rows) > 1:
-            words = (f"S {value:g}" if key == "S" else f"{value}" for key, value in given.items())
-            findings.append(ConfigurationNotRead(", ".join(words)))
+    elif given and placed.motion.kind == "joint" and _different(rows) > 1:
+        words = (f"S {value:g}" if key == "S" else f"{value}" for key, value in given.items())
+        findings.append(ConfigurationNotRead(", ".join(words)))
     if reference is None and not findings and (different := _different(rows)) > 1:
         findings.append(ConfigurationGuessed(different))
     start = np.zeros(rows.shape[1]) if reference is None else reference
@@ -629,7 +628,9 @@ class StepChecker:
             before = number
         elif isinstance(what, Pause):
             before = -1
-        elif (isinstance(what, Unknown) and what.may_move) or (isinstance(what, MovesBeside) and what.kind == "thread"):
+        elif (isinstance(what, Unknown) and what.may_move) or (
+            isinstance(what, MovesBeside) and what.kind != "interrupt"
+        ):
             joints, before = None, -1
         self._joints.append(joints)
         self._before.append(before)

@@ -119,9 +119,7 @@ class Execution(ByValue):
         moves = [0] * (len(self.steps) + 1)
         for i, step in enumerate(self.steps):
             moves[i] = moves[step.before] + isinstance(step.instruction, ArmMotion)
-        return max(
-            self.endings, key=lambda ending: (moves[ending.step] > 0 and not ending.beside, moves[ending.step])
-        )
+        return max(self.endings, key=lambda ending: (moves[ending.step] > 0 and not ending.beside, moves[ending.step]))
 
     def round_from(self, ending: Ending) -> int | None:
         """Number of the step from which a way repeats itself for ever; None if it does not."""

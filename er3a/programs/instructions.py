@@ -233,10 +233,15 @@ class Unknown:
 
 @dataclass(frozen=True, slots=True)
 class MovesBeside:
-    """A routine that moves the arm beside the program: a thread from here on, or an interrupt at any time."""
+    """A routine that moves the arm beside the program: a thread from here on, or an interrupt at any time.
+
+    Attributes
+    ----------
+    kind : ``entered`` where an interrupt's own way begins, with the arm anywhere
+    """
 
     routine: str
-    kind: Literal["thread", "interrupt"]
+    kind: Literal["thread", "interrupt", "entered"]
     text: str
 
 

@@ -27,7 +27,6 @@ from er3a.programs.instructions import (
     numbers_of,
     pose_of,
 )
-from er3a.programs.krl_reader import ORIENTATION_TYPES
 from er3a.programs.syntax import (
     Doing,
     Expression,
@@ -95,8 +94,9 @@ def relative(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[st
     """A target given by its difference from where the arm stands."""
     text, in_tool = said
     if not isinstance(value, Record):
-        known = isinstance(value, Unclear) and value is not UNREAD
-        return _unresolved(value) if known else UnresolvedTarget(text, "not_understood")
+        if isinstance(value, Unclear) and value is not UNREAD:
+            return _unresolved(value)
+        return UnresolvedTarget(text, "not_understood")
     if _has_axes(value):
         change = _joints(memory, value, text, missing=0.0)
         if memory.here.joints is None or not isinstance(change, JointTarget):
@@ -374,27 +374,36 @@ def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
 KINDS: dict[str, MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
-HARMLESS = frozenset(
-    """
-    CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
-    EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL EKI_GETBOOLARRAY EKI_GETFRAME
-    EKI_GETFRAMEARRAY EKI_GETINT EKI_GETINTARRAY EKI_GETREAL EKI_GETREALARRAY EKI_GETSTRING EKI_INIT EKI_LOCK EKI_OPEN
-    EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EO ERR_CLEAR ERR_RAISE
-    EXISTS_KRLDLG EXISTS_KRLMSG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA INVERSE IR_STOPM LK
-    MSGDIALOG MSGINFO MSGLOG MSGNOTIFY MSGQUIT MSGSTATE P00 PULSE SET_CD_PARAMS SET_KRLDLG SET_KRLMSG
-    SET_SYSTEM_DATA SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL STRTOFRAME STRTOINT
-    STRTOPOS STRTOREAL STRTOSTRING SWRITE USER_GRP VARSTATE VAR_STATE
-    """.split()
-)
+HARMLESS_TEXT = """
+CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
+EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL EKI_GETBOOLARRAY EKI_GETFRAME
+EKI_GETFRAMEARRAY EKI_GETINT EKI_GETINTARRAY EKI_GETREAL EKI_GETREALARRAY EKI_GETSTRING EKI_INIT EKI_LOCK
+EKI_OPEN EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EO ERR_CLEAR
+ERR_RAISE EXISTS_KRLDLG EXISTS_KRLMSG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA INVERSE
+IR_STOPM LK MSGDIALOG MSGINFO MSGLOG MSGNOTIFY MSGQUIT MSGSTATE P00 PULSE RESET_CD_PARAMS SET_CD_PARAMS
+SET_KRLDLG SET_KRLMSG SET_SYSTEM_DATA SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL
+STRTOFRAME STRTOINT STRTOPOS STRTOREAL STRTOSTRING SWRITE USER_GRP VARSTATE VAR_STATE
+"""
+HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Functions of the controller that move nothing and set no frame."""
 EVALUATED = frozenset((*IN_DEGREES, "ATAN2", "INV_POS"))
-OF_SETTINGS = frozenset(
-    """
-    SVEL_CP SVEL_JOINT SACC_CP SACC_JOINT SAPO SAPO_PTP STOOL STOOL2 SBASE SIPO_MODE SJERK SLOAD SGEAR_JERK SORI_TYP
-    SORI_TYPE SCIRC_TYPE
-    """.split()
-)
+OF_SETTINGS_TEXT = """
+SVEL_CP SVEL_JOINT SACC_CP SACC_JOINT SAPO SAPO_PTP STOOL STOOL2 SBASE SIPO_MODE SJERK SLOAD SGEAR_JERK SORI_TYP
+SORI_TYPE SCIRC_TYPE
+"""
+OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions behind WITH, which :func:`keep_setting` reads."""
+ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
+"""How the tool may turn on lines and arcs so that they are followed as they are meant."""
+CONTROLLER: dict[str, Value] = {
+    "$KINCLASS": "#STANDARD",
+    "$EX_AX_NUM": 0,
+    "$ERR.NUMBER": 0,
+    "$ADAP_ACC": "#STEP1",
+    "$TCP_IPO": True,
+    "$COLLISAVOID": False,
+}
+"""What a controller of an arm without other axes has in variables that its own modules ask, if no error has come up."""
 HERE = ("$POS_ACT", "$POS_FOR", "$POS_INT", "$POS_ACT_MES")
 HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_INT", "$AXIS_ACT_MEAS")
 
@@ -427,6 +436,10 @@ class KrlDialect:
         """Outputs."""
         return name.startswith(("$OUT[", "$ANOUT["))
 
+    def is_followed(self, name: str, value: Value) -> bool:
+        """Whether motions are followed as a variable asks that is set to a value."""
+        return name not in ORIENTATION_TYPES or value in ORIENTATION_TYPES[name]
+
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
@@ -435,6 +448,10 @@ class KrlDialect:
         """Frames of the controller, and where the arm stands."""
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
             return frame_record(pose_of((0.0,) * 6, "kuka"))
+        if name == "$NUM_AX":
+            return memory.cell.joints
+        if name in CONTROLLER:
+            return CONTROLLER[name]
         if name in HERE:
             seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
             return None if seen is None else frame_record(seen, "E6POS")

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from er3a.errors import InputError
-from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, not_understood, within
+from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked, mapped, not_understood, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_files import data_file_of, modules_of, shared_data_of
@@ -36,8 +36,6 @@ from er3a.programs.syntax import (
     RoutineParameter,
     Variable,
     Waiting,
-    expressions_of,
-    inner,
 )
 
 KRL = Lexicon(
@@ -157,8 +155,6 @@ ASIDES = frozenset(
         "STOP",
     ]
 )
-ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
-"""How the tool may turn on lines and arcs so that they are followed as they are meant."""
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
 Handler = Callable[["_Statement"], None]
 
@@ -178,7 +174,7 @@ def statement(builder: CodeBuilder, place: Place, text: str, signals: dict[str, 
         if reading.words.texts[0] in ("FOR", "CASE"):  # without which the lines behind would mean something else
             problem = f"this {reading.words.texts[0]} can't be read ({error})"
             raise fault(place, problem, "Write FOR i=1 TO 9, or CASE 1, 2") from None
-        builder.unknown(place, text, may_move=not inside_data)
+        builder.unread(place, text, not inside_data, folds=True)
     except RecursionError:
         raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
@@ -266,10 +262,6 @@ class _Statement:
         if words.accept("="):
             value = words.expression()
             words.finish()
-            if isinstance(left, Variable) and left.name in ORIENTATION_TYPES:
-                followed = isinstance(value, Constant) and value.value in ORIENTATION_TYPES[left.name]
-                if not followed:
-                    self.builder.unknown(self.place, self.text, may_move=False)
             self.builder.add(Assign(self.place, left, value, self.text))
             return
         words.finish()
@@ -479,13 +471,12 @@ def _renamed(operation: Operation, names: Mapping[str, str]) -> Operation:
     return replace(operation, target=each(operation.target)) if isinstance(operation, Assign) else operation
 
 
-CONFIG_NAMES = frozenset(
-    """
-    TOOL_DATA BASE_DATA LOAD_DATA PDAT_ACT LDAT_ACT FDAT_ACT PDEFAULT LDEFAULT FDEFAULT FHOME PHOME HOME XHOME XHOME1
-    XHOME2 XHOME3 XHOME4 XHOME5 PGNO SUCCESS DMY DEF_VEL_CP DEF_ACC_CP DEF_VEL_PTP DEF_ACC_PTP DEF_APO_CDIS
-    DEF_APO_CPTP POWER APPL_RUN
-    """.split()
-)
+CONFIG_NAMES_TEXT = """
+TOOL_DATA BASE_DATA LOAD_DATA PDAT_ACT LDAT_ACT FDAT_ACT PDEFAULT LDEFAULT FDEFAULT FHOME PHOME HOME XHOME
+XHOME1 XHOME2 XHOME3 XHOME4 XHOME5 PGNO SUCCESS DMY DEF_VEL_CP DEF_ACC_CP DEF_VEL_PTP DEF_ACC_PTP DEF_APO_CDIS
+DEF_APO_CPTP POWER APPL_RUN
+"""
+CONFIG_NAMES = frozenset(CONFIG_NAMES_TEXT.split())
 """Names that controllers keep in $config.dat, not in a program's own .dat."""
 HEAD = re.compile(r"(?i)\s*(?:GLOBAL\s+)?(DEF|DEFFCT)\s+(.*)")
 
@@ -516,7 +507,7 @@ def read_krl(source: ProgramText) -> Program:
             called += more_routines
             reader.data += more_data
             findings += more
-    if data_file is None and _lacks_data(routines, reader.data):
+    if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, told = linked([*called, *routines])
     return Program(
@@ -529,34 +520,6 @@ def read_krl(source: ProgramText) -> Program:
         (*findings, *told),
         source.lines,
     )
-
-
-def _lacks_data(routines: Iterable[Routine], data: Iterable[Assign]) -> bool:
-    """Whether a module's own routines use a name that nothing of what was read gives."""
-    given = {_root(each.target) for each in data} | CONFIG_NAMES
-    used: set[str] = set()
-    for routine in routines:
-        given |= {parameter.name for parameter in routine.parameters}
-        for operation in routine.code:
-            expressions = expressions_of(operation)
-            if isinstance(operation, Assign):
-                given.add(_root(operation.target))
-                expressions = () if operation.value is None else (operation.value,)
-            used.update(name for each in expressions for name in _names(each))
-    return any(name[0] not in "$%" for name in used - given)
-
-
-def _root(target: Expression) -> str:
-    while isinstance(target, (Member, Element)):
-        target = target.of
-    return target.name if isinstance(target, Variable) else ""
-
-
-def _names(expression: Expression) -> Iterable[str]:
-    if isinstance(expression, Variable):
-        yield expression.name
-    for each in inner(expression):
-        yield from _names(each)
 
 
 def _module(source: ProgramText) -> tuple[list[Routine], list[Assign], list[ProgramFinding]]:

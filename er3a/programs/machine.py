@@ -240,7 +240,7 @@ def _moves(operation: Operation, moving: set[str], dialect: Dialect) -> bool:
             return True
         case Call(routine=routine) if routine in moving:
             return True
-        case Beside(what=what, kind=kind) if what.function in moving:
+        case Beside(what=what) if what.function in moving:
             return True
     return bool(strange_call(operation, dialect))
 
@@ -599,7 +599,7 @@ class Machine:
         follows = None if behind is None else self.first_behind.get(behind)
         self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside))
 
-    def _assign(self, memory: ProgramMemory, each: Assign) -> Output | None:
+    def _assign(self, memory: ProgramMemory, each: Assign) -> Output | Unknown | None:
         if each.type_name and isinstance(each.target, Variable):
             memory.types[each.target.name] = each.type_name
         if each.value is None:
@@ -616,7 +616,7 @@ class Machine:
         memory.assign(each.target, value, local)
         if self.dialect.named(name):
             memory.write(name + "%name", each.text.partition("=")[2].strip())
-        return None
+        return None if self.dialect.is_followed(name, value) else Unknown(each.text, may_move=False)
 
     def _is_new(self, memory: ProgramMemory, name: str) -> bool:
         start = root(name)
@@ -697,20 +697,18 @@ class Machine:
         """
         name = start.what.function
         routine = self.program.routines.get(name)
-        if routine is None and (start.kind == "thread" or not self.dialect.harmless(start.what)):
-            self._note(way, start.place, MovesBeside(name, start.kind, start.text))
-        elif name not in self.moving:
+        unknown = routine is None and (start.kind == "thread" or not self.dialect.harmless(start.what))
+        if not unknown and name not in self.moving:
             self._note(way, start.place, Aside(start.text))
             return
-        else:
-            self._note(way, start.place, MovesBeside(name, start.kind, start.text))
+        before = way.step
+        self._note(way, start.place, MovesBeside(name, start.kind, start.text))
         if routine is not None:
-            local, fits = _locals(routine, start.what.arguments, start.what.keywords, way.memory)
-            if not fits:
-                self._note(way, start.place, Unknown(start.text, may_move=False))
             other = way.fork(self.numbers, len(self.seen))
+            other.step, other.beside = before, True
+            local, fits = _locals(routine, start.what.arguments, start.what.keywords, way.memory)
             other.frames = [Frame(routine, 0, local, (*way.frames[-1].calls, start.place))]
-            other.beside, other.memory.local = True, local
+            other.memory.local = local
             other.memory.beside = self._changed_later(way) | changed_beside(self.program, self.dialect, name)
             if start.kind == "interrupt":
                 other.memory.here = Position()
@@ -719,6 +717,10 @@ class Machine:
                 self.started.add(state)
                 self.numbers += 1
                 self.waiting.insert(0, other)
+                if start.kind == "interrupt":
+                    self._note(other, start.place, MovesBeside(name, "entered", start.text))
+                if not fits:
+                    self._note(other, start.place, Unknown(start.text, may_move=False))
         if start.kind == "thread":
             way.memory.here = Position()
 

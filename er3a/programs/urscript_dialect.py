@@ -63,45 +63,44 @@ ROBOT_BASE = NamedFrame("base", np.eye(4))
 NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
 SAME_TURN = 1e-9
 HALF_A_TURN = math.pi - 1e-6
-HARMLESS = frozenset(
-    """
-    assert binary_list_to_integer conveyor_pulse_decode enable_external_ft_sensor
-    encoder_enable_pulse_decode encoder_enable_set_tick_count encoder_get_tick_count encoder_set_tick_count
-    encoder_unwind_delta_tick_count end_force_mode end_freedrive_mode end_screw_driving end_teach_mode force
-    force_mode_set_damping force_mode_set_gain_scaling ft_rtde_input_enable get_actual_joint_positions_history
-    get_actual_joint_speeds get_actual_tcp_speed get_analog_in get_analog_out get_base_acceleration
-    get_configurable_digital_in get_configurable_digital_out get_controller_temp get_conveyor_tick_count
-    get_coriolis_and_centrifugal_torques get_digital_in get_digital_out get_euromap_input get_euromap_output get_flag
-    get_freedrive_status get_gravity get_inverse_kin_has_solution get_jacobian get_jacobian_time_derivative
-    get_joint_temp get_joint_torques get_mass_matrix get_standard_analog_in get_standard_analog_out
-    get_standard_digital_in get_standard_digital_out get_steptime get_target_joint_accelerations
-    get_target_joint_speeds get_target_payload get_target_payload_cog get_target_payload_inertia get_target_tcp_speed
-    get_tcp_force get_tool_accelerometer_reading get_tool_analog_in get_tool_current get_tool_digital_in
-    get_tool_digital_out integer_to_binary_list is_steady is_within_safety_limits modbus_add_rtu_signal
-    modbus_add_signal modbus_delete_signal modbus_get_error modbus_get_signal_status modbus_get_time_since_signal_invalid
-    modbus_request_update_signal_value modbus_send_custom_command modbus_set_digital_input_action
-    modbus_set_output_register modbus_set_output_signal modbus_set_runstate_dependent_choice
-    modbus_set_signal_update_frequency popup pose_dist pose_sub powerdown random read_input_boolean_register
-    read_input_float_register read_input_integer_register read_output_boolean_register read_output_float_register
-    read_output_integer_register read_port_bit read_port_register request_boolean_from_primary_client
-    request_float_from_primary_client request_integer_from_primary_client request_string_from_primary_client
-    rpc_factory rtde_set_watchdog set_analog_inputrange set_analog_out set_analog_outputdomain
-    set_baselight_off set_baselight_solid set_configurable_digital_input_action set_configurable_digital_out
-    set_conveyor_tick_count set_digital_out set_euromap_output set_euromap_runstate_dependent_choice set_flag
-    set_gp_boolean_input_action set_gravity set_input_actions_to_default set_payload set_payload_cog set_payload_mass
-    set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
-    set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
-    set_runstate_tool_digital_output_to_value set_safety_mode_transition_hardness set_standard_analog_input_domain
-    set_standard_analog_out set_standard_digital_input_action set_standard_digital_out set_target_payload
-    set_tool_analog_input_domain set_tool_communication set_tool_digital_input_action set_tool_digital_out
-    set_tool_digital_output_mode set_tool_output_mode set_tool_voltage sleep socket_close socket_get_var socket_open
-    socket_read_ascii_float socket_read_binary_integer socket_read_byte_list socket_read_line socket_read_string
-    socket_send_byte socket_send_int socket_send_line socket_send_string socket_set_var stopj stopl str_at str_cat
-    str_empty str_find str_len str_sub sync textmsg time to_num to_str tool_contact tool_contact_examples varmsg
-    write_output_boolean_register write_output_float_register write_output_integer_register write_port_bit
-    write_port_register zero_ftsensor
-    """.split()
-)
+HARMLESS_TEXT = """
+assert binary_list_to_integer conveyor_pulse_decode enable_external_ft_sensor encoder_enable_pulse_decode
+encoder_enable_set_tick_count encoder_get_tick_count encoder_set_tick_count encoder_unwind_delta_tick_count
+end_force_mode end_freedrive_mode end_screw_driving end_teach_mode force force_mode_set_damping
+force_mode_set_gain_scaling ft_rtde_input_enable get_actual_joint_positions_history get_actual_joint_speeds
+get_actual_tcp_speed get_analog_in get_analog_out get_base_acceleration get_configurable_digital_in
+get_configurable_digital_out get_controller_temp get_conveyor_tick_count get_coriolis_and_centrifugal_torques
+get_digital_in get_digital_out get_euromap_input get_euromap_output get_flag get_freedrive_status get_gravity
+get_inverse_kin_has_solution get_jacobian get_jacobian_time_derivative get_joint_temp get_joint_torques
+get_mass_matrix get_standard_analog_in get_standard_analog_out get_standard_digital_in get_standard_digital_out
+get_steptime get_target_joint_accelerations get_target_joint_speeds get_target_payload get_target_payload_cog
+get_target_payload_inertia get_target_tcp_speed get_tcp_force get_tool_accelerometer_reading get_tool_analog_in
+get_tool_current get_tool_digital_in get_tool_digital_out integer_to_binary_list is_steady
+is_within_safety_limits modbus_add_rtu_signal modbus_add_signal modbus_delete_signal modbus_get_error
+modbus_get_signal_status modbus_get_time_since_signal_invalid modbus_request_update_signal_value
+modbus_send_custom_command modbus_set_digital_input_action modbus_set_output_register modbus_set_output_signal
+modbus_set_runstate_dependent_choice modbus_set_signal_update_frequency popup pose_dist pose_sub powerdown
+random read_input_boolean_register read_input_float_register read_input_integer_register
+read_output_boolean_register read_output_float_register read_output_integer_register read_port_bit
+read_port_register request_boolean_from_primary_client request_float_from_primary_client
+request_integer_from_primary_client request_string_from_primary_client rpc_factory rtde_set_watchdog
+set_analog_inputrange set_analog_out set_analog_outputdomain set_baselight_off set_baselight_solid
+set_configurable_digital_input_action set_configurable_digital_out set_conveyor_tick_count set_digital_out
+set_euromap_output set_euromap_runstate_dependent_choice set_flag set_gp_boolean_input_action set_gravity
+set_input_actions_to_default set_payload set_payload_cog set_payload_mass
+set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
+set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
+set_runstate_tool_digital_output_to_value set_safety_mode_transition_hardness set_standard_analog_input_domain
+set_standard_analog_out set_standard_digital_input_action set_standard_digital_out set_target_payload
+set_tool_analog_input_domain set_tool_communication set_tool_digital_input_action set_tool_digital_out
+set_tool_digital_output_mode set_tool_output_mode set_tool_voltage sleep socket_close socket_get_var socket_open
+socket_read_ascii_float socket_read_binary_integer socket_read_byte_list socket_read_line socket_read_string
+socket_send_byte socket_send_int socket_send_line socket_send_string socket_set_var stopj stopl str_at str_cat
+str_empty str_find str_len str_sub sync textmsg time to_num to_str tool_contact tool_contact_examples varmsg
+write_output_boolean_register write_output_float_register write_output_integer_register write_port_bit
+write_port_register zero_ftsensor
+"""
+HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Functions of the language that move nothing and set no frame; any other name may be anybody's and do anything."""
 OUTPUTS = {
     "set_digital_out": "digital_out",
@@ -182,6 +181,10 @@ class UrScriptDialect:
     def is_signal(self, name: str) -> bool:
         """Signals are set by functions."""
         return False
+
+    def is_followed(self, name: str, value: Value) -> bool:
+        """No variable asks for anything."""
+        return True
 
     def named(self, name: str) -> bool:
         """Tools have no names."""

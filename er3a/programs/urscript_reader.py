@@ -65,6 +65,8 @@ CHANGED = "%changed"
 LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
 
 
+OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
+"""With what a line ends whose statement goes on in the next."""
 PLAIN = re.compile(
     rf"(mov[ejlp]+)\((p?)\[((?:\s*[-+]?{NUMBER}\s*,){{5}}\s*[-+]?{NUMBER}\s*)\]((?:\s*,\s*[avtr]\s*=\s*[-+]?{NUMBER})*)\s*\)$"
 )
@@ -165,7 +167,9 @@ class _UrReader:
         top = self.open[0]
         names = {each.name for each in self.routines}
         if not any(isinstance(each, Move) or names & set(_called(each)) for each in top.code):
-            called = {name for each in self.routines for step in each.code for name in _called(step) if name != each.name}
+            called = {
+                name for each in self.routines for step in each.code for name in _called(step) if name != each.name
+            }
             outermost = [each for each in self.routines if each.name in self.outermost and not each.thread]
             starts = [each for each in outermost if each.name not in called] or outermost
             if starts:
@@ -173,7 +177,7 @@ class _UrReader:
         return [*self.routines, top.routine(place)]
 
     def _statements(self) -> Iterator[tuple[Place, str, str]]:
-        """Statements with their first line: lines are joined while a bracket is open."""
+        """Statements with their first line: lines are joined while a bracket is open, or behind an operator."""
         parts: list[str] = []
         depth, first = 0, 0
         for number, line in enumerate(self.source.lines, 1):
@@ -182,7 +186,8 @@ class _UrReader:
                 first = number
             depth += change
             place = Place(self.source.path, first)
-            if depth > 0 and number - first < LONGEST_STATEMENT:
+            goes_on = depth > 0 or (depth == 0 and bool(OPEN_END.search(text)) and number < len(self.source.lines))
+            if goes_on and number - first < LONGEST_STATEMENT:
                 parts.append(text)
                 continue
             if depth != 0:
@@ -205,7 +210,7 @@ class _UrReader:
         except MisreadError:
             if text.endswith(":"):  # of a block, without which the lines behind would mean something else
                 raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
-            builder.unknown(place, text)
+            builder.unread(place, text)
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
@@ -370,7 +375,9 @@ def _method(builder: CodeBuilder, call: Invocation, place: Place, text: str) -> 
     name, _, method = call.function.partition(".")
     if method not in LIST_METHODS:
         return False
-    builder.add(Assign(place, Variable(name), Invocation(CHANGED, (Variable(name), Constant(method), *call.arguments)), text))
+    builder.add(
+        Assign(place, Variable(name), Invocation(CHANGED, (Variable(name), Constant(method), *call.arguments)), text)
+    )
     return True
 
 

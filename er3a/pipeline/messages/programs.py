@@ -161,8 +161,8 @@ TEXTS = texts(
                 "checked apart"
             ),
             interrupt=(
-                "the interrupt {routine} can move the arm at any time; its motions were checked apart, from where it is "
-                "not known"
+                "the interrupt {routine} can move the arm at any time; its motions were checked apart, from where it "
+                "is not known"
             ),
         ),
         "zone_collides": "a corner path that the blending zone allows collides: {pair}, {depth_mm:.1f} mm deep",
