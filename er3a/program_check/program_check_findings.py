@@ -206,13 +206,27 @@ class ConfigurationGuessed:
 
 
 @dataclass(frozen=True)
-class MotionCollides:
-    """Bodies overlap on the way, the deepest first."""
+class BodiesTouch:
+    """Two bodies that overlap on the way, from a time (s) of the motion on, and a place of a line; how deep at most."""
 
-    pairs: tuple[Pair, ...]
-    depth_mm: float
+    pair: Pair
+    t_s: float
     at_mm: float | None
+    depth_mm: float
+    code: Literal["bodies_touch"] = "bodies_touch"
+
+
+@dataclass(frozen=True)
+class MotionCollides:
+    """Bodies overlap on the way, the first to touch first."""
+
+    touches: tuple[BodiesTouch, ...]
     code: Literal["motion_collides"] = "motion_collides"
+
+    @property
+    def at_mm(self) -> float | None:
+        """How far the tool has come when the first bodies touch; None of a joint move."""
+        return self.touches[0].at_mm
 
 
 @dataclass(frozen=True)

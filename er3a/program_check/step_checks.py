@@ -40,6 +40,7 @@ from scipy.spatial.transform import Rotation
 from er3a.by_value import ByValue
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import link_frames
 from er3a.errors import PoseError
@@ -57,6 +58,7 @@ from er3a.program_check.motion_checks import CheckRules, MotionWay, is_given, jo
 from er3a.program_check.program_check_findings import (
     ArcGoesOn,
     ArcHasNoCircle,
+    BodiesTouch,
     CheckFinding,
     ConfigurationGuessed,
     ConfigurationNotRead,
@@ -753,10 +755,13 @@ class StepChecker:
         least = float(along.distance[along.least]) if along.least >= 0 else None
         if not along.contacts:
             return replace(motion, clearance=least)
-        worst = max(along.contacts, key=lambda contact: contact.depth)
-        at = None if motion.kind == "joint" else way.along_mm(worst.start)
-        hit = MotionCollides(worst.pairs, worst.depth * 1000, at)
-        moments = {**motion.moments, hit: worst.start}
+        touches: dict[Pair, BodiesTouch] = {}
+        for touch in (each for contact in along.contacts for each in contact.touches):  # in the order of time
+            at = None if motion.kind == "joint" else way.along_mm(touch.start)
+            first = touches.get(touch.pair, BodiesTouch(touch.pair, touch.start, at, 0.0))
+            touches[touch.pair] = replace(first, depth_mm=max(first.depth_mm, touch.depth * 1000))
+        hit = MotionCollides(tuple(touches.values()))
+        moments = {**motion.moments, hit: along.contacts[0].start}
         return replace(motion, findings=(*motion.findings, hit), clearance=least, moments=moments)
 
     def _corner(self, first: int, second: int) -> None:

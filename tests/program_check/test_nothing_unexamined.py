@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from er3a.collision.bodies import Bodies
+from er3a.collision.scene import Plane, Scene
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -39,9 +41,8 @@ def written(folder: Path, text: str, name: str = "a.script"):
 
 def check(folder: Path, text: str, name: str = "a.script", **options):
     """The check of a program, from the home position."""
-    return check_program(
-        written(folder, text, name), ROBOT, CheckOptions(measures=False, **({"start": HOME} | options))
-    )
+    given = {"start": HOME, "measures": False} | options
+    return check_program(written(folder, text, name), ROBOT, CheckOptions(**given))
 
 
 def codes(found) -> dict[str, list[int]]:
@@ -488,3 +489,37 @@ def test_motions_with_more_targets_than_they_have_are_not_understood(tmp_path):
         assert motions(tmp_path, krl(body), "a.src")[-1].target.reason == "not_understood"
     (motion,) = motions(tmp_path, "MJOINT(POINTJ(0,0,0,0,-70,0), v50perc, fine, tool0, wobj0, 3);\n", "a.pgm")
     assert motion.target.reason == "not_understood"
+
+
+# what touches first is named first
+
+
+TABLE = Scene("table", (Plane("table", np.array([0.0, 0.0, 1.0]), 0.25),))
+
+
+def test_pairs_of_bodies_are_named_in_the_order_in_which_they_touch(tmp_path):
+    down = np.radians([0.0, -123.0, 56.0, 0.0, -70.0, 0.0])
+    found = check(tmp_path, f"movej({text_of_joints(down)})\n", measures=True, scene=TABLE)
+    (collision,) = (each for each in found.findings if each.finding.code == "motion_collides")
+    (motion,) = found.motions.values()
+    bodies = Bodies(ROBOT.replace(tool=motion.placed.arm.tool), TABLE)
+    t = np.linspace(0, motion.way.law.duration, 4001)
+    distances = np.array([bodies.distances(bodies.ends(q), np.arange(len(bodies.pairs))) for q in motion.way.joints(t)])
+    first = {}
+    for k, pair in enumerate(bodies.pairs):
+        if (distances[:, k] <= 0).any():
+            begins = t[np.argmax(distances[:, k] <= 0)]
+            first[pair] = min(first.get(pair, np.inf), begins)
+    touches = collision.finding.touches
+    assert len(touches) > 1
+    assert [each.pair for each in touches] == sorted(first, key=first.__getitem__)
+    np.testing.assert_allclose([each.t_s for each in touches], sorted(first.values()), atol=t[1])
+    assert collision.moment == touches[0].t_s
+    for touch in touches:
+        deepest = min(distances[:, k].min() for k, pair in enumerate(bodies.pairs) if pair == touch.pair)
+        assert touch.depth_mm == pytest.approx(-1000 * deepest, abs=2)
+
+
+def text_of_joints(q) -> str:
+    """Joint angles in rad as URScript has them."""
+    return "[" + ", ".join(f"{angle:.9f}" for angle in q) + "]"

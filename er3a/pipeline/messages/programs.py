@@ -117,6 +117,7 @@ STOPPED: dict[EndKind, str] = {
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
 }
+MOST_PAIRS = 3  # that are named of a collision
 FIGURES = {
     "programs_passed": N_("Programs that pass"),
     "instructions_passed": N_("Motion instructions that pass"),
@@ -215,8 +216,10 @@ TEXTS = texts(
         "arrives_otherwise": (
             "the arm arrives in other joint angles than the target's: J{joint} differs by {difference_deg:.2f} {unit}"
         ),
-        "motion_collides": "collision after {at:.1f} mm of {pairs}, {depth:.1f} mm deep",
-        "motion_collides.joint": "collision of {pairs}, {depth:.1f} mm deep",
+        "motion_collides": "collision: {touches}",
+        "motion_collides.more": "collision: {touches}; and more later",
+        "bodies_touch": "{pair} after {at_mm:.1f} mm, {depth_mm:.1f} mm deep",
+        "bodies_touch.joint": "{pair} after {t_s:.2f} s, {depth_mm:.1f} mm deep",
         "arc_goes_on": "the arc ends after {angle_deg:g} deg, not at its target",
         "arc_goes_on.unknown": "the angle at which the arc ends is not known; the arc was not checked",
         "arc_goes_on.turns": (
@@ -381,10 +384,17 @@ def _(found: found_in.ArrivesOtherwise) -> str:
 
 @say.register
 def _(found: found_in.MotionCollides) -> str:
-    parts = {"pairs": joined(listed(found.pairs[:2])), "depth": found.depth_mm}
+    parts = {"touches": joined(listed(found.touches[:MOST_PAIRS]))}
+    if len(found.touches) > MOST_PAIRS:
+        return sentence("motion_collides.more", **parts)
+    return say_as(found, **parts)
+
+
+@say.register
+def _(found: found_in.BodiesTouch) -> str:
     if found.at_mm is None:
-        return sentence("motion_collides.joint", **parts)
-    return say_as(found, at=found.at_mm, **parts)
+        return sentence("bodies_touch.joint", pair=say(found.pair), depth_mm=found.depth_mm, t_s=found.t_s)
+    return say_as(found)
 
 
 @say.register
