@@ -69,6 +69,27 @@ def test_equal_verdicts_are_equal_bytes(tmp_path):
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
+MEANT = StageVerdict("arm", "dynamics", "fail", "d.bad", "Masses can't be right.", expected="fail")
+HOLDS_MEANT = StageVerdict("arm", "inverse", "pass", "i.all", "All reached; 2 fail as expected.", demonstrations=2)
+NOT_MET = StageVerdict("arm", "collision", "pass", "c.free", "Free.", expected="fail")
+
+
+def test_demonstrations_are_counted_apart_and_expectations_that_are_not_met_fail(tmp_path):
+    write_junit((GOOD, MEANT, HOLDS_MEANT, NOT_MET), tmp_path / "junit.xml")
+    report = etree.parse(tmp_path / "junit.xml")
+    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(report)
+    assert report.getroot().get("failures") == "1"
+    said = {case.get("name"): case.findtext("system-out") for case in report.iter("testcase")}
+    assert said == {
+        "validation": None,
+        "dynamics": "demonstration, fail as expected: Masses can't be right.",
+        "inverse": "demonstrations, which fail as expected: 2",
+        "collision": "expected: fail",
+    }
+    for level in ("caution", "fail"):
+        assert [each.stage for each in (GOOD, MEANT, HOLDS_MEANT, NOT_MET) if each.counts(level)] == ["collision"]
+
+
 def test_what_counts_from_which_level_on():
     assert [verdict for verdict in ALL if verdict.counts("fail")] == [BAD, BROKEN]
     assert [verdict for verdict in ALL if verdict.counts("caution")] == [CAUTION, BAD, BROKEN]

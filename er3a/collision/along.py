@@ -49,21 +49,42 @@ RateBounds = Callable[[Reals, Reals], tuple[Reals, Reals]]
 
 
 @dataclass(frozen=True)
+class Touch:
+    """Two bodies that overlap.
+
+    Attributes
+    ----------
+    start : s, when they first touch in a stretch
+    depth, at : of their deepest overlap measured, m, and its time, s
+    """
+
+    pair: Pair
+    start: float
+    depth: float
+    at: float
+
+
+@dataclass(frozen=True)
 class Contact:
     """A stretch of overlap.
 
     Attributes
     ----------
     start, end : s
-    pairs : what overlaps, the deepest first
+    touches : what overlaps, the first to touch first
     depth, at : of the deepest overlap measured, m, and its time, s
     """
 
     start: float
     end: float
-    pairs: tuple[Pair, ...]
+    touches: tuple[Touch, ...]
     depth: float
     at: float
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """What overlaps, the first to touch first."""
+        return tuple(touch.pair for touch in self.touches)
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,26 +275,40 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
     known = [i for i, time in enumerate(times) if time in motion.known]
     overlap = np.array([bool(np.nanmin(motion.known[times[i]]) <= 0) for i in known])
 
-    def least(at: float) -> float:
-        return float(motion.bodies.distances(motion.bodies.ends(motion.joints(np.array([at]))[0]), every).min())
+    def apart(at: float, pairs: Integers = every) -> float:
+        return float(motion.bodies.distances(motion.bodies.ends(motion.joints(np.array([at]))[0]), pairs).min())
 
     found = []
     for a, b in runs(overlap):
-        start = (
-            scipy.optimize.brentq(least, times[known[a - 1]], times[known[a]], xtol=near) if a > 0 else times[known[a]]
-        )
-        end = (
-            scipy.optimize.brentq(least, times[known[b - 1]], times[known[b]], xtol=near)
-            if b < len(known)
-            else times[known[b - 1]]
-        )
+        first, last = times[known[a]], times[known[b - 1]]
+        start = scipy.optimize.brentq(apart, times[known[a - 1]], first, xtol=near) if a > 0 else first
+        end = scipy.optimize.brentq(apart, last, times[known[b]], xtol=near) if b < len(known) else last
+        inside = known[max(a - 1, 0) : b]
         rows = np.array([motion.measure(times[i], q[i], every) for i in known[a:b]])
-        deepest = rows.min(axis=0)
-        order = np.argsort(deepest, kind="stable")
-        pairs = dict.fromkeys(motion.bodies.pairs[k] for k in order if deepest[k] <= 0)
-        at = times[known[a + int(np.argmin(rows.min(axis=1)))]]
-        found.append(Contact(float(start), float(end), tuple(pairs), -float(deepest.min()), float(at)))
+        if a > 0:
+            rows = np.concatenate([motion.bodies.distances(motion.bodies.ends(q[inside[0]]), every)[None], rows])
+        touches: dict[Pair, Touch] = {}
+        for k in np.flatnonzero(rows.min(axis=0) <= 0).tolist():
+            touch = _touch(
+                motion.bodies.pairs[k], times[inside], rows[:, k], lambda at, k=k: apart(at, np.array([k])), near
+            )
+            other = touches.get(touch.pair, touch)
+            deeper = max(touch, other, key=lambda each: each.depth)
+            touches[touch.pair] = Touch(touch.pair, max(min(touch.start, other.start), start), deeper.depth, deeper.at)
+        order = sorted(touches.values(), key=lambda each: (each.start, -each.depth))
+        deepest = max(order, key=lambda each: each.depth)
+        found.append(Contact(float(start), float(end), tuple(order), deepest.depth, deepest.at))
     return found
+
+
+def _touch(pair: Pair, times: Reals, distances: Reals, apart: Callable[[float], float], near: float) -> Touch:
+    """When a pair first touches and how deep it comes, of distances (k,) at times (k,)."""
+    first = int(np.argmax(distances <= 0))
+    start = float(times[first])
+    if first > 0:
+        start = float(scipy.optimize.brentq(apart, times[first - 1], start, xtol=near))
+    deepest = int(np.argmin(distances))
+    return Touch(pair, start, -float(distances[deepest]), float(times[deepest]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,8 @@ class StageVerdict:
     ----------
     status : ``not_examined`` where the stage has not been computed yet
     code : of the finding; text : in English
+    demonstrations : how many targets, paths, programs or objects in it fail as they are meant to
+    expected : what the study says that the status is to be, if it does
     """
 
     robot: str
@@ -33,6 +35,19 @@ class StageVerdict:
     status: Status | Literal["not_examined"]
     code: str
     text: str
+    demonstrations: int = 0
+    expected: str | None = None
+
+    @property
+    def is_demonstration(self) -> bool:
+        """Whether the stage is no pass, as it is meant to be: no finding, but counted apart from what passes."""
+        return self.status in ("caution", "fail") and self.status == self.expected
+
+    @property
+    def is_otherwise(self) -> bool:
+        """Whether the stage has come to another verdict than the study says that it is to come to."""
+        examined = self.status not in (NOT_EXAMINED, "not_computed")
+        return self.expected is not None and examined and self.status != self.expected
 
     @property
     def broken(self) -> bool:
@@ -40,8 +55,14 @@ class StageVerdict:
         return self.status == "not_computed" and self.code == NotComputed.code
 
     def counts(self, level: Level) -> bool:
-        """Whether this is a finding at a level; a stage that broke is one at each, for it hides what it would say."""
-        return self.broken or self.status in _COUNTED[level]
+        """Whether this is a finding at a level.
+
+        A stage that broke is one at each, for it hides what it would say, and so is one that did not come to what the
+        study expects; a demonstration is none.
+        """
+        if self.broken or self.is_otherwise:
+            return True
+        return self.status in _COUNTED[level] and not self.is_demonstration
 
 
 def read_verdicts(study: Study, results: Path) -> list[StageVerdict]:
@@ -53,16 +74,22 @@ def read_verdicts(study: Study, results: Path) -> list[StageVerdict]:
         results are damaged or of another format version, or no stage has any
     """
     with language.using("en"):
-        found = [_stage_verdict(results, robot, stage) for robot in study.names for stage in study.stages(robot)]
+        found = [
+            _stage_verdict(results, robot, stage, study.entry(robot).expect.get(stage))
+            for robot in study.names
+            for stage in study.stages(robot)
+        ]
     if all(verdict.status == NOT_EXAMINED for verdict in found):
         read_status(results / found[0].robot / found[0].stage)
     return found
 
 
-def _stage_verdict(results: Path, robot: str, name: str) -> StageVerdict:
+def _stage_verdict(results: Path, robot: str, name: str, expected: str | None) -> StageVerdict:
     folder, stage = results / robot / name, STAGES[name]
     if not is_computed(folder):
-        return StageVerdict(robot, name, NOT_EXAMINED, "stage.not_examined", sentence("stage.not_examined"))
+        unknown = sentence("stage.not_examined")
+        return StageVerdict(robot, name, NOT_EXAMINED, "stage.not_examined", unknown, expected=expected)
     import_module(stage.messages)
     verdict = read_verdict(folder, stage)
-    return StageVerdict(robot, name, verdict.status, verdict.finding.code, say_all(verdict.findings))
+    shown = len(getattr(verdict.finding, "demonstrations", ()))
+    return StageVerdict(robot, name, verdict.status, verdict.finding.code, say_all(verdict.findings), shown, expected)

@@ -33,16 +33,18 @@ from er3a.program_check.program_check_findings import (
     CheckFinding,
     Level,
     MayMove,
+    MovesBesideProgram,
     NeverReached,
     NotComeTo,
     NotFollowedToEnd,
     RestNotChecked,
+    WayNotKnown,
     level_of,
     worst_of,
 )
 from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles_of
 from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
-from er3a.programs.instructions import ArmMotion, Decision, Pause, Place, PoseTarget, Unknown
+from er3a.programs.instructions import ArmMotion, Decision, MovesBeside, Pause, Place, PoseTarget, Unknown
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import FormInferred, NameTwice, NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
@@ -89,11 +91,11 @@ class CheckOptions(ByValue):
 
 @dataclass(frozen=True)
 class NotExamined:
-    """A motion instruction that was not checked each time that it is carried out, or where the program's course was
-    not followed on."""
+    """What was not examined: a motion instruction, or not each time that it is carried out; the way of a motion whose
+    start is not known; or where the program's course was not followed on."""
 
     place: Place
-    what: Literal["motion", "course"]
+    what: Literal["motion", "way", "course"]
 
 
 @dataclass(frozen=True)
@@ -170,7 +172,8 @@ class ProgramCheck(ByValue):
     verdicts : of each motion instruction
     motions : as they were carried out, by the number of their step
     main : numbers of the steps of the way with the most motions
-    not_examined : in the order of the text; each has a finding of at least caution
+    not_examined : in the order of the text; each has a finding, of at least caution but for the way of a motion whose
+        start is not known
     """
 
     execution: Execution
@@ -234,7 +237,9 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     """``end``: number of the first step that was not checked."""
     moves = (step.place for step in execution.steps[end:] if isinstance(step.instruction, ArmMotion))
     found = [NotExamined(place, "motion") for place in moves]
-    found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, NotComeTo)]
+    missed = (NotComeTo, NeverReached)
+    found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
+    found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, WayNotKnown)]
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, NotFollowedToEnd)]
     files = {each.place.file: i for i, each in enumerate(located)}
     order = dict.fromkeys(found)
@@ -272,6 +277,9 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
         if isinstance(what, Unknown):
             unknown = MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
             found.append(LocatedFinding("caution", unknown, step.place, step.calls))
+        elif isinstance(what, MovesBeside) and what.kind != "entered":
+            beside = MovesBesideProgram(what.routine, what.kind)
+            found.append(LocatedFinding("caution", beside, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
             found.append(LocatedFinding("note", BothSidesChecked(what.condition), step.place, step.calls))
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
@@ -333,7 +341,7 @@ def _verdicts(
     worst: dict[Place, Level] = {}
     for each in located:
         worst[each.place] = worst_of((worst.get(each.place, "pass"), each.level))
-    for missing in missed:
+    for missing in (each for each in missed if each.what != "way"):
         worst[missing.place] = worst_of((worst.get(missing.place, "pass"), "caution"))
     met = {step.place for step in execution.steps}
     found = []

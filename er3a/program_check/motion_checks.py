@@ -389,8 +389,10 @@ def _followed_moments(
     ends = bool(found)
     t, kept = np.unique(np.concatenate([way.t, proof.t]), return_index=True)
     solved = np.concatenate([way.q, proof.q])[kept]
-    limits = {(type(each.cause), joints_of(each.cause)): each for each in out_of_limits(arm, t, solved, way.joints)}
-    found |= {each.cause: each.start for each in limits.values()}
+    outside = out_of_limits(arm, t, solved, way.joints)
+    limits = {(type(each.cause), joints_of(each.cause)): each.cause for each in outside}
+    begun = {(type(each.cause), joints_of(each.cause)): each.start for each in reversed(outside)}
+    found |= {cause: begun[key] for key, cause in limits.items()}
     events = singular_events(arm, t, solved, way.joints, rules.near)
     at = np.unique(np.concatenate([t, [event.t for event in events]]))
     q, velocity, acceleration = followed.rates(at)
@@ -408,11 +410,15 @@ def _followed_moments(
     for limit in rules.limits.rates[:2]:
         values = velocity if limit.order == 1 else acceleration
         stretches += rates_exceeded(at, values, limit, lambda t, order=limit.order: followed.rates(t)[order])  # type: ignore[misc]
-    worst: dict[tuple[type, int], Interval[RateCause]] = {}
-    for stretch in sorted(stretches, key=lambda stretch: stretch.cause.ratio):
-        worst[type(stretch.cause), stretch.cause.joint] = stretch
-    found |= {_as_checked(each.cause): each.start for _, each in sorted(worst.items(), key=lambda item: item[0][1])}
+    worst = {_of(each): each.cause for each in sorted(stretches, key=lambda stretch: stretch.cause.ratio)}
+    first = {_of(each): each.start for each in sorted(stretches, key=lambda stretch: stretch.start, reverse=True)}
+    found |= {_as_checked(worst[key]): first[key] for key in sorted(worst, key=lambda key: key[1])}
     return found | {part.cause: part.start for part in reversed(proof.undecided)}
+
+
+def _of(stretch: Interval[RateCause]) -> tuple[type, int]:
+    """What limit of which joint is exceeded."""
+    return type(stretch.cause), stretch.cause.joint
 
 
 def _as_checked(cause: RateCause) -> CheckFinding:

@@ -198,13 +198,35 @@ class ConfigurationNotRead:
 
 
 @dataclass(frozen=True)
-class MotionCollides:
-    """Bodies overlap on the way, the deepest first."""
+class ConfigurationGuessed:
+    """Where the arm comes from is not known, nor which of its solutions is meant: the one nearest to 0 was taken."""
 
-    pairs: tuple[Pair, ...]
-    depth_mm: float
+    solutions: int
+    code: Literal["configuration_guessed"] = "configuration_guessed"
+
+
+@dataclass(frozen=True)
+class BodiesTouch:
+    """Two bodies that overlap on the way, from a time (s) of the motion on, and a place of a line; how deep at most."""
+
+    pair: Pair
+    t_s: float
     at_mm: float | None
+    depth_mm: float
+    code: Literal["bodies_touch"] = "bodies_touch"
+
+
+@dataclass(frozen=True)
+class MotionCollides:
+    """Bodies overlap on the way, the first to touch first."""
+
+    touches: tuple[BodiesTouch, ...]
     code: Literal["motion_collides"] = "motion_collides"
+
+    @property
+    def at_mm(self) -> float | None:
+        """How far the tool has come when the first bodies touch; None of a joint move."""
+        return self.touches[0].at_mm
 
 
 @dataclass(frozen=True)
@@ -303,8 +325,17 @@ class MayMove:
 
 
 @dataclass(frozen=True)
+class MovesBesideProgram:
+    """A routine moves the arm beside the program; its motions and the program's were not checked as one."""
+
+    routine: str
+    kind: Literal["thread", "interrupt"]
+    code: Literal["moves_beside"] = "moves_beside"
+
+
+@dataclass(frozen=True)
 class NeverReached:
-    """A motion that no way through the program comes to."""
+    """A motion that no way through the program comes to, so that it was not examined."""
 
     code: Literal["never_reached"] = "never_reached"
 
@@ -379,6 +410,7 @@ CheckFinding = (
     | TurnsAtStart
     | TurnNotMet
     | ConfigurationNotRead
+    | ConfigurationGuessed
     | MotionCollides
     | PairsUnexamined
     | ZoneCollides
@@ -392,6 +424,7 @@ CheckFinding = (
     | LineNotChecked
     | SpeedNotGiven
     | MayMove
+    | MovesBesideProgram
     | NeverReached
     | NotComeTo
     | RestNotChecked
@@ -416,8 +449,8 @@ FAILS = frozenset(
 )
 NOTES = frozenset(
     (
-        *("way_not_known", "frame_taken_as_flange", "configuration_not_read", "zone_without_size", "speed_not_given"),
-        *("never_reached", "both_sides_checked", "program_form_inferred", "program_other_encoding", "spline_as_line"),
+        *("way_not_known", "frame_taken_as_flange", "zone_without_size", "speed_not_given"),
+        *("both_sides_checked", "program_form_inferred", "program_other_encoding", "spline_as_line"),
     )
 )
 

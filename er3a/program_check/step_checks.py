@@ -40,6 +40,7 @@ from scipy.spatial.transform import Rotation
 from er3a.by_value import ByValue
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import link_frames
 from er3a.errors import PoseError
@@ -57,7 +58,9 @@ from er3a.program_check.motion_checks import CheckRules, MotionWay, is_given, jo
 from er3a.program_check.program_check_findings import (
     ArcGoesOn,
     ArcHasNoCircle,
+    BodiesTouch,
     CheckFinding,
+    ConfigurationGuessed,
     ConfigurationNotRead,
     ExternalAxesLeftOut,
     FrameNotGiven,
@@ -78,11 +81,21 @@ from er3a.program_check.program_check_findings import (
     ZoneWithoutSize,
 )
 from er3a.programs.execution import Ending, Execution
-from er3a.programs.instructions import ArmMotion, JointTarget, Pause, PoseTarget, Target, Unknown, UnresolvedTarget
+from er3a.programs.instructions import (
+    ArmMotion,
+    JointTarget,
+    MovesBeside,
+    Pause,
+    PoseTarget,
+    Target,
+    Unknown,
+    UnresolvedTarget,
+)
 from er3a.robots.joint_limits import joint_shown, within
 from er3a.robots.robot import Robot
 
 FLANGE = "tool0"
+SAME_DIGITS = 6  # of angles in rad
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 
 
@@ -194,11 +207,19 @@ def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals
         rows = rows if met is None else met
         if met is None:
             findings.append(TurnNotMet(int(turn)))
-    elif given and "S" not in given and placed.motion.kind == "joint":
-        findings.append(ConfigurationNotRead(", ".join(f"{value}" for value in given.values())))
+    elif given and placed.motion.kind == "joint" and _different(rows) > 1:
+        words = (f"S {value:g}" if key == "S" else f"{value}" for key, value in given.items())
+        findings.append(ConfigurationNotRead(", ".join(words)))
+    if reference is None and not findings and (different := _different(rows)) > 1:
+        findings.append(ConfigurationGuessed(different))
     start = np.zeros(rows.shape[1]) if reference is None else reference
     away = np.abs(rows - start).max(axis=1)
     return Goal(rows[int(away.argmin())], pose, True, tuple(findings))
+
+
+def _different(rows: Reals) -> int:
+    """How many solutions (k, n) there are that are not the same."""
+    return len(np.unique(np.round(rows, SAME_DIGITS), axis=0))
 
 
 def _with_signs(rows: Reals, turn: int) -> Reals | None:
@@ -609,7 +630,9 @@ class StepChecker:
             before = number
         elif isinstance(what, Pause):
             before = -1
-        elif isinstance(what, Unknown) and what.may_move:
+        elif (isinstance(what, Unknown) and what.may_move) or (
+            isinstance(what, MovesBeside) and what.kind != "interrupt"
+        ):
             joints, before = None, -1
         self._joints.append(joints)
         self._before.append(before)
@@ -732,10 +755,13 @@ class StepChecker:
         least = float(along.distance[along.least]) if along.least >= 0 else None
         if not along.contacts:
             return replace(motion, clearance=least)
-        worst = max(along.contacts, key=lambda contact: contact.depth)
-        at = None if motion.kind == "joint" else way.along_mm(worst.start)
-        hit = MotionCollides(worst.pairs, worst.depth * 1000, at)
-        moments = {**motion.moments, hit: worst.start}
+        touches: dict[Pair, BodiesTouch] = {}
+        for touch in (each for contact in along.contacts for each in contact.touches):  # in the order of time
+            at = None if motion.kind == "joint" else way.along_mm(touch.start)
+            first = touches.get(touch.pair, BodiesTouch(touch.pair, touch.start, at, 0.0))
+            touches[touch.pair] = replace(first, depth_mm=max(first.depth_mm, touch.depth * 1000))
+        hit = MotionCollides(tuple(touches.values()))
+        moments = {**motion.moments, hit: along.contacts[0].start}
         return replace(motion, findings=(*motion.findings, hit), clearance=least, moments=moments)
 
     def _corner(self, first: int, second: int) -> None:

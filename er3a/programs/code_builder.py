@@ -7,8 +7,10 @@ Calls of a program's own routines, wherever they stand in expressions, become op
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from er3a.errors import InputError
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
@@ -16,6 +18,7 @@ from er3a.programs.program_findings import NameTwice, NotUnderstood, ProgramFind
 from er3a.programs.syntax import (
     Aggregate,
     Assign,
+    Beside,
     Binary,
     Branch,
     Call,
@@ -35,6 +38,7 @@ from er3a.programs.syntax import (
     Routine,
     RoutineParameter,
     Unary,
+    Unclear,
     Variable,
     Waiting,
     expressions_of,
@@ -42,6 +46,7 @@ from er3a.programs.syntax import (
 )
 
 MOST_NESTED = 200
+ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*)[^=\"'(]*=(?!=)")
 
 
 @dataclass
@@ -84,9 +89,26 @@ class CodeBuilder:
         """An instruction that moves nothing."""
         self.add(Fixed(place, Aside(text)))
 
+    def beside(self, place: Place, what: Invocation, text: str, kind: Literal["thread", "interrupt"]) -> None:
+        """A routine that runs beside the program from here on."""
+        self.add(Beside(place, what, text, kind))
+
     def unknown(self, place: Place, text: str, may_move: bool = True) -> None:
         """An instruction that is not understood."""
         self.add(Fixed(place, Unknown(text, may_move)))
+
+    def unread(self, place: Place, text: str, may_move: bool = True, folds: bool = False) -> None:
+        """A statement that is not understood; what it assigns something to has no known value from here.
+
+        Parameters
+        ----------
+        folds : whether ``a`` and ``A`` are one name
+        """
+        self.unknown(place, text, may_move)
+        assigned = ASSIGNED.match(text)
+        if assigned is not None:
+            name = assigned[1].upper() if folds else assigned[1]
+            self.add(Assign(place, Variable(name), Constant(Unclear(name)), text, local=False))
 
     def inside(self, *kinds: str) -> bool:
         """Whether the innermost block is one of these."""
@@ -281,6 +303,41 @@ def linked(routines: Iterable[Routine]) -> tuple[dict[str, Routine], tuple[Progr
     return {name: _linked(routine, by_name) for name, routine in by_name.items()}, tuple(found)
 
 
+def lacks_data(routines: Iterable[Routine], data: Iterable[Assign], known: Container[str]) -> bool:
+    """Whether routines use a variable that nothing of what was read gives.
+
+    Parameters
+    ----------
+    known : variables that are given elsewhere; those that begin with ``$`` or ``%`` always are
+    """
+    given = {_variable(each.target) for each in data}
+    used: set[str] = set()
+    for routine in routines:
+        given |= {parameter.name for parameter in routine.parameters}
+        for operation in routine.code:
+            expressions = expressions_of(operation)
+            if isinstance(operation, Assign):
+                given.add(_variable(operation.target))
+                expressions = () if operation.value is None else (operation.value,)
+            elif isinstance(operation, Move):
+                expressions = tuple(each for each in operation.arguments[:1] if each is not None)
+            used.update(name for each in expressions for name in _variables(each))
+    return any(name[0] not in "$%" and name not in known for name in used - given)
+
+
+def _variable(target: Expression) -> str:
+    while isinstance(target, (Member, Element)):
+        target = target.of
+    return target.name if isinstance(target, Variable) else ""
+
+
+def _variables(expression: Expression) -> Iterable[str]:
+    if isinstance(expression, Variable):
+        yield expression.name
+    for each in inner(expression):
+        yield from _variables(each)
+
+
 def not_understood(code: Iterable[Operation]) -> Iterable[NotUnderstood]:
     """What is kept in code without being understood."""
     for operation in code:
@@ -401,5 +458,9 @@ def mapped(operation: Operation, each: Each) -> Operation:
             return replace(operation, of=None if of is None else each(of))
         case Doing(what=what):
             return replace(operation, what=each(what))
+        case Beside(what=what):
+            mapped_what = within(what, each)
+            assert isinstance(mapped_what, Invocation)
+            return replace(operation, what=mapped_what)
         case _:
             return operation

@@ -10,7 +10,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeGuard
 
 import numpy as np
 
@@ -170,9 +170,15 @@ IN_DEGREES: Mapping[str, Callable[[float], float]] = {
     "SQRT": math.sqrt,
     "ABS": abs,
 }
-SAME = {"AND": "AND", "and": "AND", "B_AND": "AND", "&": "AND", "&&": "AND"}
-SAME |= dict.fromkeys(("OR", "or", "B_OR", "||"), "OR")
-EXCLUSIVE = {"EXOR", "XOR", "xor", "B_EXOR"}
+SAME = {"AND": "AND", "and": "AND", "&": "AND", "&&": "AND"}
+SAME |= dict.fromkeys(("OR", "or", "||"), "OR")
+EXCLUSIVE = {"EXOR", "XOR", "xor"}
+BITWISE: Mapping[str, Callable[[int, int], int]] = {
+    "B_AND": operator.and_,
+    "B_OR": operator.or_,
+    "B_EXOR": operator.xor,
+}
+"""Of whole numbers, bit by bit; of anything else they are not defined."""
 
 
 class Functions(Protocol):
@@ -383,6 +389,8 @@ class ProgramMemory:
                 return side
         if sign in ("==", "=", "<>", "!="):
             return (left == right) == (sign in ("==", "="))
+        if sign in BITWISE:
+            return BITWISE[sign](left, right) if _is_whole(left) and _is_whole(right) else Unclear(f"... {sign} ...")
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
         return self._computed(sign, left, right)
@@ -417,10 +425,16 @@ def root(name: str) -> str:
     return name[: min(ends)] if ends else name
 
 
+def _is_whole(value: Value) -> TypeGuard[int]:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
 def _unary(sign: str, value: Value) -> Value:
     if isinstance(value, Unclear):
         return value
-    if sign in ("NOT", "not", "!", "B_NOT"):
+    if sign == "B_NOT":
+        return ~value if _is_whole(value) else Unclear(f"{sign} ...")
+    if sign in ("NOT", "not", "!"):
         return not value if isinstance(value, bool) else Unclear(f"{sign} ...")
     plain = number(value)
     if plain is None:
@@ -446,6 +460,9 @@ class Dialect(Functions, Protocol):
 
     def is_signal(self, name: str) -> bool:
         """Whether an assignment to this name sets an output."""
+
+    def is_followed(self, name: str, value: Value) -> bool:
+        """Whether motions are followed as a variable asks that is set to a value."""
 
     def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """The motion, from where the arm stands."""

@@ -65,6 +65,7 @@ class Ending:
     step : number of its last step; -1 if it has none
     repeats_from : number of the step that follows the last, where it repeats or joins; None if no step does
     limit : that was met, as a number: of operations, sides of branches, rounds or calls; 0 if none was
+    beside : whether the way is that of a thread or interrupt, which runs beside the program
     """
 
     kind: EndKind
@@ -72,6 +73,7 @@ class Ending:
     place: Place
     repeats_from: int | None = None
     limit: int = 0
+    beside: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,11 +115,11 @@ class Execution(ByValue):
         return tuple(reversed(found))
 
     def main(self) -> Ending:
-        """The way with the most motions; the first of them if there are several."""
+        """The program's own way with the most motions; the first of them if there are several."""
         moves = [0] * (len(self.steps) + 1)
         for i, step in enumerate(self.steps):
             moves[i] = moves[step.before] + isinstance(step.instruction, ArmMotion)
-        return max(self.endings, key=lambda ending: moves[ending.step])
+        return max(self.endings, key=lambda ending: (moves[ending.step] > 0 and not ending.beside, moves[ending.step]))
 
     def round_from(self, ending: Ending) -> int | None:
         """Number of the step from which a way repeats itself for ever; None if it does not."""

@@ -232,6 +232,20 @@ class Unknown:
 
 
 @dataclass(frozen=True, slots=True)
+class MovesBeside:
+    """A routine that moves the arm beside the program: a thread from here on, or an interrupt at any time.
+
+    Attributes
+    ----------
+    kind : ``entered`` where an interrupt's own way begins, with the arm anywhere
+    """
+
+    routine: str
+    kind: Literal["thread", "interrupt", "entered"]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Decision:
     """A condition that only the running cell knows, and which side is followed from here."""
 
@@ -239,7 +253,7 @@ class Decision:
     taken: bool
 
 
-Instruction = ArmMotion | Pause | Output | Remark | Disabled | Aside | Unknown | Decision
+Instruction = ArmMotion | Pause | Output | Remark | Disabled | Aside | Unknown | MovesBeside | Decision
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,7 @@ from er3a.programs.syntax import (
     Expression,
     Invocation,
     Move,
+    Program,
     Record,
     Unclear,
     Value,
@@ -48,6 +49,8 @@ AXIS_KINDS = ("AXIS", "E6AXIS")
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[NamedFrame, NamedFrame]
+UNREAD = Unclear("")
+"""The value of a motion's arguments that are more or fewer than it has."""
 
 
 def _has_axes(value: Record) -> bool:
@@ -76,7 +79,7 @@ def frame_record(pose: Reals, kind: str = "FRAME") -> Record:
 def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
     """What a position in a motion means; ``said`` is the line, and whether a relative position is meant by the tool."""
     text = said[0]
-    if isinstance(value, Unclear):
+    if isinstance(value, Unclear) and value is not UNREAD:
         return _unresolved(value)
     if not isinstance(value, Record):
         return UnresolvedTarget(text, "not_understood")
@@ -90,8 +93,10 @@ def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str,
 def relative(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
     """A target given by its difference from where the arm stands."""
     text, in_tool = said
-    if isinstance(value, Unclear) or not isinstance(value, Record):
-        return _unresolved(value) if isinstance(value, Unclear) else UnresolvedTarget(text, "not_understood")
+    if not isinstance(value, Record):
+        if isinstance(value, Unclear) and value is not UNREAD:
+            return _unresolved(value)
+        return UnresolvedTarget(text, "not_understood")
     if _has_axes(value):
         change = _joints(memory, value, text, missing=0.0)
         if memory.here.joints is None or not isinstance(change, JointTarget):
@@ -194,34 +199,80 @@ def set_by_bas(memory: ProgramMemory, call: Invocation) -> bool:
     given: Value = values[1] if len(values) > 1 else Unclear("BAS")
     match command:
         case "#INITMOV":
-            pass  # values of the controller's own, which no program tells
+            _initial(memory)
         case "#VEL_PTP":
-            _all_axes(memory, "$VEL_AXIS", given)
+            _joint_speed(memory, given)
         case "#ACC_PTP":
             _all_axes(memory, "$ACC_AXIS", given)
         case "#VEL_CP":
-            memory.write("$VEL.CP", given)
+            _line_speed(memory, given)
         case "#ACC_CP":
-            memory.write("$ACC.CP", given)
+            _line_acceleration(memory, given)
         case "#TOOL":
             _number(memory, "$TOOL", "TOOL_DATA", given)
         case "#BASE":
             _number(memory, "$BASE", "BASE_DATA", given)
+        case "#EX_BASE":
+            memory.write("$BASE", Unclear("BASE_DATA on an external axis"))
+            memory.shared.pop("$BASE%name", None)
         case "#FRAMES":
             _frames(memory)
         case "#PTP_DAT" | "#PTP_PARAMS":
-            _joint_data(memory, memory.read("PDAT_ACT"))
+            data = memory.read("PDAT_ACT")
+            _joint_data(memory, data)
             if command == "#PTP_PARAMS":
                 _frames(memory)
-                _all_axes(memory, "$VEL_AXIS", given)
+            _joint_speed(memory, _field(data, "VEL", "PDAT_ACT") if command == "#PTP_DAT" else given)
         case "#CP_DAT" | "#CP_PARAMS":
-            _line_data(memory, memory.read("LDAT_ACT"))
+            data = memory.read("LDAT_ACT")
+            _line_data(memory, data)
             if command == "#CP_PARAMS":
                 _frames(memory)
-                memory.write("$VEL.CP", given)
+            _line_speed(memory, _field(data, "VEL", "LDAT_ACT") if command == "#CP_DAT" else given)
+        case "#OUT_SYNC" | "#OUT_ASYNC" | "#GROUP" | "#ACC_GLUE":
+            pass
         case _:
             return False
     return True
+
+
+def _initial(memory: ProgramMemory) -> None:
+    """``BAS(#INITMOV,0)`` as controllers' own bas.src has it: full speed, the robot's base, tool 1, usual zones."""
+    _all_axes(memory, "$ACC_AXIS", 100)
+    _all_axes(memory, "$VEL_AXIS", 100)
+    _line_acceleration(memory, 100)
+    memory.write("$VEL.CP", memory.read("DEF_VEL_CP") or Unclear("DEF_VEL_CP"))
+    for part in ("CPTP", "CDIS", "CVEL", "CORI"):
+        memory.write(f"$APO.{part}", memory.read(f"DEF_APO_{part}") or Unclear(f"DEF_APO_{part}"))
+    memory.write("$ORI_TYPE", "#VAR")
+    memory.write("$IPO_MODE", "#BASE")
+    _number(memory, "$BASE", "BASE_DATA", 0)
+    _number(memory, "$TOOL", "TOOL_DATA", 1)
+
+
+def _field(data: Value | None, name: str, kept_as: str) -> Value:
+    """A field of motion data; unclear where they don't have it."""
+    found = data.get(name) if isinstance(data, Record) else None
+    return Unclear(f"{kept_as}.{name}") if found is None else found
+
+
+def _joint_speed(memory: ProgramMemory, percent: Value) -> None:
+    plain = number(percent)
+    _all_axes(memory, "$VEL_AXIS", percent if plain is None else min(plain, 100.0))
+
+
+def _line_speed(memory: ProgramMemory, speed: Value) -> None:
+    plain, most = number(speed), number(memory.read("DEF_VEL_CP"))
+    memory.write("$VEL.CP", speed if plain is None or most is None else min(plain, most))
+
+
+def _line_acceleration(memory: ProgramMemory, percent: Value) -> None:
+    plain, full = number(percent), number(memory.read("DEF_ACC_CP"))
+    if plain is None:
+        memory.write("$ACC.CP", percent)
+        return
+    share = min(plain / 100, 1.0)
+    memory.write("$ACC.CP", Record("", (("share", share),)) if full is None else share * full)
 
 
 def keep_setting(memory: ProgramMemory, name: str, expression: Expression) -> None:
@@ -244,7 +295,7 @@ def keep_setting(memory: ProgramMemory, name: str, expression: Expression) -> No
         case "SACC_JOINT" if isinstance(given, Record):
             _all_axes(memory, "$ACC_AXIS", given.get("ACC") or Unclear(name))
         case "SACC_CP":
-            _share(memory, given)
+            _line_acceleration(memory, _field(given, "ACC", name))
         case "SAPO":
             _zone_data(memory, given, "#CDIS")
         case "SAPO_PTP":
@@ -267,13 +318,13 @@ def _all_axes(memory: ProgramMemory, name: str, value: Value) -> None:
 
 
 def _number(memory: ProgramMemory, variable: str, array: str, given: Value) -> None:
-    """Set tool or base by its number; 0 is the null frame."""
+    """Set tool or base by its number; 0, and -1 of what was never taught, is the null frame."""
     plain = number(given)
     memory.shared.pop(variable + "%name", None)
     if plain is None:
         memory.write(variable, Unclear(f"{array}[?]"))
         return
-    name = f"{array}[{plain:g}]" if plain else "$NULLFRAME"
+    name = f"{array}[{plain:g}]" if plain > 0 else "$NULLFRAME"
     memory.write(variable, memory.read(name) or Unclear(name))
     memory.write(variable + "%name", name)
 
@@ -302,14 +353,9 @@ def _joint_data(memory: ProgramMemory, data: Value | None) -> None:
 
 def _line_data(memory: ProgramMemory, data: Value | None) -> None:
     if isinstance(data, Record):
-        _share(memory, data)
+        _line_acceleration(memory, _field(data, "ACC", "LDAT_ACT"))
         _zone_data(memory, data, "#CDIS")
-
-
-def _share(memory: ProgramMemory, data: Value) -> None:
-    percent = number(data.get("ACC")) if isinstance(data, Record) else None
-    if percent is not None:
-        memory.write("$ACC.CP", Record("", (("share", percent / 100),)))
+        memory.write("$ORI_TYPE", data.get("ORI_TYP") or "#VAR")
 
 
 def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
@@ -319,7 +365,7 @@ def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
         return
     mode = data.get("APO_MODE") or usual
     if mode == "#CPTP":
-        memory.write("$APO.CPTP", distance)
+        memory.write("$APO.CPTP", min(distance, 100.0))
     else:
         memory.write("$APO.CDIS", distance)
         memory.shared.pop("$APO.CPTP", None)
@@ -328,33 +374,36 @@ def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
 KINDS: dict[str, MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
-HARMLESS = frozenset(
-    [
-        "DELETE_BACKWARD_BUFFER",
-        "VAR_STATE",
-        "CIOCTL",
-        "COPEN",
-        "CCLOSE",
-        "MSGINFO",
-        "MSGLOG",
-        "SET_CD_PARAMS",
-        "STRCLEAR",
-        "STRCOPY",
-        "USER_GRP",
-        "CHECKHOME",
-        "ERR_RAISE",
-        "VARSTATE",
-        "CAST_TO",
-        "CAST_FROM",
-        "SWRITE",
-        "SREAD",
-        "CWRITE",
-        "MSGNOTIFY",
-        "MSGQUIT",
-        "MSGSTATE",
-        "MSGDIALOG",
-    ]
-)
+HARMLESS_TEXT = """
+CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
+EKI_CHECK EKI_CHECKBUFFER EKI_CLEAR EKI_CLEARBUFFER EKI_CLOSE EKI_GETBOOL EKI_GETBOOLARRAY EKI_GETFRAME
+EKI_GETFRAMEARRAY EKI_GETINT EKI_GETINTARRAY EKI_GETREAL EKI_GETREALARRAY EKI_GETSTRING EKI_INIT EKI_LOCK
+EKI_OPEN EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EO ERR_CLEAR
+ERR_RAISE EXISTS_KRLDLG EXISTS_KRLMSG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA INVERSE
+IR_STOPM LK MSGDIALOG MSGINFO MSGLOG MSGNOTIFY MSGQUIT MSGSTATE P00 PULSE RESET_CD_PARAMS SET_CD_PARAMS
+SET_KRLDLG SET_KRLMSG SET_SYSTEM_DATA SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL
+STRTOFRAME STRTOINT STRTOPOS STRTOREAL STRTOSTRING SWRITE USER_GRP VARSTATE VAR_STATE
+"""
+HARMLESS = frozenset(HARMLESS_TEXT.split())
+"""Functions of the controller that move nothing and set no frame."""
+EVALUATED = frozenset((*IN_DEGREES, "ATAN2", "INV_POS"))
+OF_SETTINGS_TEXT = """
+SVEL_CP SVEL_JOINT SACC_CP SACC_JOINT SAPO SAPO_PTP STOOL STOOL2 SBASE SIPO_MODE SJERK SLOAD SGEAR_JERK SORI_TYP
+SORI_TYPE SCIRC_TYPE
+"""
+OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
+"""Functions behind WITH, which :func:`keep_setting` reads."""
+ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
+"""How the tool may turn on lines and arcs so that they are followed as they are meant."""
+CONTROLLER: dict[str, Value] = {
+    "$KINCLASS": "#STANDARD",
+    "$EX_AX_NUM": 0,
+    "$ERR.NUMBER": 0,
+    "$ADAP_ACC": "#STEP1",
+    "$TCP_IPO": True,
+    "$COLLISAVOID": False,
+}
+"""What a controller of an arm without other axes has in variables that its own modules ask, if no error has come up."""
 HERE = ("$POS_ACT", "$POS_FOR", "$POS_INT", "$POS_ACT_MES")
 HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_INT", "$AXIS_ACT_MEAS")
 
@@ -377,12 +426,19 @@ class KrlDialect:
     whole_division = True
     first_index = 1
 
+    def __init__(self, program: Program):
+        pass
+
     def begin(self, memory: ProgramMemory) -> None:
         """No variable is there from the start."""
 
     def is_signal(self, name: str) -> bool:
         """Outputs."""
         return name.startswith(("$OUT[", "$ANOUT["))
+
+    def is_followed(self, name: str, value: Value) -> bool:
+        """Whether motions are followed as a variable asks that is set to a value."""
+        return name not in ORIENTATION_TYPES or value in ORIENTATION_TYPES[name]
 
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""
@@ -392,6 +448,10 @@ class KrlDialect:
         """Frames of the controller, and where the arm stands."""
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
             return frame_record(pose_of((0.0,) * 6, "kuka"))
+        if name == "$NUM_AX":
+            return memory.cell.joints
+        if name in CONTROLLER:
+            return CONTROLLER[name]
         if name in HERE:
             seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
             return None if seen is None else frame_record(seen, "E6POS")
@@ -407,7 +467,7 @@ class KrlDialect:
     def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """Mathematics in degrees, and inverse frames."""
         values = tuple(None if each is None else memory.value(each) for each in given.arguments)
-        if name == "INV_POS" and values and is_frame(values[0]):
+        if name == "INV_POS" and len(values) == 1 and is_frame(values[0]):
             pose = record_pose(values[0])
             if pose is not None:
                 inverse = pose.copy()
@@ -459,10 +519,14 @@ class KrlDialect:
         kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
         tool, base, speed, acceleration, zone = _settings(memory, kind, move)
         values = [self._argument(memory, each) for each in move.arguments]
+        if len(values) != (2 if kind == "arc" else 1):
+            values = [UNREAD, UNREAD]
         make = relative if plain != move.form else target
         in_tool = "#TOOL" in move.words
         made = [make(memory, value, (tool, base), (move.text, in_tool)) for value in values]
-        via = made[0] if kind == "arc" and len(made) > 1 else None
+        if kind in ("line", "arc", "spline") and memory.read("$ORI_TYPE") == "#CONSTANT":
+            made = [self._unturned(memory, each, (tool, base)) for each in made]
+        via = made[0] if kind == "arc" else None
         block = memory.shared.get("%spline")
         return ArmMotion(
             kind,
@@ -477,6 +541,17 @@ class KrlDialect:
             base,
             block if isinstance(block, int) and block else None,
         )
+
+    def _unturned(self, memory: ProgramMemory, goal: Target, frames: Frames) -> Target:
+        """The target with the orientation that the tool has before: ``$ORI_TYPE=#CONSTANT``."""
+        if not isinstance(goal, PoseTarget):
+            return goal
+        seen = memory.here.seen(*frames, memory.cell.flange)
+        if seen is None:
+            return UnresolvedTarget("$ORI_TYPE=#CONSTANT", "position_unknown")
+        pose = goal.pose.copy()
+        pose[:3, :3] = seen[:3, :3]
+        return PoseTarget(pose, goal.configuration, external=goal.external)
 
     def _argument(self, memory: ProgramMemory, argument: Expression | None) -> Value:
         """A motion's argument; to go to where the arm stands, wherever that is, no joint moves."""
@@ -495,7 +570,10 @@ class KrlDialect:
             memory.write("%spline", doing.place.line if call.function == "%SPLINE" else 0)
             return None
         if call.function == "BAS":
-            return None if set_by_bas(memory, call) else Aside(doing.text)
+            if not set_by_bas(memory, call):
+                return Unknown(doing.text)
+            turns = memory.read("$ORI_TYPE")
+            return None if turns in (None, *ORIENTATION_TYPES["$ORI_TYPE"]) else Unknown(doing.text, may_move=False)
         if call.function == "PULSE" and call.arguments and call.arguments[0] is not None:
             name = memory.key(call.arguments[0]) or "$OUT"
             return Output(name, doing.text)
@@ -503,7 +581,7 @@ class KrlDialect:
 
     def harmless(self, call: Invocation) -> bool:
         """Messages, files, signals."""
-        return call.function == "PULSE" or call.function in HARMLESS
+        return call.function in HARMLESS or call.function in EVALUATED or call.function in OF_SETTINGS
 
 
 _SET = frozenset(

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from er3a.errors import InputError
-from er3a.programs.code_builder import CodeBuilder, fault, linked, mapped, not_understood, within
+from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked, mapped, not_understood, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_files import data_file_of, modules_of, shared_data_of
@@ -19,6 +19,7 @@ from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFi
 from er3a.programs.syntax import (
     Aggregate,
     Assign,
+    Beside,
     Constant,
     Doing,
     Element,
@@ -145,10 +146,8 @@ ASIDES = frozenset(
         "ENUM",
         "STRUC",
         "CONTINUE",
-        "TRIGGER",
         "ANIN",
         "ANOUT",
-        "RESUME",
         "BRAKE",
         "TIME_BLOCK",
         "CONST_VEL",
@@ -175,7 +174,7 @@ def statement(builder: CodeBuilder, place: Place, text: str, signals: dict[str, 
         if reading.words.texts[0] in ("FOR", "CASE"):  # without which the lines behind would mean something else
             problem = f"this {reading.words.texts[0]} can't be read ({error})"
             raise fault(place, problem, "Write FOR i=1 TO 9, or CASE 1, 2") from None
-        builder.unknown(place, text, may_move=not inside_data)
+        builder.unread(place, text, not inside_data, folds=True)
     except RecursionError:
         raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
@@ -232,7 +231,10 @@ class _Statement:
         words = self.words
         while words.next in ("DECL", "GLOBAL", "CONST"):
             words.take()
-        if words.next in ("STRUC", "ENUM", "INTERRUPT"):
+        if words.accept("INTERRUPT"):
+            _interrupt(self)
+            return
+        if words.next in ("STRUC", "ENUM"):
             self.builder.aside(self.place, self.text)
             return
         if words.accept("SIGNAL"):
@@ -360,12 +362,27 @@ def _return(reading: _Statement) -> None:
 
 
 def _interrupt(reading: _Statement) -> None:
-    if reading.words.accept("DECL") and " DO " in reading.text.upper():
-        routine = re.split(r"(?i)\bDO\b", reading.text)[-1]
-        if "IR_STOPM" not in routine.upper() and "(" in routine:
-            reading.builder.unknown(reading.place, reading.text, may_move=False)  # not here, but whenever it is met
-            return
-    reading.builder.aside(reading.place, reading.text)
+    """``INTERRUPT DECL priority WHEN condition DO routine()``; ``INTERRUPT ON`` and the like change only when."""
+    if reading.words.accept("DECL"):
+        _do(reading)
+    else:
+        reading.builder.aside(reading.place, reading.text)
+
+
+def _do(reading: _Statement) -> None:
+    """A routine behind DO, which runs whenever a condition holds; or an assignment of a TRIGGER."""
+    asked = re.search(r"(?i)\bDO\b(.*?)(\bPRIO\s*=.*)?$", reading.text)
+    if asked is None:
+        raise MisreadError("no DO")
+    words = KrlWords(asked[1])
+    what = words.expression()
+    if isinstance(what, Invocation):
+        words.finish()
+        reading.builder.beside(reading.place, what, reading.text, "interrupt")
+    elif words.accept("="):
+        reading.builder.aside(reading.place, reading.text)
+    else:
+        raise MisreadError("DO calls no routine and sets nothing")
 
 
 def _goto(reading: _Statement) -> None:
@@ -398,6 +415,8 @@ HANDLERS: dict[str, Handler] = {
     "HALT": lambda reading: reading.builder.add(Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
     "INTERRUPT": _interrupt,
+    "TRIGGER": _do,
+    "RESUME": lambda reading: reading.builder.unknown(reading.place, reading.text),  # the arm stops where it is
     "SPLINE": lambda reading: _spline(reading),
     "PTP_SPLINE": lambda reading: _spline(reading),
     "ENDSPLINE": lambda reading: _spline(reading),
@@ -446,9 +465,19 @@ def _renamed(operation: Operation, names: Mapping[str, str]) -> Operation:
         return expression
 
     operation = mapped(operation, each)
+    if isinstance(operation, Beside):
+        function = operation.what.function
+        return replace(operation, what=replace(operation.what, function=names.get(function, function)))
     return replace(operation, target=each(operation.target)) if isinstance(operation, Assign) else operation
 
 
+CONFIG_NAMES_TEXT = """
+TOOL_DATA BASE_DATA LOAD_DATA PDAT_ACT LDAT_ACT FDAT_ACT PDEFAULT LDEFAULT FDEFAULT FHOME PHOME HOME XHOME
+XHOME1 XHOME2 XHOME3 XHOME4 XHOME5 PGNO SUCCESS DMY DEF_VEL_CP DEF_ACC_CP DEF_VEL_PTP DEF_ACC_PTP DEF_APO_CDIS
+DEF_APO_CPTP POWER APPL_RUN
+"""
+CONFIG_NAMES = frozenset(CONFIG_NAMES_TEXT.split())
+"""Names that controllers keep in $config.dat, not in a program's own .dat."""
 HEAD = re.compile(r"(?i)\s*(?:GLOBAL\s+)?(DEF|DEFFCT)\s+(.*)")
 
 
@@ -463,9 +492,7 @@ def read_krl(source: ProgramText) -> Program:
     reader = _KrlReader(source)
     findings: list[ProgramFinding] = [*source.findings]
     data_file = data_file_of(source.path, ".dat")
-    if data_file is None:
-        findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
-    else:
+    if data_file is not None:
         findings += reader.read_data(read_program_text(data_file))
     shared = shared_data_of(source.path)
     if shared is not None:
@@ -480,6 +507,8 @@ def read_krl(source: ProgramText) -> Program:
             called += more_routines
             reader.data += more_data
             findings += more
+    if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
+        findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, told = linked([*called, *routines])
     return Program(
         "krl",

@@ -46,6 +46,8 @@ class KrlWriter(Writer):
     def __init__(self, listing: Listing, options: WriteOptions):
         super().__init__(listing, options)
         self.settings: dict[str, str] = {}
+        given = (motion.acceleration for motion in listing.motions if motion.kind == "joint")
+        self.accelerates_fully = all(each is None or (each.unit, each.value) == ("share", 1.0) for each in given)
 
     def files(self, head: list[str]) -> dict[str, str]:
         """The .src and the .dat file."""
@@ -135,7 +137,7 @@ class KrlWriter(Writer):
         if motion.kind == "joint":
             self._joint_speed(ready)
             acceleration = motion.acceleration
-            if acceleration is not None and acceleration.unit == "share":
+            if acceleration is not None and acceleration.unit == "share" and not self.accelerates_fully:  # by INITMOV
                 self._set("acc", f"BAS(#ACC_PTP,{short(acceleration.value * 100, 3)})")
             return
         speed = tool_speed(ready)

@@ -52,7 +52,7 @@ class Language:
     suffixes: tuple[str, ...]
     sign: re.Pattern[str] | None
     reader: Callable[[ProgramText], Program]
-    dialect: Callable[[], Dialect]
+    dialect: Callable[[Program], Dialect]
     writer: Callable[[Listing, WriteOptions], Writer] | None
     joints: range | None
     opening: str = ""

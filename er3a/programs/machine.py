@@ -30,11 +30,22 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, root
 from er3a.programs.execution import Ending, EndKind, Execution, KeepOn, RunLimits, Step
-from er3a.programs.instructions import ArmMotion, Decision, Instruction, Output, Pause, Place, Unknown
+from er3a.programs.instructions import (
+    ArmMotion,
+    Aside,
+    Decision,
+    Instruction,
+    MovesBeside,
+    Output,
+    Pause,
+    Place,
+    Unknown,
+)
 from er3a.programs.languages import LANGUAGES, not_written
 from er3a.programs.syntax import (
     START,
     Assign,
+    Beside,
     Branch,
     Call,
     Doing,
@@ -89,7 +100,7 @@ def deciding(program: Program, modal: frozenset[str]) -> frozenset[str]:
         if isinstance(operation, Fixed):
             continue
         used = {name for each in expressions_of(operation) for name in names(each)}
-        if isinstance(operation, (Branch, Move, Call, Return, Doing)):
+        if isinstance(operation, (Branch, Move, Call, Beside, Return, Doing)):
             needed |= used
             if isinstance(operation, Call):
                 assigned |= {*used, operation.result}
@@ -107,11 +118,60 @@ def deciding(program: Program, modal: frozenset[str]) -> frozenset[str]:
     return frozenset(needed & assigned)
 
 
-def changed_by_threads(program: Program) -> frozenset[str]:
-    """Names of the variables that threads change, beside the program."""
-    threads = (routine for routine in program.routines.values() if routine.thread)
-    changes = (each for routine in threads for each in routine.code if isinstance(each, Assign) and not each.local)
-    return frozenset(target_name(each.target) for each in changes)
+def changed_beside(program: Program, dialect: Dialect, itself: str = "") -> frozenset[str]:
+    """Names of the variables that threads and interrupts, but for one ``itself``, change beside the program."""
+    routines = program.routines
+    asked = {each.what.function for each in program.operations() if isinstance(each, Beside)}
+    started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
+    return _changed_in(program, _with_called(program, started), dialect)
+
+
+def _with_called(program: Program, names: Iterable[str]) -> set[str]:
+    """Routines with those that they call or start."""
+    found: set[str] = set()
+    waiting = [name for name in names if name in program.routines]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += [each for op in program.routines[name].code for each in _next(op) if each in program.routines]
+    return found
+
+
+def _next(operation: Operation) -> tuple[str, ...]:
+    """The routine that an operation calls or starts, if it does."""
+    if isinstance(operation, Call):
+        return (operation.routine,)
+    return (operation.what.function,) if isinstance(operation, Beside) else ()
+
+
+def _changed_in(program: Program, names: Iterable[str], dialect: Dialect) -> frozenset[str]:
+    """Variables, not local ones, that routines change."""
+    return frozenset(each for name in names for op in program.routines[name].code for each in _shared(op, dialect))
+
+
+def _shared(operation: Operation, dialect: Dialect) -> Iterable[str]:
+    """Variables, not local ones, that an operation changes."""
+    if isinstance(operation, Assign):
+        return () if operation.local else (target_name(operation.target),)
+    if isinstance(operation, Doing) and not (
+        isinstance(operation.what, Invocation) and dialect.harmless(operation.what)
+    ):
+        return dialect.modal
+    return ()
+
+
+def strange_call(operation: Operation, dialect: Dialect) -> str:
+    """A function in an operation's expressions that is not known, and so may do anything; empty if there is none."""
+    waiting = list(expressions_of(operation))
+    if isinstance(operation, Doing) and isinstance(operation.what, Invocation):
+        waiting = list(inner(operation.what))
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, Invocation) and not dialect.harmless(each):
+            return f"{each.function}(...)"
+        waiting += inner(each)
+    return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,11 +236,13 @@ def _moves(operation: Operation, moving: set[str], dialect: Dialect) -> bool:
             return True
         case Fixed(instruction=instruction):
             return isinstance(instruction, ArmMotion) or (isinstance(instruction, Unknown) and instruction.may_move)
-        case Doing(what=what):
-            return not (isinstance(what, Invocation) and dialect.harmless(what))
-        case Call(routine=routine):
-            return routine in moving
-    return False
+        case Doing(what=what) if not (isinstance(what, Invocation) and dialect.harmless(what)):
+            return True
+        case Call(routine=routine) if routine in moving:
+            return True
+        case Beside(what=what) if what.function in moving:
+            return True
+    return bool(strange_call(operation, dialect))
 
 
 def _changes(program: Program) -> dict[str, set[str]]:
@@ -388,6 +450,7 @@ class RunWay:
     number: int = 0
     rounds: dict[tuple[str, int], int] = field(default_factory=dict)
     line: tuple[tuple[int, int], ...] = ()  # ways that it comes from, each with the count of states until then
+    beside: bool = False  # whether it runs beside the program
 
     def fork(self, new: int, states: int) -> RunWay:
         """Another that goes its own way from here."""
@@ -395,7 +458,7 @@ class RunWay:
         memory = self.memory.copy()
         memory.local = frames[-1].local
         line = (*self.line, (self.number, states))
-        return RunWay(frames, memory, self.step, new, dict(self.rounds), line)
+        return RunWay(frames, memory, self.step, new, dict(self.rounds), line, self.beside)
 
 
 class Machine:
@@ -414,6 +477,14 @@ class Machine:
         self.names_met: set[str] = set()
         self.deciding_names: list[str] = []  # of those, whole
         self.quiet = quiet_branches(program, dialect)
+        self.moving = _moving(program, dialect)
+        self.strange: dict[tuple[str, int], str] = {
+            (name, at): text
+            for name, routine in program.routines.items()
+            for at, each in enumerate(routine.code)
+            if (text := strange_call(each, dialect))
+        }
+        self.started: set[Hashable] = set()  # what runs beside the program, by its state when it begins
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, tuple[int, int, int]] = {}  # way, count, last step
@@ -427,7 +498,7 @@ class Machine:
     def run(self) -> Execution:
         """Follow all ways."""
         memory = ProgramMemory(self.dialect, self.cell)
-        memory.beside = changed_by_threads(self.program)
+        memory.beside = changed_beside(self.program, self.dialect)
         self.dialect.begin(memory)
         for each in self.program.data:
             self._assign(memory, each)
@@ -463,6 +534,9 @@ class Machine:
             back = False
             at = frame.at
             frame.at += 1
+            if (strange := self.strange.get((frame.routine.name, at))) is not None:
+                self._note(way, operation.place, Unknown(strange))
+                way.memory.here = Position()
             if isinstance(operation, GoTo):
                 frame.at, back = operation.to, operation.to <= at
                 if operation.endless and back and self._drifts(way, frame.routine.name, at):
@@ -475,6 +549,8 @@ class Machine:
                     self._end(way, "recursion", operation.place, limit=self.limits.depth)
                     return
                 self._call(way, operation)
+            elif isinstance(operation, Beside):
+                self._start(way, operation)
             elif isinstance(operation, (Return, Halt)):
                 if isinstance(operation, Halt) or len(way.frames) == 1:
                     self._end(way, "end", operation.place)
@@ -521,9 +597,9 @@ class Machine:
     def _end(self, way: RunWay, kind: EndKind, place: Place, behind: int | None = None, limit: int = 0) -> None:
         """``behind``: the step in front of the one that follows."""
         follows = None if behind is None else self.first_behind.get(behind)
-        self.endings.append(Ending(kind, way.step, place, follows, limit))
+        self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside))
 
-    def _assign(self, memory: ProgramMemory, each: Assign) -> Output | None:
+    def _assign(self, memory: ProgramMemory, each: Assign) -> Output | Unknown | None:
         if each.type_name and isinstance(each.target, Variable):
             memory.types[each.target.name] = each.type_name
         if each.value is None:
@@ -540,7 +616,7 @@ class Machine:
         memory.assign(each.target, value, local)
         if self.dialect.named(name):
             memory.write(name + "%name", each.text.partition("=")[2].strip())
-        return None
+        return None if self.dialect.is_followed(name, value) else Unknown(each.text, may_move=False)
 
     def _is_new(self, memory: ProgramMemory, name: str) -> bool:
         start = root(name)
@@ -599,24 +675,74 @@ class Machine:
 
     def _call(self, way: RunWay, call: Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
-        by_name = {name: memory.value(each) for name, each in call.keywords}
-        local: dict[str, Value] = {} if call.result == START else {"%inside": True}
-        outs = []
-        for i, parameter in enumerate(routine.parameters):
-            given = call.arguments[i] if i < len(call.arguments) else None
-            if given is not None:
-                local[parameter.name] = memory.value(given)
-                if parameter.out and isinstance(given, (Variable, Member, Element)):
-                    outs.append((parameter.name, given))
-            elif parameter.name in by_name:
-                local[parameter.name] = by_name[parameter.name]
-            elif parameter.default is not None:
-                local[parameter.name] = memory.value(parameter.default)
-            else:
-                local[parameter.name] = Unclear(parameter.name)
+        local, fits = _locals(routine, call.arguments, call.keywords, memory)
+        if call.result == START:
+            del local["%inside"]
+        if not fits:
+            self._note(way, call.place, Unknown(call.text, may_move=False))
+        outs = tuple(
+            (parameter.name, given)
+            for parameter, given in zip(routine.parameters, call.arguments)
+            if parameter.out and isinstance(given, (Variable, Member, Element))
+        )
         calls = (*way.frames[-1].calls, call.place)
-        way.frames.append(Frame(routine, 0, local, calls, call.result, tuple(outs)))
+        way.frames.append(Frame(routine, 0, local, calls, call.result, outs))
         memory.local = local
+
+    def _start(self, way: RunWay, start: Beside) -> None:
+        """Follow a routine that moves the arm beside the program, on a way that begins here.
+
+        The program's own way goes on. Behind the start of a thread it does not know where the arm stands; an interrupt,
+        which may come at any time, begins where it is not known, and the motion that it broke into goes on behind it.
+        """
+        name = start.what.function
+        routine = self.program.routines.get(name)
+        unknown = routine is None and (start.kind == "thread" or not self.dialect.harmless(start.what))
+        if not unknown and name not in self.moving:
+            self._note(way, start.place, Aside(start.text))
+            return
+        before = way.step
+        self._note(way, start.place, MovesBeside(name, start.kind, start.text))
+        if routine is not None:
+            other = way.fork(self.numbers, len(self.seen))
+            other.step, other.beside = before, True
+            local, fits = _locals(routine, start.what.arguments, start.what.keywords, way.memory)
+            other.frames = [Frame(routine, 0, local, (*way.frames[-1].calls, start.place))]
+            other.memory.local = local
+            other.memory.beside = self._changed_later(way) | changed_beside(self.program, self.dialect, name)
+            if start.kind == "interrupt":
+                other.memory.here = Position()
+            state = (name, frozenset(local.items()), self._kept(other.memory.shared), other.memory.here.key())
+            if state not in self.started:
+                self.started.add(state)
+                self.numbers += 1
+                self.waiting.insert(0, other)
+                if start.kind == "interrupt":
+                    self._note(other, start.place, MovesBeside(name, "entered", start.text))
+                if not fits:
+                    self._note(other, start.place, Unknown(start.text, may_move=False))
+        if start.kind == "thread":
+            way.memory.here = Position()
+
+    def _changed_later(self, way: RunWay) -> frozenset[str]:
+        """Names of the variables that a way may still change."""
+        found: set[str] = set()
+        called: set[str] = set()
+        for frame in way.frames:
+            seen: set[int] = set()
+            waiting = [frame.at]
+            code = frame.routine.code
+            while waiting:
+                at = waiting.pop()
+                if at in seen or at >= len(code):
+                    continue
+                seen.add(at)
+                operation = code[at]
+                waiting += [operation.to] if isinstance(operation, GoTo) else [at + 1]
+                waiting += [operation.otherwise] if isinstance(operation, Branch) else []
+                found.update(_shared(operation, self.dialect))
+                called.update(_next(operation))
+        return frozenset(found) | _changed_in(self.program, _with_called(self.program, called), self.dialect)
 
     def _return(self, way: RunWay, operation: Return) -> None:
         memory = way.memory
@@ -654,6 +780,29 @@ class Machine:
         self.names_met |= new
         self.deciding_names += [name for name in new if name[0] == "%" or root(name) in self.deciding]
         return frozenset((name, values[name]) for name in self.deciding_names if name in values)
+
+
+def _locals(
+    routine: Routine,
+    arguments: tuple[Expression | None, ...],
+    keywords: tuple[tuple[str, Expression], ...],
+    memory: ProgramMemory,
+) -> tuple[dict[str, Value], bool]:
+    """Variables of a routine that begins, and whether it has a parameter for each argument."""
+    by_name = {name: memory.value(each) for name, each in keywords}
+    local: dict[str, Value] = {"%inside": True}
+    for i, parameter in enumerate(routine.parameters):
+        given = arguments[i] if i < len(arguments) else None
+        if given is not None:
+            local[parameter.name] = memory.value(given)
+        elif parameter.name in by_name:
+            local[parameter.name] = by_name[parameter.name]
+        elif parameter.default is not None:
+            local[parameter.name] = memory.value(parameter.default)
+        else:
+            local[parameter.name] = Unclear(parameter.name)
+    fits = len(arguments) <= len(routine.parameters) and by_name.keys() <= {each.name for each in routine.parameters}
+    return local, fits
 
 
 def _labels(routine: Routine) -> frozenset[int]:
@@ -709,7 +858,7 @@ def execute(
     cell = Cell(flange, start, frames=known)
     if robot is not None:
         cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4))
-    return Machine(program, LANGUAGES[program.language].dialect(), cell, limits or RunLimits(), keep_on).run()
+    return Machine(program, LANGUAGES[program.language].dialect(program), cell, limits or RunLimits(), keep_on).run()
 
 
 def _not_meant(program: Program, robot: Robot) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from er3a.programs.lexing import read_program_text
@@ -12,6 +13,8 @@ POINTS = {".src": ".dat", ".sub": ".dat", ".pgm": ".var"}
 KRL = (".src", ".sub")
 CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
 MOST_MODULES = 200
+BASICS, BASICS_FILES = "BAS", ("bas.src", "BAS.SRC", "Bas.src", "BAS.src")
+DEEPEST = 6  # folders of an archive
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
@@ -24,12 +27,17 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
 
 def modules_of(path: Path) -> tuple[Path, ...]:
-    """The modules that a .src file calls, and those that these call, in the order in which they are met."""
+    """The modules that a .src file calls, and those that these call, in the order in which they are met.
+
+    They lie beside it; the controller's own bas.src may also lie where an archive has it.
+    """
     beside = {
         each.stem.upper(): each
         for each in sorted(path.parent.iterdir())
         if each.suffix.lower() == ".src" and each.is_file()
     }
+    if BASICS not in beside and (basics := _in_archive(path, BASICS_FILES)) is not None:
+        beside[BASICS] = basics
     beside.pop(path.stem.upper(), None)
     found: list[Path] = []
     waiting = [path]
@@ -52,8 +60,13 @@ def data_file_of(path: Path, suffix: str) -> Path | None:
 
 def shared_data_of(path: Path) -> Path | None:
     """The controller's own $config.dat, with its tools, bases and points: beside a program, or as in an archive."""
-    for folder in (path.parent, path.parent.parent / "System"):
-        for name in ("$config.dat", "$CONFIG.DAT", "$Config.dat"):
+    return _in_archive(path, ("$config.dat", "$CONFIG.DAT", "$Config.dat"))
+
+
+def _in_archive(path: Path, names: Iterable[str]) -> Path | None:
+    """A file of the controller beside a program, or in the folder System beside one of the folders above it."""
+    for folder in (path.parent, *(above / "System" for above in list(path.resolve().parents)[1:DEEPEST])):
+        for name in names:
             if (folder / name).is_file():
                 return folder / name
     return None

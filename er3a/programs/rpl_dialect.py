@@ -28,6 +28,7 @@ from er3a.programs.syntax import (
     Expression,
     Invocation,
     Move,
+    Program,
     Record,
     Unclear,
     Value,
@@ -40,7 +41,7 @@ from er3a.programs.syntax import (
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
 ZONE = re.compile(r"z(\d+(?:\.\d+)?)$", re.IGNORECASE)
 NO_BASE = "wobj0"
-LIBRARIES = ("tcpip.", "io.", "fidbus.", "sys.", "str.", "log.")
+LIBRARIES = ("tcpip.", "io.", "fidbus.", "str.", "log.")
 
 
 class RplDialect:
@@ -51,12 +52,19 @@ class RplDialect:
     whole_division = True
     first_index = 1
 
+    def __init__(self, program: Program):
+        pass
+
     def begin(self, memory: ProgramMemory) -> None:
         """No variable is there from the start."""
 
     def is_signal(self, name: str) -> bool:
         """Outputs, and what goes to the field bus."""
         return name.startswith(("io.", "fidbus."))
+
+    def is_followed(self, name: str, value: Value) -> bool:
+        """No variable asks for anything."""
+        return True
 
     def named(self, name: str) -> bool:
         """Tools are named in each motion."""
@@ -91,17 +99,17 @@ class RplDialect:
 
     def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """MJOINT and MLIN: target, speed, zone, tool, reference frame."""
-        given = list(move.arguments)[:5]
-        given += [None] * (5 - len(given))
+        given = [*move.arguments, *[None] * (5 - len(move.arguments))]
         point = Unclear(move.text) if given[0] is None else memory.value(given[0])
-        tool, base = (_word(memory, each) for each in given[3:])
+        goal = _target(point, move.text) if len(given) == 5 else UnresolvedTarget(move.text, "not_understood")
+        tool, base = (_word(memory, each) for each in given[3:5])
         frames = memory.cell.frames
         base_pose = frames.get(base or NO_BASE)
         if base_pose is None and base in ("", NO_BASE):
             base_pose = np.eye(4)
         return ArmMotion(
             "joint" if move.form == "MJOINT" else "line",
-            _target(point, move.text),
+            goal,
             move.form,
             speed=_speed(_word(memory, given[1])),
             zone=_zone(_word(memory, given[2])),
@@ -116,8 +124,9 @@ class RplDialect:
         return Aside(doing.text) if self.harmless(call) else Unknown(doing.text)
 
     def harmless(self, call: Invocation) -> bool:
-        """Functions of libraries."""
-        return call.function.startswith(LIBRARIES)
+        """Functions of the controller's libraries for signals, texts and sockets, and those that are evaluated."""
+        name = call.function
+        return name.startswith(LIBRARIES) or name in FIELDS or name == "OFFSET" or name.upper() in IN_DEGREES
 
 
 def _word(memory: ProgramMemory, expression: Expression | None) -> str:
@@ -152,6 +161,8 @@ def _point(name: str, values: list[Value | None]) -> Value:
 
 
 def _offset(point: Record, by: list[Value | None]) -> Value:
+    if len(by) > 3:
+        return Unclear(f"OFFSET({shown(point)}, ...)")
     for key, step in zip(POSITION, by):
         old = point.get(key)
         for part in (old, step):

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator
 
 from er3a.errors import InputError
-from er3a.programs.code_builder import CodeBuilder, fault, linked
+from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_files import data_file_of
@@ -76,6 +76,10 @@ class RplWords(Words):
     def special(self) -> Expression | None:
         """The taught point ``*`` of a motion."""
         return Opaque(self.take()) if self.next == "*" and self.kind == "mark" else None
+
+
+LIBRARY_NAMES = frozenset(("io", "fidbus", "sys", "str", "log", "tcpip"))
+"""Names that belong to the controller, not to a program's .var file."""
 
 
 def expression(text: str) -> Expression:
@@ -191,7 +195,10 @@ def read_rpl(source: ProgramText) -> Program:
         else:
             _statement(builder, place, text)
     data, findings = _variables(source)
-    by_name, more = linked([builder.routine(place)])
+    routine = builder.routine(place)
+    if data_file_of(source.path, ".var") is None and lacks_data([routine], data, LIBRARY_NAMES):
+        findings.append(DataFileMissing(source.path.with_suffix(".var").name))
+    by_name, more = linked([routine])
     findings = [*source.findings, *findings, *more]
     return Program("rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines)
 
@@ -200,7 +207,7 @@ def _variables(source: ProgramText) -> tuple[list[Assign], list[ProgramFinding]]
     """Declarations of the .var file."""
     path = data_file_of(source.path, ".var")
     if path is None:
-        return [], [DataFileMissing(source.path.with_suffix(".var").name)]
+        return [], []
     data: list[Assign] = []
     found: list[ProgramFinding] = []
     seen: set[str] = set()

@@ -55,10 +55,19 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """URScript's ``get_inverse_kin``: the joints of a pose, which only the arm's table gives."""
+    """URScript's ``get_inverse_kin``: the joints of a pose, which only the arm's table gives.
+
+    Attributes
+    ----------
+    near : joints that the solution is nearest to; empty for where the arm stood, ``here``
+    tool : whose pose it is; None for the robot's own
+    here : equal for equal positions of the arm
+    """
 
     pose: Record
     near: Value
+    tool: Value | None = None
+    here: tuple[bytes, ...] = ()
 
 
 Value = float | int | bool | str | Unclear | Record | Solved | tuple["Value", ...]
@@ -233,6 +242,16 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
+class Beside:
+    """From here on a routine runs beside the program: at once (a thread), or whenever its condition holds."""
+
+    place: Place
+    what: Invocation
+    text: str
+    kind: Literal["thread", "interrupt"]
+
+
+@dataclass(frozen=True, slots=True)
 class Return:
     """Leave the routine."""
 
@@ -293,7 +312,7 @@ class Fixed:
     instruction: Instruction
 
 
-Operation = Assign | GoTo | Branch | Call | Return | Halt | Move | Waiting | Doing | Fixed
+Operation = Assign | GoTo | Branch | Call | Beside | Return | Halt | Move | Waiting | Doing | Fixed
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,6 +404,8 @@ def expressions_of(operation: Operation) -> tuple[Expression, ...]:
             found = (of,)
         case Doing(what=what):
             found = (what,)
+        case Beside(what=what):
+            found = inner(what)
         case _:
             found = ()
     return tuple(each for each in found if each is not None)

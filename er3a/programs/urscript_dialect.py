@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -27,23 +28,28 @@ from er3a.programs.instructions import (
     Unknown,
     UnresolvedTarget,
     Zone,
+    centre_and_angle,
     numbers_of,
     pose_of,
 )
 from er3a.programs.syntax import (
     POSE_KEYS,
+    Assign,
     Doing,
     Invocation,
     Move,
+    Program,
     Record,
     Solved,
     Unclear,
     Value,
+    Variable,
     finite,
     number,
     numbers,
     shown,
 )
+from er3a.programs.urscript_reader import CHANGED, LIST_METHODS, THREAD
 
 KINDS: dict[str, MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
 PARAMETERS = {
@@ -54,29 +60,48 @@ PARAMETERS = {
 }
 DEFAULTS = {"movej": (1.4, 1.05), "movel": (1.2, 0.25), "movep": (1.2, 0.25), "movec": (1.2, 0.25)}
 ROBOT_BASE = NamedFrame("base", np.eye(4))
-HARMLESS = (
-    *("set_", "get_", "popup", "textmsg", "sync", "socket_", "zero_ftsensor", "write_", "read_", "rtde_", "modbus_"),
-    *(
-        "stopj",
-        "stopl",
-        "request_",
-        "rpc_factory",
-        "modbus",
-        "end_",
-        "str_",
-        "to_",
-        "assert",
-        "varmsg",
-        "rq_set_",
-        "is_",
-        "encoder_",
-        "conveyor_pulse_decode",
-        "reset_",
-        "tool_contact",
-        "time",
-        "switch_",
-    ),
-)
+NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
+SAME_TURN = 1e-9
+HALF_A_TURN = math.pi - 1e-6
+HARMLESS_TEXT = """
+assert binary_list_to_integer conveyor_pulse_decode enable_external_ft_sensor encoder_enable_pulse_decode
+encoder_enable_set_tick_count encoder_get_tick_count encoder_set_tick_count encoder_unwind_delta_tick_count
+end_force_mode end_freedrive_mode end_screw_driving end_teach_mode force force_mode_set_damping
+force_mode_set_gain_scaling ft_rtde_input_enable get_actual_joint_positions_history get_actual_joint_speeds
+get_actual_tcp_speed get_analog_in get_analog_out get_base_acceleration get_configurable_digital_in
+get_configurable_digital_out get_controller_temp get_conveyor_tick_count get_coriolis_and_centrifugal_torques
+get_digital_in get_digital_out get_euromap_input get_euromap_output get_flag get_freedrive_status get_gravity
+get_inverse_kin_has_solution get_jacobian get_jacobian_time_derivative get_joint_temp get_joint_torques
+get_mass_matrix get_standard_analog_in get_standard_analog_out get_standard_digital_in get_standard_digital_out
+get_steptime get_target_joint_accelerations get_target_joint_speeds get_target_payload get_target_payload_cog
+get_target_payload_inertia get_target_tcp_speed get_tcp_force get_tool_accelerometer_reading get_tool_analog_in
+get_tool_current get_tool_digital_in get_tool_digital_out integer_to_binary_list is_steady
+is_within_safety_limits modbus_add_rtu_signal modbus_add_signal modbus_delete_signal modbus_get_error
+modbus_get_signal_status modbus_get_time_since_signal_invalid modbus_request_update_signal_value
+modbus_send_custom_command modbus_set_digital_input_action modbus_set_output_register modbus_set_output_signal
+modbus_set_runstate_dependent_choice modbus_set_signal_update_frequency popup pose_dist pose_sub powerdown
+random read_input_boolean_register read_input_float_register read_input_integer_register
+read_output_boolean_register read_output_float_register read_output_integer_register read_port_bit
+read_port_register request_boolean_from_primary_client request_float_from_primary_client
+request_integer_from_primary_client request_string_from_primary_client rpc_factory rtde_set_watchdog
+set_analog_inputrange set_analog_out set_analog_outputdomain set_baselight_off set_baselight_solid
+set_configurable_digital_input_action set_configurable_digital_out set_conveyor_tick_count set_digital_out
+set_euromap_output set_euromap_runstate_dependent_choice set_flag set_gp_boolean_input_action set_gravity
+set_input_actions_to_default set_payload set_payload_cog set_payload_mass
+set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
+set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
+set_runstate_tool_digital_output_to_value set_safety_mode_transition_hardness set_standard_analog_input_domain
+set_standard_analog_out set_standard_digital_input_action set_standard_digital_out set_target_payload
+set_tool_analog_input_domain set_tool_communication set_tool_digital_input_action set_tool_digital_out
+set_tool_digital_output_mode set_tool_output_mode set_tool_voltage sleep socket_close socket_get_var socket_open
+socket_read_ascii_float socket_read_binary_integer socket_read_byte_list socket_read_line socket_read_string
+socket_send_byte socket_send_int socket_send_line socket_send_string socket_set_var stopj stopl str_at str_cat
+str_empty str_find str_len str_sub sync textmsg time to_num to_str tool_contact tool_contact_examples varmsg
+write_output_boolean_register write_output_float_register write_output_integer_register write_port_bit
+write_port_register zero_ftsensor
+"""
+HARMLESS = frozenset(HARMLESS_TEXT.split())
+"""Functions of the language that move nothing and set no frame; any other name may be anybody's and do anything."""
 OUTPUTS = {
     "set_digital_out": "digital_out",
     "set_standard_digital_out": "standard_digital_out",
@@ -86,6 +111,36 @@ OUTPUTS = {
     "set_standard_analog_out": "standard_analog_out",
     "set_flag": "flag",
 }
+SIGNATURES: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("get_actual_joint_positions", "get_target_joint_positions", "get_actual_tcp_pose"), ()),
+    **dict.fromkeys(("get_target_tcp_pose", "get_target_waypoint", "get_tcp_offset"), ()),
+    "get_actual_tool_flange_pose": (),
+    "get_forward_kin": ("q", "tcp"),
+    "get_inverse_kin": ("x", "qnear", "maxPositionError", "maxOrientationError", "tcp"),
+    "pose_trans": ("p_from", "p_from_to"),
+    "pose_add": ("p_1", "p_2"),
+    "pose_sub": ("p_to", "p_from"),
+    "pose_inv": ("p_from",),
+    "inv": ("m",),
+    "interpolate_pose": ("p_from", "p_to", "alpha"),
+    "point_dist": ("p_from", "p_to"),
+    "rotvec2rpy": ("rotation_vector",),
+    "rpy2rotvec": ("rpy_vector",),
+    "norm": ("a",),
+    "normalize": ("v",),
+    "length": ("v",),
+    "get_list_length": ("v",),
+    "size": ("v",),
+    "make_list": ("length", "initial_value", "capacity"),
+    **dict.fromkeys(("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "floor", "ceil", "abs"), ("f",)),
+    "atan2": ("x", "y"),
+    "pow": ("base", "exponent"),
+    "log": ("b", "f"),
+    "d2r": ("d",),
+    "r2d": ("r",),
+}
+"""Parameters of the functions that are evaluated. A call that does not fit them is not understood."""
+LONGEST_LIST = 10_000
 PLAIN: dict[str, Callable[..., float]] = {
     **{name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "pow")},
     "floor": math.floor,
@@ -98,7 +153,22 @@ PLAIN: dict[str, Callable[..., float]] = {
 
 
 class UrScriptDialect:
-    """URScript, as a run needs it."""
+    """URScript, as a run needs it.
+
+    Attributes
+    ----------
+    servers : names of variables that hold what ``rpc_factory`` gives: other processes, which move nothing here
+    """
+
+    def __init__(self, program: Program):
+        assigned = (each for each in program.operations() if isinstance(each, Assign))
+        self.servers = frozenset(
+            each.target.name
+            for each in assigned
+            if isinstance(each.target, Variable)
+            and isinstance(each.value, Invocation)
+            and each.value.function == "rpc_factory"
+        )
 
     modal = frozenset(("%tcp",))
     local_by_default = True
@@ -111,6 +181,10 @@ class UrScriptDialect:
     def is_signal(self, name: str) -> bool:
         """Signals are set by functions."""
         return False
+
+    def is_followed(self, name: str, value: Value) -> bool:
+        """No variable asks for anything."""
+        return True
 
     def named(self, name: str) -> bool:
         """Tools have no names."""
@@ -133,46 +207,45 @@ class UrScriptDialect:
         return Record("p", tuple(zip(POSE_KEYS, values)))
 
     def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
-        """Mathematics, poses, where the arm stands; what is not known is unclear."""
+        """Mathematics, poses, where the arm stands; what is not known, or called otherwise than known, is unclear."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
         keywords = {key: memory.value(each) for key, each in given.keywords}
-        if name == "get_inverse_kin" and values and isinstance(values[0], Record):
-            near = values[1] if len(values) > 1 else keywords.get("qnear")
-            return Solved(values[0], near if near is not None else ())
         if name == "struct":
             return Record(name, tuple(keywords.items()))
-        found = _of_position(memory, name, values)
+        unclear = Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
+        if name == CHANGED:
+            return _changed(values, unclear)
+        placed = _placed(SIGNATURES.get(name), values, keywords)
+        if placed is None:
+            return unclear
+        found = _of_position(memory, name, placed)
         if found is None:
-            found = _of_poses(name, values, keywords)
-        plain = numbers(tuple(values))
-        if found is None and name in ("norm", "normalize"):
-            found = _of_vector(name, values)
-        if found is None and name in PLAIN and plain:
+            found = _of_poses(name, placed)
+        if found is None:
+            found = _of_lists(name, placed)
+        if found is None and name in PLAIN:
+            plain = numbers(tuple(placed.get(key) for key in SIGNATURES[name]))
             try:
-                found = PLAIN[name](*plain)
+                found = None if plain is None else PLAIN[name](*plain)
             except (ValueError, OverflowError, ZeroDivisionError, TypeError):
                 found = None
-        if (
-            found is None
-            and name in ("length", "get_list_length")
-            and values
-            and isinstance(values[0], (tuple, Record))
-        ):
-            found = len(values[0] if isinstance(values[0], tuple) else values[0].items)
-        return (
-            Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
-            if (found is None)
-            else found
-        )
+        return unclear if found is None else found
 
     def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """movej, movel, movep, movec."""
-        given = dict(zip(PARAMETERS[move.form], move.arguments))
-        given |= dict(move.settings)
-        values = {name: memory.value(each) for name, each in given.items() if each is not None}
         kind = KINDS[move.form]
+        placed = [None if each is None else memory.value(each) for each in move.arguments]
+        settings = {name: memory.value(each) for name, each in move.settings}
+        values = _placed(PARAMETERS[move.form], placed, settings)
+        if values is None:
+            unknown = UnresolvedTarget(move.text, "not_understood")
+            return ArmMotion(kind, unknown, move.form, unknown if kind == "arc" else None, tool=_tool(memory))
         first, second = PARAMETERS[move.form][:2]
         goal = values.get(second if kind == "arc" else first, Unclear(move.text))
+        made = _target(memory, goal, move.text)
+        via = _target(memory, values.get(first, Unclear(move.text)), move.text) if kind == "arc" else None
+        if "mode" in values:
+            made = _in_mode(memory, values["mode"], via, made, move.text)
         a, v = DEFAULTS[move.form]
         joint = kind == "joint"
         seconds = number(values.get("t")) or 0.0
@@ -182,9 +255,9 @@ class UrScriptDialect:
         zone = Zone("named", 0.0, shown(radius)) if blend is None else Zone("distance", blend) if blend > 0 else FINE
         return ArmMotion(
             kind,
-            _target(goal, move.text),
+            made,
             move.form,
-            _target(values.get(first, Unclear(move.text)), move.text) if kind == "arc" else None,
+            via,
             None,
             speed,
             _rate(values.get("a", a), "rad/s2" if joint else "m/s2"),
@@ -197,22 +270,46 @@ class UrScriptDialect:
         """The tool, outputs, what is harmless; the rest is unknown."""
         call = doing.what
         assert isinstance(call, Invocation)
-        given = [each for each in call.arguments if each is not None]
-        if call.function == "set_tcp" and given:
-            memory.write("%tcp", memory.value(given[0]))
+        values = [None if each is None else memory.value(each) for each in call.arguments]
+        keywords = {key: memory.value(each) for key, each in call.keywords}
+        if call.function == "set_tcp":
+            given = _placed(("pose", "tcp_name"), values, keywords)
+            if given is None or "pose" not in given:
+                memory.write("%tcp", Unclear(doing.text))
+                return Unknown(doing.text)
+            memory.write("%tcp", given["pose"])
             return None
-        if call.function in OUTPUTS and len(given) == 2:
-            values = [memory.value(each) for each in given]
-            return Output(f"{OUTPUTS[call.function]}[{shown(values[0])}]", shown(values[1]))
+        output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
+        if output is not None and len(output) == 2:
+            return Output(f"{OUTPUTS[call.function]}[{shown(output['n'])}]", shown(output["b"]))
         return Aside(doing.text) if self.harmless(call) else Unknown(doing.text)
 
     def harmless(self, call: Invocation) -> bool:
-        """Signals, messages, sockets; and methods of objects of other processes, which move nothing by themselves."""
-        return call.function != "set_tcp" and ("." in call.function or call.function.startswith(HARMLESS))
+        """Functions whose exact name is known, and those that other processes answer."""
+        if "." in call.function:
+            name, _, method = call.function.partition(".")
+            return name in self.servers or method in LIST_METHODS
+        return call.function in HARMLESS or call.function in SIGNATURES or call.function in ("struct", CHANGED, THREAD)
+
+
+def _placed(
+    names: tuple[str, ...] | None, values: list[Value | None], keywords: dict[str, Value]
+) -> dict[str, Value] | None:
+    """Arguments by the names of a function's parameters; None for a call that does not fit them."""
+    if names is None or len(values) > len(names) or None in values or not keywords.keys() <= set(names):
+        return None
+    placed = {name: each for name, each in zip(names, values) if each is not None}
+    return None if placed.keys() & keywords.keys() else placed | keywords
+
+
+def _tool_value(memory: ProgramMemory) -> Value | None:
+    """The pose of the tool as a value; None where neither program nor cell gives it."""
+    value = memory.read("%tcp")
+    return _record(memory.cell.tool) if value is None and memory.cell.tool is not None else value
 
 
 def _tool(memory: ProgramMemory) -> NamedFrame:
-    value = memory.shared.get("%tcp")
+    value = memory.read("%tcp")
     if value is None:
         return NamedFrame("", memory.cell.tool)
     pose = _pose(value)
@@ -238,19 +335,19 @@ def _record(pose: Reals) -> Record:
     return Record("p", tuple(zip(POSE_KEYS, numbers_of(pose, "ur"))))
 
 
-def _target(value: Value, text: str) -> Target:
+def _target(memory: ProgramMemory, value: Value, text: str) -> Target:
     match value:
-        case Solved(pose=pose, near=near):
-            found = _target(pose, text)
-            joints = _joints(near)
-            return replace(found, near=joints) if isinstance(found, PoseTarget) else found
+        case Solved():
+            return _solved_target(memory, value, text)
         case Unclear(text=unclear):
-            return UnresolvedTarget(unclear, "not_finite" if unclear.lower() in ("nan", "inf") else "undefined")
+            if unclear.lower() in ("nan", "inf"):
+                return UnresolvedTarget(unclear, "not_finite")
+            return UnresolvedTarget(unclear, "undefined" if NAME.fullmatch(unclear) else "not_understood")
         case Record() | tuple():
             parts = value.values() if isinstance(value, Record) else value
             unclear_part = next((each for each in parts if isinstance(each, Unclear)), None)
             if unclear_part is not None:
-                return _target(unclear_part, text)
+                return _target(memory, unclear_part, text)
             plain = numbers(parts)
             if plain is not None and not finite(plain):
                 return UnresolvedTarget(text, "not_finite")
@@ -263,38 +360,117 @@ def _target(value: Value, text: str) -> Target:
     return UnresolvedTarget(text, "not_understood")
 
 
+def _in_mode(memory: ProgramMemory, mode: Value, via: Target | None, goal: Target, text: str) -> Target:
+    """An arc's target by its mode: 0 turns the tool from its first orientation to the target's, 1 with the tangent.
+
+    An arc of less than half a turn whose tool turns with the tangent is one whose tool turns evenly to the first
+    orientation, turned by the arc's angle. Longer ones would turn the other way round, and are not understood.
+    """
+    if number(mode) == 0:
+        return goal
+    start = memory.here.seen(_tool(memory), ROBOT_BASE, memory.cell.flange)
+    if number(mode) != 1 or not isinstance(goal, PoseTarget) or not isinstance(via, PoseTarget):
+        return UnresolvedTarget(text, "not_understood")
+    if start is None:
+        return UnresolvedTarget(text, "position_unknown")
+    circle = centre_and_angle(start[:3, 3], via.pose[:3, 3], goal.pose[:3, 3])
+    if circle is None or circle[2] > HALF_A_TURN:
+        return UnresolvedTarget(text, "not_understood")
+    pose = goal.pose.copy()
+    pose[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(circle[2] * circle[1]).as_matrix() @ start[:3, :3]
+    return PoseTarget(pose)
+
+
+def _solved_target(memory: ProgramMemory, solved: Solved, text: str) -> Target:
+    """The joints that bring the tool of then to the pose, as a pose of the tool of now."""
+    found = _target(memory, solved.pose, text)
+    if not isinstance(found, PoseTarget):
+        return found
+    if isinstance(solved.near, Unclear):
+        return UnresolvedTarget(solved.near.text, "not_understood")
+    now = _tool_value(memory)
+    if solved.tool != now:
+        then, tool = _pose(solved.tool), _pose(now)
+        if then is None or tool is None:
+            return UnresolvedTarget(text, "not_understood")
+        found = PoseTarget(found.pose @ np.linalg.inv(then) @ tool)
+    near = _joints(solved.near)
+    if near is None and solved.here != memory.here.key():  # which of the solutions was nearest then is not known
+        return UnresolvedTarget(text, "position_unknown")
+    return replace(found, near=near)
+
+
 def _joints(value: Value) -> Reals | None:
     plain = numbers(value) if isinstance(value, tuple) else None
     return np.array(plain) if plain is not None and len(plain) == 6 and finite(plain) else None
 
 
-def _of_position(memory: ProgramMemory, name: str, values: list[Value | None]) -> Value | None:
+def _of_position(memory: ProgramMemory, name: str, given: dict[str, Value]) -> Value | None:
     """Functions of where the arm stands, and of its table."""
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
         return None if memory.here.joints is None else tuple(map(float, memory.here.joints))
-    if name in ("get_actual_tcp_pose", "get_target_tcp_pose", "get_target_waypoint"):
-        seen = memory.here.seen(_tool(memory), ROBOT_BASE, memory.cell.flange)
+    if name in ("get_actual_tcp_pose", "get_target_tcp_pose", "get_target_waypoint", "get_actual_tool_flange_pose"):
+        tool = NamedFrame("flange", np.eye(4)) if name.endswith("flange_pose") else _tool(memory)
+        seen = memory.here.seen(tool, ROBOT_BASE, memory.cell.flange)
         return None if seen is None else _record(seen)
+    if name == "get_tcp_offset":
+        offset = _tool(memory).pose
+        return None if offset is None else _record(offset)
     if name == "get_forward_kin" and memory.cell.flange is not None:
-        joints = _joints(values[0]) if values and values[0] is not None else memory.here.joints
-        tool = _tool(memory).pose
-        if joints is not None and tool is not None:
-            return _record(memory.cell.flange(joints) @ tool)
+        joints = _joints(given["q"]) if "q" in given else memory.here.joints
+        tool_pose = _pose(given["tcp"]) if "tcp" in given else _tool(memory).pose
+        if joints is not None and tool_pose is not None:
+            return _record(memory.cell.flange(joints) @ tool_pose)
+    if name == "get_inverse_kin" and isinstance(pose := given.get("x"), Record):
+        near = given.get("qnear", () if memory.here.joints is None else tuple(map(float, memory.here.joints)))
+        tool_value = given.get("tcp", _tool_value(memory))
+        plain = isinstance(near, Unclear) or near == () or _joints(near) is not None
+        if plain and (tool_value is None or _pose(tool_value) is not None):
+            return Solved(pose, near, tool_value, memory.here.key())
     return None
 
 
-def _of_vector(name: str, values: list[Value | None]) -> Value | None:
-    """The length of a list of numbers, and the list over its length."""
-    given = values[0] if len(values) == 1 else None
-    plain = numbers(given) if isinstance(given, tuple) else numbers((given,))
+def _changed(values: list[Value | None], unclear: Unclear) -> Value:
+    """A list behind one of its methods, whose name is the second argument."""
+    found, name, *more = (Unclear("") if each is None else each for each in values)
+    if isinstance(found, tuple) and len(found) < LONGEST_LIST:
+        if name == "append" and len(more) == 1:
+            return (*found, more[0])
+        if name == "clear" and not more:
+            return ()
+    return unclear
+
+
+def _of_lists(name: str, given: dict[str, Value]) -> Value | None:
+    """The number of a list's elements, its length as a vector, and the list over that; a list of one value."""
+    value = given.get("v", given.get("a"))
+    if name in ("length", "get_list_length", "size"):
+        return len(value) if isinstance(value, (tuple, str)) else None
+    if name == "make_list":
+        count = number(given.get("length"))
+        fits = count is not None and count == int(count) and 0 <= count <= LONGEST_LIST
+        return (given["initial_value"],) * int(count or 0) if fits and "initial_value" in given else None
+    if name not in ("norm", "normalize"):
+        return None
+    parts = value.values() if isinstance(value, Record) and name == "norm" else value
+    plain = numbers(parts) if isinstance(parts, tuple) else numbers((parts,))
     size = None if not plain else math.hypot(*plain)
     if not plain or size is None or not math.isfinite(size):
         return None
     return size if name == "norm" else tuple(each / size for each in plain) if size > 0 else None
 
 
-def _of_poses(name: str, values: list[Value | None], keywords: dict[str, Value]) -> Value | None:
-    """Functions of poses."""
+def _of_poses(name: str, given: dict[str, Value]) -> Value | None:
+    """Functions of poses, as the manual defines them [1]_.
+
+    What it leaves open has no value: how ``pose_dist`` weighs turns against lengths, and in which frame ``pose_sub``
+    turns (R_to R_from' and R_from' R_to are both read into it), unless both give the same.
+
+    References
+    ----------
+    .. [1] Universal Robots, *Script manual*, module urmath.
+    """
+    values = [given[key] for key in SIGNATURES.get(name, ()) if key in given]
     if name in ("rpy2rotvec", "rotvec2rpy") and values and isinstance(values[0], tuple):
         plain = numbers(values[0])
         if plain is not None and len(plain) == 3 and finite(plain):
@@ -306,7 +482,7 @@ def _of_poses(name: str, values: list[Value | None], keywords: dict[str, Value])
                 turn = rpy_of(scipy.spatial.transform.Rotation.from_rotvec(plain).as_matrix())
             return tuple(map(float, turn))
     poses = [pose for pose in map(_pose, values) if pose is not None]
-    if name == "pose_inv" and len(poses) == 1:
+    if name in ("pose_inv", "inv") and len(poses) == 1:
         return _record(np.asarray(np.linalg.inv(poses[0]), np.float64))
     if len(poses) != 2:
         return None
@@ -314,14 +490,19 @@ def _of_poses(name: str, values: list[Value | None], keywords: dict[str, Value])
     match name:
         case "pose_trans":
             return _record(a @ b)
-        case "pose_add" | "pose_sub":
+        case "pose_add":
             found = a.copy()
-            sign = 1 if name == "pose_add" else -1
-            found[:3, 3] += sign * b[:3, 3]
-            found[:3, :3] = (b[:3, :3] if sign > 0 else b[:3, :3].T) @ a[:3, :3]
+            found[:3, 3] += b[:3, 3]
+            found[:3, :3] = a[:3, :3] @ b[:3, :3]
             return _record(found)
+        case "pose_sub":
+            found = a.copy()
+            found[:3, 3] -= b[:3, 3]
+            found[:3, :3] = a[:3, :3] @ b[:3, :3].T
+            same = np.abs(found[:3, :3] - b[:3, :3].T @ a[:3, :3]).max() < SAME_TURN
+            return _record(found) if same else None
         case "interpolate_pose":
-            share = number(values[2] if len(values) > 2 else keywords.get("alpha"))
+            share = number(given.get("alpha"))
             if share is None or not math.isfinite(share):
                 return None
             turn = scipy.spatial.transform.Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()
@@ -331,7 +512,4 @@ def _of_poses(name: str, values: list[Value | None], keywords: dict[str, Value])
             return _record(found)
         case "point_dist":
             return float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
-        case "pose_dist":
-            turn = scipy.spatial.transform.Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()
-            return float(np.linalg.norm([*(a[:3, 3] - b[:3, 3]), *turn]))
     return None

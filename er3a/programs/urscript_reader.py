@@ -16,22 +16,26 @@ from er3a.programs.syntax import (
     POSE_KEYS,
     START,
     Assign,
+    Beside,
     Call,
     Constant,
     Doing,
     Expression,
-    Fixed,
     Halt,
     Invocation,
     Listed,
     Move,
     Opaque,
+    Operation,
     Program,
     Record,
     Return,
     Routine,
     RoutineParameter,
+    Variable,
     Waiting,
+    expressions_of,
+    inner,
 )
 
 UR = Lexicon(
@@ -54,8 +58,15 @@ UR = Lexicon(
 )
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
 LONGEST_STATEMENT = 500  # lines
+THREAD = "%thread"
+"""What a variable holds that a thread was started with, as a function."""
+CHANGED = "%changed"
+"""What a list is behind a method that changes it, as a function of itself, the method's name and its arguments."""
+LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
 
 
+OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
+"""With what a line ends whose statement goes on in the next."""
 PLAIN = re.compile(
     rf"(mov[ejlp]+)\((p?)\[((?:\s*[-+]?{NUMBER}\s*,){{5}}\s*[-+]?{NUMBER}\s*)\]((?:\s*,\s*[avtr]\s*=\s*[-+]?{NUMBER})*)\s*\)$"
 )
@@ -112,7 +123,7 @@ class UrWords(Words):
 
 
 def read_urscript(source: ProgramText) -> Program:
-    """The program of a .script file: its statements, or its first routine that no other calls.
+    """The program of a .script file: its statements, or else the first of its outermost routines that no other calls.
 
     Raises
     ------
@@ -137,6 +148,7 @@ class _UrReader:
     def __init__(self, source: ProgramText):
         self.source = source
         self.routines: list[Routine] = []
+        self.outermost: list[str] = []
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
 
     def read(self) -> list[Routine]:
@@ -153,15 +165,19 @@ class _UrReader:
                 builder.routine(place)
             raise fault(builder.place, f"{builder.name} has no end", "Close it with end")
         top = self.open[0]
-        if not any(isinstance(each, (Doing, Move, Call)) for each in top.code):
-            called = {name for each in self.routines for name in _called(each)}
-            starts = [each for each in self.routines if not each.thread and each.name not in called]
+        names = {each.name for each in self.routines}
+        if not any(isinstance(each, Move) or names & set(_called(each)) for each in top.code):
+            called = {
+                name for each in self.routines for step in each.code for name in _called(step) if name != each.name
+            }
+            outermost = [each for each in self.routines if each.name in self.outermost and not each.thread]
+            starts = [each for each in outermost if each.name not in called] or outermost
             if starts:
                 top.add(Call(starts[0].place, starts[0].name, (), (), starts[0].name, START))
         return [*self.routines, top.routine(place)]
 
     def _statements(self) -> Iterator[tuple[Place, str, str]]:
-        """Statements with their first line: lines are joined while a bracket is open."""
+        """Statements with their first line: lines are joined while a bracket is open, or behind an operator."""
         parts: list[str] = []
         depth, first = 0, 0
         for number, line in enumerate(self.source.lines, 1):
@@ -170,7 +186,8 @@ class _UrReader:
                 first = number
             depth += change
             place = Place(self.source.path, first)
-            if depth > 0 and number - first < LONGEST_STATEMENT:
+            goes_on = depth > 0 or (depth == 0 and bool(OPEN_END.search(text)) and number < len(self.source.lines))
+            if goes_on and number - first < LONGEST_STATEMENT:
                 parts.append(text)
                 continue
             if depth != 0:
@@ -191,9 +208,9 @@ class _UrReader:
         try:
             self._read(builder, UrWords(text.removesuffix(";")), place, text)
         except MisreadError:
-            if re.match(r"(def|thread|sec|if|while|elif|else)\b.*:$", text):
+            if text.endswith(":"):  # of a block, without which the lines behind would mean something else
                 raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
-            builder.unknown(place, text)
+            builder.unread(place, text)
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
@@ -216,7 +233,10 @@ class _UrReader:
             (builder.leave_loop if first == "break" else builder.next_round)(place)
         elif first == "halt":
             builder.add(Halt(place))
-        elif first in ("run", "join", "kill", "enter_critical", "exit_critical", "pass") and follows not in ("=", "("):
+        elif first == "run" and follows not in ("=", "("):
+            words.take()
+            _run(builder, words, place, text)
+        elif first in ("join", "kill", "enter_critical", "exit_critical", "pass") and follows not in ("=", "("):
             builder.aside(place, text)
         else:
             _plain(builder, words, place, text)
@@ -247,6 +267,8 @@ class _UrReader:
             raise fault(place, "an end without a beginning", "Remove it")
         self.routines.append(builder.routine(place))
         self.open.pop()
+        if len(self.open) == 1:
+            self.outermost.append(builder.name)
 
 
 def _plain_motion(place: Place, plain: re.Match[str]) -> Move:
@@ -316,12 +338,15 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
     scope = words.take() if words.next in ("global", "local") and words.kinds[words.at + 1] == "name" else ""
     left = words.expression()
     if words.accept("="):
-        if words.next == "run":
-            builder.aside(place, text)
-            return
-        value = words.expression()
+        started = words.next == "run" and words.texts[words.at + 1] not in ("", "(")
+        if started:
+            words.take()
+            _run(builder, words, place, text)
+        value = Invocation(THREAD, ()) if started else words.expression()
         words.finish()
         builder.add(Assign(place, left, value, text, "global" if scope == "global" else "", scope == "local"))
+        if isinstance(value, Invocation):
+            _method(builder, value, place, text)
         return
     words.finish()
     if scope:
@@ -332,12 +357,35 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
         builder.add(Move(place, left.function, left.arguments, text, (), left.keywords))
     elif left.function == "sleep" and len(left.arguments) == 1:
         builder.add(Waiting(place, "seconds", left.arguments[0], text))
-    else:
+    elif not _method(builder, left, place, text):
         builder.add(Doing(place, left, text))
 
 
-def _called(routine: Routine) -> Iterator[str]:
-    """Functions that a routine calls as statements or in expressions."""
-    for operation in routine.code:
-        if not isinstance(operation, Fixed):
-            yield from re.findall(r"\w+(?=\s*\()", getattr(operation, "text", ""))
+def _run(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
+    """``run name(...)``: a thread."""
+    what = words.expression()
+    words.finish()
+    if not isinstance(what, Invocation):
+        raise MisreadError("no thread is named")
+    builder.beside(place, what, text, "thread")
+
+
+def _method(builder: CodeBuilder, call: Invocation, place: Place, text: str) -> bool:
+    """A method that changes its list; False if the call is none."""
+    name, _, method = call.function.partition(".")
+    if method not in LIST_METHODS:
+        return False
+    builder.add(
+        Assign(place, Variable(name), Invocation(CHANGED, (Variable(name), Constant(method), *call.arguments)), text)
+    )
+    return True
+
+
+def _called(operation: Operation) -> Iterator[str]:
+    """Functions that an operation calls, or runs beside it."""
+    waiting = [*expressions_of(operation), *((operation.what,) if isinstance(operation, Beside) else ())]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, Invocation):
+            yield each.function
+        waiting += inner(each)

@@ -26,6 +26,7 @@ from er3a.programs.instructions import (
     Instruction,
     JointTarget,
     Listing,
+    MovesBeside,
     NamedFrame,
     Output,
     Pause,
@@ -437,7 +438,7 @@ class Writer(ABC):
                 self._remark(text)
             case Disabled(text=text):
                 self.comment(f"disabled: {text}")
-            case Aside(text=text) | Unknown(text=text):
+            case Aside(text=text) | Unknown(text=text) | MovesBeside(text=text):
                 self._foreign(text, self.own)
             case Pause(condition=condition):
                 if condition is None or self.own:

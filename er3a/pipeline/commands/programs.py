@@ -123,13 +123,14 @@ def write(
         bool, typer.Option("--unsafe", help="write paths that are not safe too, and say so in the file")
     ] = False,
 ):
-    """Write the paths of a file as programs; paths that are not safe are refused."""
+    """Write the paths of a file as programs; exit code 1 where one is refused as not safe, or loses a motion."""
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
     from er3a.pipeline.messages.expectations import outcome_word
     from er3a.pipeline.messages.programs import say
     from er3a.pipeline.program_reports import programs_of
     from er3a.pipeline.progress import shown_work
+    from er3a.programs.program_findings import TargetsLeftOut
 
     arm = load_robot(robot)
     refused = 0
@@ -146,6 +147,7 @@ def write(
             print(f"{file}: written")
         for finding in made.findings:
             print_note(f"{made.name}: {say(finding)}")
+        refused += any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
     if refused:
         raise typer.Exit(1)
 

@@ -144,7 +144,8 @@ def verdicts(
         columns = ("robot", "stage", "verdict", Column("finding", overflow="fold"))
         table = Table(*columns, box=box.SIMPLE, padding=0)
         for each in found:
-            table.add_row(each.robot, each.stage, each.status.replace("_", " "), Text(each.text))
+            expected = ", as expected" if each.is_demonstration else ""
+            table.add_row(each.robot, each.stage, each.status.replace("_", " ") + expected, Text(each.text))
         Console().print(table)
     if fail_on:
         _end_with_findings(found, fail_on)
@@ -155,8 +156,12 @@ def _end_with_findings(found: Sequence[StageVerdict], level: FailOn) -> None:
     counted = [verdict for verdict in found if verdict.counts(level.value)]
     if unknown := sum(verdict.status == NOT_EXAMINED for verdict in found):
         print_note(f"not examined, and neither passed nor failed: {unknown} of {len(found)} stages")
+    if shown := [f"{verdict.robot}, {verdict.stage}" for verdict in found if verdict.is_demonstration]:
+        print_note(f"as expected, and counted apart: {'; '.join(shown)}")
     for verdict in counted:
-        print_note(f"{verdict.robot}, {verdict.stage} ({verdict.status.replace('_', ' ')}): {verdict.text}")
+        status = verdict.status.replace("_", " ")
+        expected = f"; expected: {verdict.expected}" if verdict.is_otherwise else ""
+        print_note(f"{verdict.robot}, {verdict.stage} ({status}{expected}): {verdict.text}")
     if counted:
         raise typer.Exit(1)
 

@@ -71,6 +71,9 @@ REMEDIES: dict[str, str] = {
     "arrives_otherwise": N_("Teach the target again where the line arrives, or go there by a joint move."),
     "turns_at_start": N_("Turn the joint by a joint move first, or begin the line beside the singular pose."),
     "turn_not_met": N_("Correct the target's Turn (T), or teach the target again."),
+    "configuration_guessed": N_("Give start_deg of the program, or begin with a move to joint angles."),
+    "moves_beside": BY_HAND,
+    "never_reached": N_("Remove this motion, or check what leads to it as a program of its own."),
     "motion_collides": N_(
         "Go round by a via point, take another configuration or tool orientation, or move what stands in the way."
     ),
@@ -114,6 +117,7 @@ STOPPED: dict[EndKind, str] = {
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
 }
+MOST_PAIRS = 3  # that are named of a collision
 FIGURES = {
     "programs_passed": N_("Programs that pass"),
     "instructions_passed": N_("Motion instructions that pass"),
@@ -146,6 +150,21 @@ TEXTS = texts(
         "turn_not_met": "no solution within the limits has the signs that T {turn} asks for; the nearest was taken",
         "configuration_not_read": (
             "the meaning of the configuration {text} is not known; the solution nearest to the joints before was taken"
+        ),
+        "configuration_guessed": (
+            "where the arm comes from is not known: of {solutions} solutions the one nearest to 0 was taken, and what "
+            "follows is checked from there"
+        ),
+        "moves_beside": by(
+            "kind",
+            thread=(
+                "the thread {routine} moves the arm while the program goes on; its motions and the program's were "
+                "checked apart"
+            ),
+            interrupt=(
+                "the interrupt {routine} can move the arm at any time; its motions were checked apart, from where it "
+                "is not known"
+            ),
         ),
         "zone_collides": "a corner path that the blending zone allows collides: {pair}, {depth_mm:.1f} mm deep",
         "zone_not_settled": (
@@ -197,8 +216,10 @@ TEXTS = texts(
         "arrives_otherwise": (
             "the arm arrives in other joint angles than the target's: J{joint} differs by {difference_deg:.2f} {unit}"
         ),
-        "motion_collides": "collision after {at:.1f} mm of {pairs}, {depth:.1f} mm deep",
-        "motion_collides.joint": "collision of {pairs}, {depth:.1f} mm deep",
+        "motion_collides": "collision: {touches}",
+        "motion_collides.more": "collision: {touches}; and more later",
+        "bodies_touch": "{pair} after {at_mm:.1f} mm, {depth_mm:.1f} mm deep",
+        "bodies_touch.joint": "{pair} after {t_s:.2f} s, {depth_mm:.1f} mm deep",
         "arc_goes_on": "the arc ends after {angle_deg:g} deg, not at its target",
         "arc_goes_on.unknown": "the angle at which the arc ends is not known; the arc was not checked",
         "arc_goes_on.turns": (
@@ -363,10 +384,17 @@ def _(found: found_in.ArrivesOtherwise) -> str:
 
 @say.register
 def _(found: found_in.MotionCollides) -> str:
-    parts = {"pairs": joined(listed(found.pairs[:2])), "depth": found.depth_mm}
+    parts = {"touches": joined(listed(found.touches[:MOST_PAIRS]))}
+    if len(found.touches) > MOST_PAIRS:
+        return sentence("motion_collides.more", **parts)
+    return say_as(found, **parts)
+
+
+@say.register
+def _(found: found_in.BodiesTouch) -> str:
     if found.at_mm is None:
-        return sentence("motion_collides.joint", **parts)
-    return say_as(found, at=found.at_mm, **parts)
+        return sentence("bodies_touch.joint", pair=say(found.pair), depth_mm=found.depth_mm, t_s=found.t_s)
+    return say_as(found)
 
 
 @say.register

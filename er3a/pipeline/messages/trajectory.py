@@ -8,7 +8,7 @@ from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
-from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, joined, listed, say, sentence, texts, word
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
     Jump,
@@ -88,8 +88,8 @@ TEXTS = texts(
         "path.jump": "the branch in use ends at t = {t:.4g} s, J{joint} would jump",
         "path.stretch": "{when}: {cause}",
         "path.when": "from t = {start:.4g} to {end:.4g} s",
-        "bodies_overlap": "{pairs} overlap, up to {depth:.1f} mm at t = {t:.4g} s",
-        "bodies_overlap.more": "{pairs} and more",
+        "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
+        "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
@@ -188,7 +188,7 @@ def _apart_from_collisions(path: PathSummary) -> str:
         return joined([say(path.no_way), shown])
     if path.unreachable:
         return joined(map(_when, path.unreachable))
-    if faults := path.out_of_limits or _worst(path.too_fast):
+    if faults := path.out_of_limits or _first_and_worst(path.too_fast):
         return joined([*map(say, faults), *map(say, path.singularities), _at_another_pace(path)])
     if path.undecided:
         return joined([*map(say, path.undecided), *map(say, path.singularities)])
@@ -204,12 +204,13 @@ def _apart_from_collisions(path: PathSummary) -> str:
     return sentence("path.safe")
 
 
-def _worst(stretches: tuple[Stretch[RateCause], ...]) -> list[Stretch[RateCause]]:
-    """Of each kind of limit the stretch that exceeds it most."""
-    found: dict[str, Stretch[RateCause]] = {}
-    for part in sorted(stretches, key=lambda stretch: stretch.cause.ratio, reverse=True):
-        found.setdefault(part.cause.code, part)
-    return list(found.values())
+def _first_and_worst(stretches: tuple[Stretch[RateCause], ...]) -> list[Stretch[RateCause]]:
+    """Of each kind of limit the stretch that exceeds it first and, if it is another, the one that exceeds it most."""
+    found: list[Stretch[RateCause]] = []
+    for code in dict.fromkeys(part.cause.code for part in stretches):
+        alike = [part for part in stretches if part.cause.code == code]
+        found += [min(alike, key=lambda part: part.t0_s), max(alike, key=lambda part: part.cause.ratio)]
+    return sorted(dict.fromkeys(found), key=lambda part: part.t0_s)
 
 
 def _at_another_pace(path: PathSummary) -> str:
@@ -263,11 +264,10 @@ def _when(stretch: Stretch) -> str:  # type: ignore[type-arg]
 
 @say.register
 def _(found: BodiesOverlap) -> str:
-    pairs = joined(listed(found.pairs[:MOST_PAIRS]), ", ")
-    if len(found.pairs) > MOST_PAIRS:
-        pairs = sentence("bodies_overlap.more", pairs=pairs)
-    worst = {"pairs": pairs, "depth": found.depth_mm, "t": found.t_s}
-    return say_as(found, **worst)
+    touches = joined(listed(found.touches[:MOST_PAIRS]))
+    if len(found.touches) > MOST_PAIRS:
+        return sentence("bodies_overlap.more", touches=touches)
+    return touches
 
 
 def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-arg]

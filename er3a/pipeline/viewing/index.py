@@ -402,7 +402,8 @@ def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
     """Write the report.
 
     A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
-    to the robot or has not been computed yet, are skipped; a caution passes and tells what it found.
+    to the robot or has not been computed yet, are skipped; a caution passes and tells what it found. What fails as it
+    is meant to is no failure, and is told as a demonstration; what the study expects otherwise is a failure.
     """
     root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
     for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
@@ -421,14 +422,27 @@ def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
     text = _NO_XML.sub("?", verdict.text)
     if outcome := _outcome(verdict):
         ElementTree.SubElement(case, outcome, message=text, type=verdict.code)
-    if verdict.status == "caution":
-        ElementTree.SubElement(case, "system-out").text = f"caution: {text}"
+    told = []
+    if verdict.is_demonstration:
+        told.append(f"demonstration, {verdict.status} as expected: {text}")
+    elif verdict.status == "caution":
+        told.append(f"caution: {text}")
+    if verdict.demonstrations:
+        told.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
+    if verdict.is_otherwise:
+        told.append(f"expected: {verdict.expected}")
+    if told:
+        ElementTree.SubElement(case, "system-out").text = "\n".join(told)
 
 
 def _outcome(verdict: StageVerdict) -> str | None:
     """The element that says how a case ended; None where it passed."""
     if verdict.broken:
         return "error"
+    if verdict.is_otherwise:
+        return "failure"
+    if verdict.is_demonstration:
+        return None
     return {
         "fail": "failure",
         "no_reference": "skipped",
@@ -496,11 +510,20 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     ]
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     shown = sorted(heads.values(), key=lambda head: FIRST.index(head.status))
+    meant = [  # to fail, or to hold what fails: these are counted apart from what passes
+        head.stage
+        for head in shown
+        if (head.demonstrations and head.status == "pass")
+        or (head.status in ("caution", "fail") and head.status == expected.get(head.stage))
+    ]
     return {
         "robot": study.robot(name),
         "table": table,
         "heads": [(head, *page.led(head.text)) for head in shown],
-        "counts": [(status, sum(head.status == status for head in shown)) for status in FIRST],
+        "counts": [
+            (status, sum(head.status == status and head.stage not in meant for head in shown)) for status in FIRST
+        ],
+        "demonstrations": len(meant),
         "expected": expected,
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "decision": decision(

@@ -116,7 +116,7 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         cycle=check.cycle,
         least_clearance_mm=min(clear, default=None),
         findings=tuple(_finding_at(each, starts) for each in found),
-        not_examined=tuple(sorted({each.place.line for each in check.not_examined})),
+        not_examined=tuple(sorted({each.place.line for each in check.not_examined if each.what != "way"})),
     )
 
 

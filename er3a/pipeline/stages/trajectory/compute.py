@@ -70,6 +70,7 @@ from er3a.robots.joint_limits import shown, within
 from er3a.robots.robot import Robot
 
 LEAST_RATIO = 1e-3  # of the limits, below which a path counts as standing still
+FAULTS: tuple[PathVerdict, ...] = ("unreachable", "none found", "leaves limits", "collides", "too fast")
 ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
 
@@ -478,7 +479,8 @@ def _verdict(
 
     safe, count = len(named("safe")), len(asked) + len(skipped)
     finding = AllSafe if safe == count else SomeUnsafe if safe else NoneSafe
-    status: Status = "pass" if safe == count else "caution" if safe else "fail"
+    failed = any(_fails(path) for path in asked)
+    status: Status = "pass" if safe == count else "fail" if failed or not safe else "caution"
     counts = finding(
         paths=count,
         safe=safe,
@@ -495,6 +497,11 @@ def _verdict(
         not_followed=tuple(path.name for path in skipped),
     )
     return Verdict(status, counts)
+
+
+def _fails(path: PathSummary) -> bool:
+    """Whether a path can't be run as it is: it collides, leaves limits, or no joints follow it."""
+    return path.verdict in FAULTS or (path.verdict == "singular" and (bool(path.jumps) or not path.joint_speed_bounded))
 
 
 def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tuple[Figure, ...]:

@@ -13,7 +13,7 @@ from er3a.collision.bodies import Bodies
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.stages.trajectory.model import BodiesOverlap, Clearances, LeastClearance
+from er3a.pipeline.stages.trajectory.model import BodiesOverlap, Clearances, LeastClearance, PairTouches
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import (
     AccelerationTooGreatIfAssumed,
@@ -222,7 +222,13 @@ def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
 def collisions(along: ClearanceAlong) -> list[Interval[BodiesOverlap]]:
     """Stretches of overlap."""
     return [
-        Interval(contact.start, contact.end, BodiesOverlap(contact.pairs, contact.depth * 1000, contact.at))
+        Interval(
+            contact.start,
+            contact.end,
+            BodiesOverlap(
+                tuple(PairTouches(each.pair, each.start, each.depth * 1000, each.at) for each in contact.touches)
+            ),
+        )
         for contact in along.contacts
     ]
 

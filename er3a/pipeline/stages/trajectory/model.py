@@ -144,13 +144,27 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class BodiesOverlap:
-    """What overlaps, the deepest first, and by how much at most."""
+class PairTouches:
+    """Two bodies that overlap: from when on, and by how much at most, at what time."""
 
-    pairs: tuple[Pair, ...]
+    pair: Pair
+    t0_s: float
     depth_mm: float
     t_s: float
+    code: Literal["pair_touches"] = "pair_touches"
+
+
+@dataclass(frozen=True)
+class BodiesOverlap:
+    """What overlaps, the first to touch first."""
+
+    touches: tuple[PairTouches, ...]
     code: Literal["bodies_overlap"] = "bodies_overlap"
+
+    @property
+    def depth_mm(self) -> float:
+        """The greatest overlap of all."""
+        return max(each.depth_mm for each in self.touches)
 
 
 @dataclass(frozen=True)
