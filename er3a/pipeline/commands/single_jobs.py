@@ -141,6 +141,24 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
             write_checksum(reports / page)
 
 
+@app.command(rich_help_panel=JOBS)
+def article(
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Write the page on the article of a study that names its tables, in every language, and its numbers."""
+    from er3a.pipeline.article.page import write_article
+    from er3a.pipeline.results import write_checksum
+
+    shown = _study_to_show(study)
+    if shown.article is None:
+        raise Er3aError(f"{study}: article: missing. Name the tables to compare: printed, corrected and real")
+    write_article(shown, results, reports)
+    for page in shown.article_pages().values():
+        write_checksum(reports / page)
+
+
 def _study_to_show(file: Path) -> Study:
     """A study whose language is the one that pages are written in from here on."""
     study = load_study(file)
