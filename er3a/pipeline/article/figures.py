@@ -90,7 +90,9 @@ def _reach(
             axes.plot(*np.array(arc).T, color=colour, linewidth=1)
         if own.void_mm and own.void_litres:
             axes.plot(np.hypot(*own.void_mm[:2]), own.void_mm[2], "*", color=HIGHLIGHT, markersize=11)
-            text = tr("void of {low} to {high} L", low=fixed(own.void_litres[0], 1), high=fixed(own.void_litres[1], 1))
+            text = tr(
+                "void of {low} to {high} L", low=number(own.void_litres[0], 3), high=number(own.void_litres[1], 3)
+            )
             axes.annotate(text, (np.hypot(*own.void_mm[:2]), own.void_mm[2]), (8, 8), textcoords="offset points")
         axes.set(title=name, xlabel=tr("distance from axis 1 (mm)"), aspect="equal")
     panels[0].set_ylabel("z (mm)")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup, escape
 
 from er3a.files.kept_files import write_atomically
 from er3a.geometry.transforms import translation
@@ -35,7 +36,23 @@ from er3a.robots.robot import Robot
 APART_M = 1.8  # between two arms that stand side by side
 LANGUAGE_NAMES = {"en": "English", "zh": "中文"}
 STATUS_OF_STAGES = ("collision", "programs", "vision", "dynamics")
-ERRORS = "circle_error_mm missed_after_mm residual_mm round_trip_deg shifted_apart_mm same_pose_apart".split()
+PAGES = {
+    **dict.fromkeys(("teach", "wrist", "same_as_teach"), "teach"),
+    **dict.fromkeys(("zero_pose", "offset", "key_poses", "round_trip", "units"), "validation"),
+    **dict.fromkeys(("target", "ikine", "ikcon", "unreachable", "eight", "choice", "poor_solver"), "inverse"),
+    **dict.fromkeys(("cloud", "void", "hole"), "workspace"),
+    **dict.fromkeys(("jtraj", "animation", "ctraj", "line_singular", "condition", "avoidance"), "trajectory"),
+}
+"""The page of the printed table that shows more of an item, by the item's code."""
+EXAMPLE_DEG = "0,45,-30,0,60,0"
+ERRORS = (
+    "circle_error_mm",
+    "missed_after_mm",
+    "residual_mm",
+    "round_trip_deg",
+    "shifted_apart_mm",
+    "same_pose_apart",
+)
 BADGES = {"agrees": "pass", "differs": "fail", "in_part": "caution", "not_examined": "no_reference", "done": "done"}
 ROLES = {
     "printed": N_("the article's table"),
@@ -52,11 +69,12 @@ class Row:
     code: str
     title: str
     says: str
-    finds: str
+    finds: Markup
     how: str
     why: str
     status: str
     badge: str
+    page: str
 
 
 def write_article(study: Study, results: Path, folder: Path) -> None:
@@ -98,8 +116,7 @@ def _write(study: Study, results: Path, numbers: ArticleNumbers, output: Path, o
         table_columns=["i>", "a (mm)>", "α (°)>", "d (mm)>", tr("offset (°)>"), tr("limits (°)>")],
         table_rows=[_dh_rows(study.robot(name)) for name in tables.names],
         drawn=drawn,
-        places=places,
-        of_section={"2.2": [], "3.2": ["wrist"], "5.1": [], "5.2": ["move", "line", "measures"]},
+        of_section={"3.2": ["wrist"], "5.2": ["move", "line", "measures"]},
         player=_player(study, results, tables),
         player_style=player_style(),
     )
@@ -118,12 +135,28 @@ def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str
             item.code,
             tr(item.title),
             tr(item.says),
-            tr(item.finds, **parts) if not item.finds.startswith("{stage_") else parts[f"stage_{item.code}"],
+            _with_code(parts.get(f"stage_{item.code}") or tr(item.finds, **parts)),
             item.how,
             tr(item.why, **parts) if item.why and status != "agrees" else "",
             status,
             BADGES[status],
+            _page_on(study.article, item.code) if study.article else "",
         )
+
+
+def _page_on(tables: ArticleTables, code: str) -> str:
+    """The address of the page that shows more of an item; empty where there is none."""
+    if code in STATUS_OF_STAGES:
+        return f"{tables.real}/{code}.html"
+    place = f"#q={EXAMPLE_DEG}" if code == "same_as_teach" else ""
+    return f"{tables.printed}/{PAGES[code]}.html{place}" if code in PAGES else ""
+
+
+def _with_code(text: str) -> Markup:
+    """A text whose words in backticks are code."""
+    plain, *rest = text.split("`")
+    parts = [Markup("<code>{}</code>").format(part) if k % 2 == 0 else escape(part) for k, part in enumerate(rest)]
+    return escape(plain) + Markup("").join(parts)
 
 
 def _status_of_stage(study: Study, results: Path, item: Item) -> str:

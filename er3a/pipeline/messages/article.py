@@ -66,7 +66,7 @@ ITEMS = (
     Item(
         "convention",
         "2.2",
-        'er3a.load_table("table.csv")',
+        'er3a.load_robot("table.csv", convention="modified")',
         N_("Standard or modified"),
         N_("Manuals use either convention; find out which."),
         N_(
@@ -147,7 +147,7 @@ ITEMS = (
             "As printed the tool stands at z = {p_tool_z:.0f} mm: {hidden_percent:.0f} % of the arm's length is "
             "outside that window (figure {figure_zero}). With offset 2 = −90° it is at {c_tool_z:.0f} mm."
         ),
-        N_("The window hides most of the arm; that alone shows that the table is not the arm described."),
+        N_("The window hides the forearm and the tool: the table is not the arm described."),
     ),
     Item(
         "teach",
@@ -202,7 +202,7 @@ ITEMS = (
     Item(
         "same_as_teach",
         "4.1",
-        "teach.html#q=0,45,-30,0,60,0",
+        "",
         N_("The same in the teach panel"),
         N_("The computed position must agree with what the teach panel shows."),
         N_("Open the example in the panel of this table and compare: both use one table."),
@@ -353,7 +353,7 @@ ITEMS = (
     Item(
         "line_singular",
         "5.2",
-        "er3a/trajectory",
+        "",
         N_("Where the line is singular"),
         N_("A straight line may cross singular regions; the example is played without a remark."),
         N_(

@@ -33,6 +33,7 @@ let last = 0;
 let awaited = false;
 
 const orbit = new Orbit(canvas, data.target, 0.75 * data.width, refresh);
+if (beside.length) orbit.turn(0.7, 0); // arms that stand beside each other along y
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
 const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
   return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };

@@ -168,7 +168,7 @@ def _data(
         "pieces": drawn_pieces(robot),
         "beside": [{"table": table_data(arm), "pieces": drawn_pieces(arm)} for arm in beside],
         "signs": [{"text": text, "at": at.tolist()} for text, at in zip(signs, bases)],
-        "width": size + float(np.ptp(bases, axis=0).max()),
+        "width": max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
         "target": (np.mean(bases, axis=0) + robot.base[:3, 2] * 0.35 * size).tolist(),
         "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, **COLOURS},
         "axes": AXES,
