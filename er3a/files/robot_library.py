@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from pathlib import Path
 from typing import Annotated
@@ -27,6 +26,7 @@ from er3a.files.robot_file import (
 from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel, load
+from er3a.formats.urdf import robot_name
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
@@ -56,8 +56,7 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
 
 def read_table(path: Path, convention: Convention = "standard") -> RobotFile:
     """What a D-H table says, as a robot's file; warns of what had to be assumed."""
-    plain = re.sub(r"[^a-z0-9_]+", "_", path.stem.lower()).strip("_")[:60]
-    content, notes = read_dh_table(path, plain if plain[:1].isalpha() else f"arm_{plain}".rstrip("_"), convention)
+    content, notes = read_dh_table(path, robot_name(path), convention)
     if notes:
         warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=4)
     return content
