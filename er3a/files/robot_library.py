@@ -26,11 +26,10 @@ from er3a.files.robot_file import (
 from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel, load
-from er3a.formats.urdf import robot_name
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
-from er3a.robots.robot import CombinedLimit, Convention, ConvexPiece, Envelope, Grade, Robot, Source
+from er3a.robots.robot import CombinedLimit, Convention, ConvexPiece, Envelope, Grade, Robot, Source, robot_name
 
 ROBOTS = ROOT / "data" / "robots"
 REFERENCES = ROOT / "data" / "manual_refs"

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import update_wrapper
+from pathlib import Path
 from typing import Any, Concatenate, Literal, ParamSpec, TypeVar, get_args
 
 import numpy as np
@@ -338,6 +339,12 @@ def _warn_of_units(robot: Robot) -> None:
 
 def _warn(robot: Robot, problem: str, remedy: str) -> None:
     warnings.warn(f"{robot.name}: {problem}; {remedy}", InputWarning, stacklevel=4)
+
+
+def robot_name(path: Path) -> str:
+    """A name for the robot in a file, from the file's: small letters, digits and underscores, 64 at most."""
+    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower()).strip("_")[:64]
+    return name or "imported"
 
 
 def _placement(T: Reals) -> str:

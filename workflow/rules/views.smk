@@ -134,7 +134,7 @@ if STUDY.article:
             tables=STUDY.article.model_dump(),
             language=LANGUAGE,
             caption=pages.of_article(),
-            code=code_digest("er3a.pipeline.article.page", "er3a.pipeline.messages.article", *all_messages()),
+            code=code_digest("er3a.pipeline.article.article_page", "er3a.pipeline.messages.article", *all_messages()),
         message:
             "write the page on the article"
         shell:

@@ -176,7 +176,7 @@ def article(
     reports: Reports = DEFAULT_REPORTS,
 ):
     """Write the page on the article of a study that names its tables, in every language, and its numbers."""
-    from er3a.pipeline.article.page import write_article
+    from er3a.pipeline.article.article_page import write_article
     from er3a.pipeline.results import write_checksum
 
     shown = _study_to_show(study)

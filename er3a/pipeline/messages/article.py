@@ -16,7 +16,7 @@ class Item:
     code, section : what it is, and where in the article it stands
     how : what does it in er3a, as written in Python or a terminal; empty where nothing does
     title, says, finds : what the article says, and what er3a computes, with fields of
-        :class:`er3a.pipeline.article.numbers.ArticleNumbers`
+        :class:`er3a.pipeline.article.article_numbers.ArticleNumbers`
     why : what is shown unless both agree
     """
 

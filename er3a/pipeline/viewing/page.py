@@ -66,7 +66,7 @@ MARKS = {"figure": N_("Figure {number}"), "table": N_("Table {number}")}
 
 
 @dataclass(frozen=True)
-class Mark:
+class Numbered:
     """What a figure or table is called on its page, and its address there."""
 
     id: str
@@ -79,10 +79,10 @@ class Numbering:
     def __init__(self) -> None:
         self._counts = dict.fromkeys(MARKS, 0)
 
-    def __call__(self, kind: str, name: str = "") -> Mark:
+    def __call__(self, kind: str, name: str = "") -> Numbered:
         self._counts[kind] += 1
         number = self._counts[kind]
-        return Mark(f"{kind}-{name or number}", tr(MARKS[kind], number=number))
+        return Numbered(f"{kind}-{name or number}", tr(MARKS[kind], number=number))
 
 
 @dataclass(frozen=True)

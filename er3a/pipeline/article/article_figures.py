@@ -8,7 +8,7 @@ import numpy as np
 
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.pipeline.article.numbers import (
+from er3a.pipeline.article.article_numbers import (
     CLOUD,
     COMPARED,
     DURATION_S,

@@ -13,8 +13,8 @@ from markupsafe import Markup, escape
 
 from er3a.files.kept_files import write_atomically
 from er3a.geometry.transforms import translation
-from er3a.pipeline.article import figures
-from er3a.pipeline.article.numbers import LINE, MOVE, ArticleNumbers, TableNumbers, agreements, article_numbers
+from er3a.pipeline.article import article_figures
+from er3a.pipeline.article.article_numbers import LINE, MOVE, ArticleNumbers, TableNumbers, agreements, article_numbers
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.article import AGREEMENT, ITEMS, SECTIONS, Item
@@ -62,7 +62,7 @@ ROLES = {
 
 
 @dataclass(frozen=True)
-class Row:
+class ArticleRow:
     """An item as the page shows it; ``status``: code of the agreement, ``badge``: class of its mark."""
 
     number: int
@@ -93,7 +93,7 @@ def write_article(study: Study, results: Path, folder: Path) -> None:
 def _write(study: Study, results: Path, numbers: ArticleNumbers, output: Path, others: dict[str, str]) -> None:
     tables = study.article
     assert tables is not None
-    drawn = figures.draw(study, results, numbers)
+    drawn = article_figures.draw(study, results, numbers)
     order = ["zero", "player", *(name for name in drawn if name != "zero")]
     places = {name: k for k, name in enumerate(order, start=1)}
     rows = list(_rows(study, results, numbers, places))
@@ -126,11 +126,11 @@ def _of_section(section: str) -> list[int]:
     return [k for k, item in enumerate(ITEMS) if item.section == section]
 
 
-def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str, int]) -> Iterator[Row]:
+def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str, int]) -> Iterator[ArticleRow]:
     found, parts = agreements(numbers), _parts(study, results, numbers, places)
     for place, item in enumerate(ITEMS, start=1):
         status = found.get(item.code) or _status_of_stage(study, results, item)
-        yield Row(
+        yield ArticleRow(
             place,
             item.code,
             tr(item.title),
