@@ -22,7 +22,7 @@ from er3a.robots.usable import check_joint_values, check_robot
 Check = Callable[[Any], None]
 Function = TypeVar("Function", bound=Callable[..., Any])
 LOOK_FOR_CROSSED_LIMITS = {"diagnose"}
-JOINT_VALUES = ("q", "q_ref", "q0")
+JOINT_VALUES = ("q", "q_ref", "q0", "q_start")
 CONTAINERS = (Sequence, Mapping)
 CALLED = {str: "a text", Path: "a path", NoneType: "None"}
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from er3a.errors import InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.robot_library import load_robot, robot_of
-from er3a.formats.urdf import robot_name, urdf_table
+from er3a.formats.urdf import urdf_table
 from er3a.formats.xacro import plain_urdf
-from er3a.robots.robot import Convention, Robot
+from er3a.robots.robot import Convention, Robot, robot_name
 
 READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from er3a.errors import InputError
+from er3a.errors import InputError, InputWarning
+from er3a.files.dh_table import read_dh_table
 from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields, masses_of
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import (
@@ -27,24 +29,36 @@ from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
-from er3a.robots.robot import CombinedLimit, ConvexPiece, Envelope, Grade, Robot, Source
+from er3a.robots.robot import CombinedLimit, Convention, ConvexPiece, Envelope, Grade, Robot, Source, robot_name
 
 ROBOTS = ROOT / "data" / "robots"
 REFERENCES = ROOT / "data" / "manual_refs"
 MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
-def load_robot(name_or_path: str | Path) -> Robot:
-    """Load a robot by the name of a file in data/robots, or by a path that ends in .yaml.
+def load_robot(name_or_path: str | Path, convention: Convention = "standard") -> Robot:
+    """Load a robot by the name of a file in data/robots, or by a path that ends in .yaml or .csv.
 
-    A name is looked up below the working folder first, then among the robots that come with er3a.
+    A name is looked up below the working folder first, then among the robots that come with er3a. A .csv holds a D-H
+    table (:mod:`er3a.files.dh_table`), mm and degrees, in the convention given unless it says its own; what had to be
+    assumed is warned of (``er3a.InputWarning``).
 
     Raises
     ------
     InputError
         naming file, field and remedy
     """
+    if str(name_or_path).endswith(".csv"):
+        return robot_of(read_table(Path(name_or_path), convention))
     return robot_of(read_robot(robot_path(name_or_path)))
+
+
+def read_table(path: Path, convention: Convention = "standard") -> RobotFile:
+    """What a D-H table says, as a robot's file; warns of what had to be assumed."""
+    content, notes = read_dh_table(path, robot_name(path), convention)
+    if notes:
+        warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=4)
+    return content
 
 
 def read_robot(path: Path) -> RobotFile:

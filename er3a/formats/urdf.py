@@ -50,7 +50,7 @@ from er3a.geometry.transforms import rot_y, rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
-from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source
+from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source, robot_name
 
 PARALLEL = 1e-12
 NEARLY_PARALLEL = 1e-3  # rad
@@ -569,9 +569,3 @@ def _chain_forward(joints: Sequence[UrdfJoint], values: Reals) -> Reals:
 
 def _words(values: Reals) -> str:
     return " ".join(repr(float(value)) for value in values)
-
-
-def robot_name(path: Path) -> str:
-    """A name for the robot in a file, from the file's: small letters, digits and underscores, 64 at most."""
-    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower()).strip("_")[:64]
-    return name or "imported"

@@ -90,7 +90,7 @@ def characteristic_length(robot: Robot) -> float:
     return arm_length(robot) if closed_form_missing(robot) else wrist_partitioned_arm(robot).wrist_reach
 
 
-def conditioning(robot: Robot, q: Reals, length: float) -> Conditioning:
+def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditioning:
     """Manipulability, condition number and smallest singular value at joint values (..., n) in rad or m.
 
     Of an arm with fewer than six joints the singular values are those of its n columns. Columns of joints that slide
@@ -98,8 +98,10 @@ def conditioning(robot: Robot, q: Reals, length: float) -> Conditioning:
 
     Parameters
     ----------
-    length : characteristic length, m; the linear rows of the Jacobian are divided by it
+    length : characteristic length, m; the linear rows of the Jacobian are divided by it. None for that of
+        :func:`characteristic_length`
     """
+    length = characteristic_length(robot) if length is None else length
     J = jacobian(robot, q)
     J[..., :3, :] /= length
     if robot.sliding.any():

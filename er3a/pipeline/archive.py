@@ -58,7 +58,7 @@ def archive(study_file: Path, results: Path, reports: Path, output: Path) -> int
                 files[Path("reports") / name / f"{stage}.rrd"] = _there(reports / name / f"{stage}.rrd")
         for page in study.pages(name):
             files[Path("reports") / name / f"{page}.html"] = _there(reports / name / f"{page}.html")
-    files |= {Path("reports") / name: _there(reports / name) for name in OVERALL}
+    files |= {Path("reports") / name: _there(reports / name) for name in (*OVERALL, *study.article_pages().values())}
     files |= {Path(name): ROOT / name for name in KEPT if (ROOT / name).is_file()}
     crate = _crate(study.robots)
     for place, file in sorted(files.items()):

@@ -51,7 +51,9 @@ def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path
     These are results, blocks that a run which was cut off has sampled, pages, recordings and previews. Of a stage's
     results it is the summary that is named, without which the stage counts as not done.
     """
-    checks: list[tuple[Path, Callable[[Path], object]]] = [(reports / page, check_checksum) for page in OVERALL]
+    checks: list[tuple[Path, Callable[[Path], object]]] = [
+        (reports / page, check_checksum) for page in (*OVERALL, *study.article_pages().values())
+    ]
     for robot in study.names:
         checks += [(reports / robot / f"{page}.html", check_checksum) for page in study.pages(robot)]
         for stage in study.stages(robot):

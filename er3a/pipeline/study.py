@@ -14,7 +14,7 @@ from er3a.files.annotations import translations_in
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.yaml_file import StrictModel, load, read_yaml
-from er3a.pipeline.messages.language import LanguageCode
+from er3a.pipeline.messages.language import LANGUAGES, LanguageCode
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.sweeps import Sweep, Variant
 from er3a.robots.robot import Robot
@@ -74,6 +74,23 @@ class RobotEntry(StrictModel):
         return self
 
 
+class ArticleTables(StrictModel):
+    """Robots of the study that the page on the article compares.
+
+    ``printed``: with the article's table; ``corrected``: with the entry changed that contradicts the article's own
+    text; ``real``: the arm that the article names.
+    """
+
+    printed: Name
+    corrected: Name
+    real: Name
+
+    @property
+    def names(self) -> tuple[str, str, str]:
+        """The three robots."""
+        return self.printed, self.corrected, self.real
+
+
 class ReportSettings(StrictModel):
     """How pages and recordings are written; no number depends on it."""
 
@@ -87,6 +104,7 @@ class StudyBase(StrictModel):
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
     robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
     sweeps: Annotated[dict[Name, Sweep], Field(max_length=100)] = {}
+    article: ArticleTables | None = None
     report: ReportSettings = ReportSettings()
     _file: Path | None = PrivateAttr(default=None)
 
@@ -110,6 +128,15 @@ class StudyBase(StrictModel):
                     problem = f"sweeps.{name}: '{variant.name}' is too long for a robot's name"
                     raise ValueError(f"{problem} | Give the sweep a shorter name")
                 taken.add(variant.name)
+        return self
+
+    @model_validator(mode="after")
+    def _article_names_robots_of_the_study(self):
+        for role, name in self.article or ():
+            if name not in self.robots:
+                raise ValueError(f"article.{role}: the study has no robot '{name}' | Known: {', '.join(self.robots)}")
+            if (stages := self.robots[name].stages) is not None and "trajectory" not in stages:
+                raise ValueError(f"article.{role}: '{name}' does not go through the stage trajectory | Add it")
         return self
 
     @model_validator(mode="after")
@@ -225,6 +252,13 @@ class StudyBase(StrictModel):
         if key == "dynamics":
             settings["loads"] = [load.model_dump() for load in self.loads(name)]
         return {"seed": self.seed, "robot": entry, key: settings}
+
+    def article_pages(self) -> dict[str, str]:
+        """The files of the page on the article by language, the study's own first; none without ``article``."""
+        if self.article is None:
+            return {}
+        own = self.report.language
+        return {own: "article.html"} | {code: f"article_{code}.html" for code in LANGUAGES if code != own}
 
     def own_titles(self) -> dict[str, str]:
         """People's titles and notes in the language of the pages, by what they translate; none in English."""

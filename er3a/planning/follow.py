@@ -45,7 +45,7 @@ from er3a.kinematics.wrist_partitioned import parallel_axes_arm, solve_slots, wr
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.numerics.runs import runs
-from er3a.planning.moves import ToolPath
+from er3a.planning.moves import ToolPath, check_times
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
@@ -417,12 +417,16 @@ def follow(
 
     Raises
     ------
+    Er3aError
+        for times beyond the line's start or end
     PoseError
         if ``start_slot`` has no solution at the start
     NotWristPartitionedError
         if the arm has no closed form here
     """
-    grid = branches_along(robot, line, np.asarray(t, float))
+    t = np.asarray(t, float)
+    check_times(t, line.duration)
+    grid = branches_along(robot, line, t)
     q = np.full((len(grid.t), 6), np.nan)
     slot = np.full(len(grid.t), -1)
     before, jumps = q_start, []

@@ -16,21 +16,30 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy
 
 from er3a.by_value import ByValue
-from er3a.errors import PoseError
+from er3a.errors import Er3aError, PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import Ends, FromRestToRest, Rates, TimeLaw, quintic
 
 HALF_TURN_TOLERANCE = 1e-9
+BEYOND = 1e-6  # by which times and shares may miss a motion's ends
 
 
+def check_times(t: Reals, duration: float) -> None:
+    """:class:`er3a.Er3aError` for times (...,) in s before 0 or behind the duration; NaN passes."""
+    slack = BEYOND * duration
+    if t.size and (t.min() < -slack or t.max() > duration + slack):
+        raise Er3aError(f"t runs from {t.min():g} to {t.max():g} s; the motion lasts from 0 to {duration:g} s")
+
+
+@runtime_checkable
 class ToolPath(Protocol):
     """A way of the tool in space, and when it is where: what :func:`er3a.planning.follow.follow` can follow.
 
@@ -167,9 +176,18 @@ class Segment(ByValue, ABC):
         bounds = np.stack([linear, [self.turned, 0.0, 0.0, 0.0]], axis=-1)
         return np.broadcast_to(bounds, (len(start), 4, 2))
 
+    def at(self, t: Reals) -> Reals:
+        """T_base_tool (..., 4, 4) at times (...,) in s; :class:`er3a.Er3aError` beyond start and end."""
+        t = np.asarray(t, float)
+        check_times(t, self.duration)
+        return self.poses(self.progress(t)[0])
+
     def poses(self, progress: Reals) -> Reals:
-        """See :class:`ToolPath`."""
+        """See :class:`ToolPath`; :class:`er3a.Er3aError` for shares beyond 0 and 1, such as times in s."""
         progress = np.asarray(progress, float)
+        if progress.size and (progress.min() < -BEYOND or progress.max() > 1 + BEYOND):
+            ends = f"{progress.min():g} to {progress.max():g}"
+            raise Er3aError(f"progress runs from {ends}; expected shares of the way, 0 to 1. At times in s: at(t)")
         return turning_poses(self.T_start, self.points(progress), self.rotation, progress)
 
     def way(self, progress: Reals) -> Reals:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import update_wrapper
+from pathlib import Path
 from typing import Any, Concatenate, Literal, ParamSpec, TypeVar, get_args
 
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, ReadOnly, Sheet, shortly
-from er3a.errors import RobotError, ShapeError
+from er3a.errors import InputWarning, RobotError, ShapeError
 from er3a.geometry.transforms import as_floats, rpy_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.masses import Masses
@@ -203,6 +205,55 @@ class Robot(ByValue, Displayed):
         array.setflags(write=False)
         object.__setattr__(self, key, array)
 
+    @classmethod
+    def from_dh(
+        cls,
+        a: Reals,
+        alpha: Reals,
+        d: Reals,
+        *,
+        offset: Reals | None = None,
+        lower: Reals | None = None,
+        upper: Reals | None = None,
+        convention: Convention = "standard",
+        sliding: Flags | None = None,
+        name: str = "arm",
+        **more: Any,
+    ) -> Robot:
+        """A robot from the columns of a D-H table, in m and rad, joint directions +1.
+
+        Warns (``er3a.InputWarning``) of lengths that can only be mm and of angles that can only be degrees.
+
+        Parameters
+        ----------
+        a, alpha, d : (n,), m and rad
+        offset : (n,), rad; None for 0
+        lower, upper : (n,), rad or m; None for a turn around 0, and for 0 to 1 m where a joint slides
+        convention : "standard" or "modified"
+        sliding : (n,) bool; None for an arm whose joints all turn
+        more : further attributes, such as ``base``, ``tool`` or ``speed``
+
+        Raises
+        ------
+        ShapeError, RobotError
+            as for the class
+        """
+        count = np.size(a)
+        slides = np.zeros(count, dtype=bool) if sliding is None else np.asarray(sliding, dtype=bool)
+        robot = cls(
+            **{"name": name, "title": name, "direction": np.ones(count)} | more,
+            convention=convention,
+            a=a,
+            alpha=alpha,
+            d=d,
+            offset=np.zeros(count) if offset is None else offset,
+            lower=np.where(slides, 0.0, -np.pi) if lower is None else lower,
+            upper=np.where(slides, 1.0, np.pi) if upper is None else upper,
+            sliding=slides,
+        )
+        _warn_of_units(robot)
+        return robot
+
     @property
     def joints(self) -> int:
         """How many joints there are in q, n."""
@@ -272,6 +323,28 @@ class Robot(ByValue, Displayed):
 _OF_ROWS = "a", "alpha", "d", "beta", "direction", "offset"
 _OF_JOINTS = "lower", "upper", "speed"
 _PLACED = "base", "flange", "tool"
+
+
+LONGEST_M, MOST_TURNED = 20.0, 20 * np.pi  # beyond which a number is another unit's
+
+
+def _warn_of_units(robot: Robot) -> None:
+    """Warn of a table that was given in mm or degrees."""
+    turned = np.concatenate([robot.alpha, robot.offset, (robot.upper - robot.lower)[~robot.slides]])
+    if max(np.abs(robot.a).max(), np.abs(robot.d).max()) > LONGEST_M:
+        _warn(robot, f"a link is longer than {LONGEST_M:g} m", "er3a takes m: divide mm by 1000")
+    if np.abs(turned).max() > MOST_TURNED:
+        _warn(robot, "an angle is more than ten turns in rad", "er3a takes rad: np.radians(...)")
+
+
+def _warn(robot: Robot, problem: str, remedy: str) -> None:
+    warnings.warn(f"{robot.name}: {problem}; {remedy}", InputWarning, stacklevel=4)
+
+
+def robot_name(path: Path) -> str:
+    """A name for the robot in a file, from the file's: small letters, digits and underscores, 64 at most."""
+    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower()).strip("_")[:64]
+    return name or "imported"
 
 
 def _placement(T: Reals) -> str:

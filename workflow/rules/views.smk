@@ -104,3 +104,38 @@ rule index:
         "write the index"
     shell:
         "er3a index 2> {log}"
+
+
+if STUDY.article:
+
+    rule article:
+        input:
+            [
+                path.format(robot=robot)
+                for robot in STUDY.article.names
+                for stage in STUDY.stages(robot)
+                for path in results_of(stage)
+            ],
+            [os.path.relpath(STUDY.robot_file(robot)) for robot in STUDY.article.names],
+            os.path.relpath(catalogue_file("zh")),
+        output:
+            "results/article.json",
+            report(
+                [f"reports/{page}" for page in STUDY.article_pages().values()],
+                caption="../report/article.rst",
+                category=tr(pages.ALL_ROBOTS),
+                labels={tr(pages.PAGE): tr(pages.ARTICLE)},
+            ),
+        log:
+            "logs/article.log",
+        conda:
+            "../envs/er3a.yaml"
+        params:
+            tables=STUDY.article.model_dump(),
+            language=LANGUAGE,
+            caption=pages.of_article(),
+            code=code_digest("er3a.pipeline.article.article_page", "er3a.pipeline.messages.article", *all_messages()),
+        message:
+            "write the page on the article"
+        shell:
+            "er3a article 2> {log}"

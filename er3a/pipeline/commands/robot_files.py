@@ -51,8 +51,8 @@ def import_urdf(
     """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
-    from er3a.formats.urdf import robot_name
     from er3a.formats.xacro import plain_urdf
+    from er3a.robots.robot import robot_name
 
     with shown_work(f"{file}: the arm is read") as at, plain_urdf(file, xacro or ()) as plain:
         shown = split and (lambda mesh: at(f"{mesh}: split into convex pieces"))

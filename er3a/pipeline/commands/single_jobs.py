@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -111,18 +112,45 @@ def report(
 
 @app.command(rich_help_panel=JOBS)
 def teach(
-    robot: RobotName,
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study, or a table or URDF")],
     study: StudyFile = DEFAULT_STUDY,
     results: Results = DEFAULT_RESULTS,
     reports: Reports = DEFAULT_REPORTS,
+    output: Annotated[Path | None, typer.Option(help="the page, for a file; else NAME.html")] = None,
 ):
-    """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all IK solutions of it, in one page."""
+    """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all IK solutions of it, in one page.
+
+    A file (.csv with a D-H table, .yaml, .urdf) needs no study: its page is written into this folder.
+    """
+    from er3a.files.arm_file import READ
     from er3a.pipeline.results import write_checksum
     from er3a.pipeline.teach.panel import write_teach_page
 
+    if Path(robot).suffix in READ:
+        _teach_file(robot, output or Path(f"{Path(robot).stem}.html"))
+        return
+    if output is not None:
+        raise Er3aError("--output is for a file; the panel of a robot of the study is one of its pages")
     page = reports / robot / "teach.html"
     write_teach_page(_study_to_show(study), robot, results, page)
     write_checksum(page)
+
+
+def _teach_file(source: str, page: Path) -> None:
+    """Write the panel of an arm that stands in a file."""
+    from er3a.files.arm_file import read_arm
+    from er3a.files.kept_files import sha256
+    from er3a.pipeline.code_digest import code_digest
+    from er3a.pipeline.results import Input, Provenance
+    from er3a.pipeline.teach.panel import write_panel
+
+    arm = read_arm(source)
+    for note in arm.notes:
+        print_note(note)
+    provenance = Provenance((Input(source, sha256(Path(source)), {}),), code_digest(__name__))
+    command = shlex.join(["er3a", "teach", source, "--output", str(page)])
+    write_panel(arm.robot, page, command=command, provenance=provenance)
+    print(f"{page}: written")
 
 
 @app.command(rich_help_panel=JOBS)
@@ -139,6 +167,24 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
         write_index(shown, results, reports)
         for page in OVERALL:
             write_checksum(reports / page)
+
+
+@app.command(rich_help_panel=JOBS)
+def article(
+    study: StudyFile = DEFAULT_STUDY,
+    results: Results = DEFAULT_RESULTS,
+    reports: Reports = DEFAULT_REPORTS,
+):
+    """Write the page on the article of a study that names its tables, in every language, and its numbers."""
+    from er3a.pipeline.article.article_page import write_article
+    from er3a.pipeline.results import write_checksum
+
+    shown = _study_to_show(study)
+    if shown.article is None:
+        raise Er3aError(f"{study}: article: missing. Name the tables to compare: printed, corrected and real")
+    write_article(shown, results, reports)
+    for page in shown.article_pages().values():
+        write_checksum(reports / page)
 
 
 def _study_to_show(file: Path) -> Study:

@@ -11,6 +11,7 @@ from er3a.pipeline.messages.say import word
 # Words of the lists in which a reader of the report chooses pages; the workflow's rules use them.
 PAGE, INDEX, ALL_ROBOTS = N_("page"), N_("index"), N_("All robots")
 TEACH_PANEL, COMPARISON = N_("teach panel"), N_("two robots side by side")
+ARTICLE = N_("the article, sentence by sentence")
 FOUNDATIONS: Mapping[str, str] = {
     "fail": N_("Never use this table: evidence contradicts it. These results hold for the table, not for the robot."),
     "caution": N_("Validation leaves part of this D-H table open: these results are only as good as the table."),
@@ -111,6 +112,11 @@ def of_index() -> str:
 def of_comparison() -> str:
     """The comparison of two robots."""
     return tr("Two robots side by side: parameters, key figures, and the borders of what they reach in one drawing.")
+
+
+def of_article() -> str:
+    """The page on the article."""
+    return tr("What the article says, step by step, and what er3a computes from its table.")
 
 
 def decision(

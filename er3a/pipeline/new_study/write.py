@@ -22,13 +22,13 @@ from er3a.files.scene_file import SceneFile
 from er3a.files.shipped import ROOT
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.formats.mesh_file import read_text
-from er3a.formats.urdf import import_urdf, robot_name
+from er3a.formats.urdf import import_urdf
 from er3a.formats.urdf_tree import Split
 from er3a.formats.xacro import plain_urdf
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.new_study.tasks import LEAST_TARGETS, Spot, TaskSearch, reach_of, scenes
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.robots.robot import Convention, Robot
+from er3a.robots.robot import Convention, Robot, robot_name
 
 SCHEMA_LINE = "# yaml-language-server: $schema=../../config/robot.schema.json\n"
 

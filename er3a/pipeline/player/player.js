@@ -21,6 +21,7 @@ const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, told] = ["arm", "motion", "time", "clock", "told"].map(part);
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const solids = [...armSolids(table, data.size, data.colours, data.pieces), ...sceneSolids(data.carried, table.a.length + 1)];
+const beside = data.beside.map(({ table, pieces }) => ({ table, solids: armSolids(table, data.size, data.colours, pieces) }));
 const surroundings = sceneSolids(data.scene);
 const picture = new Picture(canvas);
 const floor = data.floor ?? column(table.base, 3)[2];
@@ -31,7 +32,8 @@ let playing = false;
 let last = 0;
 let awaited = false;
 
-const orbit = new Orbit(canvas, data.target, 0.75 * data.size, refresh);
+const orbit = new Orbit(canvas, data.target, 0.75 * data.width, refresh);
+if (beside.length) orbit.turn(0.7, 0); // arms that stand beside each other along y
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
 const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
   return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };
@@ -41,7 +43,8 @@ const stretches = [...document.querySelectorAll("[data-from]")];
 function prepared(motion) {
   const count = motion.times.length;
   const poses = decodePoses(motion.poses, count, table.a.length + 1);
-  return { ...motion, poses, values: decodeValues(motion.values, count, motion.step) };
+  const others = motion.beside.map((text, k) => decodePoses(text, count, data.beside[k].table.a.length + 1));
+  return { ...motion, poses, others, values: decodeValues(motion.values, count, motion.step) };
 }
 
 const start = () => motion.times[0];
@@ -87,20 +90,23 @@ function frame(now) {
 
 function draw() {
   const poses = [table.base, ...poseBetween(motion.times, motion.poses, t)];
+  const others = beside.map((arm, k) => ({ ...arm, poses: [arm.table.base, ...poseBetween(motion.times, motion.others[k], t)] }));
   const { page } = orbit;
   picture.fit();
   picture.begin(eyeOf(orbit));
   picture.floor(column(table.base, 3), data.size / 10, floor, page.grid);
-  picture.shadow(solids, poses, floor, page.grid);
-  picture.solids([{ solids: surroundings, poses: [WORLD], ghost: false }, { solids, poses, ghost: false }]);
-  picture.line(motion.trail, page.ink, 1.5);
+  for (const arm of [{ solids, poses }, ...others]) picture.shadow(arm.solids, arm.poses, floor, page.grid);
+  const arms = [{ solids, poses }, ...others].map(({ solids, poses }) => ({ solids, poses, ghost: false }));
+  picture.solids([{ solids: surroundings, poses: [WORLD], ghost: false }, ...arms]);
+  for (const trail of motion.trails) picture.line(trail, page.ink, 1.5);
   for (const { way, status } of motion.events) if (way.length) picture.line(way, data.colours[status], 3);
   for (const { from, to, text, t0, t1 } of motion.marks ?? []) {
     if (t < t0 || t > t1 || (t === t1 && t0 < t1 && t1 < end())) continue; // where two meet, the later one
     picture.line([from, to], data.colours.mark, 3);
     picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
   }
-  toolFrame(poses.at(-1));
+  for (const arm of arms) toolFrame(arm.poses.at(-1));
+  for (const { text, at } of data.signs) picture.word(text, at, page.ink, page.halo);
 }
 
 function toolFrame(T) {

@@ -94,6 +94,7 @@ class PlayedMotion:
     name, text : what it is called, and what is said of it where no event is near
     t : (N,), s, rising; q : (N, n), joint coordinates, finite
     timed : false where no times are known: ``t`` counts points then, which are shown at an even pace
+    beside : (N, n) each, joint coordinates of the arms that stand beside the first
     """
 
     name: str
@@ -103,10 +104,23 @@ class PlayedMotion:
     events: Sequence[PlayedEvent] = ()
     marks: Sequence[Mark] = field(default=())
     timed: bool = True
+    beside: Sequence[Reals] = ()
 
 
-def player(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None = None) -> Markup:
-    """The player as HTML, one a page; empty where there is no motion."""
+def player(
+    robot: Robot,
+    motions: Sequence[PlayedMotion],
+    scene: Scene | None = None,
+    beside: Sequence[Robot] = (),
+    signs: Sequence[str] = (),
+) -> Markup:
+    """The player as HTML, one a page; empty where there is no motion.
+
+    Parameters
+    ----------
+    beside : further arms, which move at the same time; their bases say where they stand
+    signs : what is written at the base of each arm, the first included; nothing if empty
+    """
     shown = [motion for motion in motions if len(motion.t) > 1]
     if not shown:
         return Markup()
@@ -116,7 +130,7 @@ def player(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None = 
         environment.get_template("player.html.j2").render(
             words=words,
             motions=shown,
-            data=_data(robot, shown, scene, words),
+            data=_data(robot, shown, scene, words, beside, signs),
             scripts=import_map([*(TEACH / f"{name}.js" for name in DRAWING), _HERE / "poses.js"]),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
@@ -138,19 +152,30 @@ def player_style() -> Markup:
     return Markup(f"<style>{(_HERE / 'player.css').read_text(encoding='utf-8')}</style>")
 
 
-def _data(robot: Robot, motions: Sequence[PlayedMotion], scene: Scene | None, words: dict[str, str]) -> dict[str, Any]:
+def _data(
+    robot: Robot,
+    motions: Sequence[PlayedMotion],
+    scene: Scene | None,
+    words: dict[str, str],
+    beside: Sequence[Robot],
+    signs: Sequence[str],
+) -> dict[str, Any]:
     size = drawn_size(robot)
+    bases = [arm.base[:3, 3] for arm in (robot, *beside)]
     return {
         "table": table_data(robot),
         "size": size,
         "pieces": drawn_pieces(robot),
-        "target": (robot.base @ [0, 0, 0.35 * size, 1])[:3].tolist(),
+        "beside": [{"table": table_data(arm), "pieces": drawn_pieces(arm)} for arm in beside],
+        "signs": [{"text": text, "at": at.tolist()} for text, at in zip(signs, bases)],
+        "width": max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
+        "target": (np.mean(bases, axis=0) + robot.base[:3, 2] * 0.35 * size).tolist(),
         "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, **COLOURS},
         "axes": AXES,
         "floor": floor_of(scene),
         "scene": scene_data(scene.solids if scene else ()),
         "carried": scene_data(scene.carried if scene else ()),
-        "motions": [_motion(robot, motion) for motion in motions],
+        "motions": [_motion(robot, motion, beside) for motion in motions],
         "joints": _joints(robot),
         "words": words,
     }
@@ -235,27 +260,23 @@ def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:
     return {"kind": "sphere", "radius": solid.radius, **common}
 
 
-def _motion(robot: Robot, motion: PlayedMotion) -> dict[str, Any]:
+def _motion(robot: Robot, motion: PlayedMotion, beside: Sequence[Robot]) -> dict[str, Any]:
     rows = _shown(motion)
     T = frames(robot, motion.q[rows])
-    turns = (
-        scipy.spatial.transform.Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3))
-        .as_quat(scalar_first=True)
-        .reshape(*T.shape[:2], 4)
-    )
-    poses = np.concatenate([T[..., :3, 3], turns], axis=-1).astype("<f4")
+    others = [frames(arm, q[rows]) for arm, q in zip(beside, motion.beside, strict=True)]
     values = shown(robot, motion.q[rows])
     step = float(np.abs(values).max()) / MOST_STEPS or 1.0
-    trail = T[:: max(1, len(rows) // TRAIL_POINTS), -1, :3, 3]
+    apart = max(1, len(rows) // TRAIL_POINTS)
     return {
         "name": motion.name,
         "rate": None if motion.timed else max(1.0, float(motion.t[-1]) / UNTIMED_S),
         "text": motion.text,
         "times": np.round(motion.t[rows], 6).tolist(),
-        "poses": base64.b64encode(poses.tobytes()).decode("ascii"),
+        "poses": _packed(T),
         "step": step,
         "values": base64.b64encode(np.round(values / step).astype("<i2").tobytes()).decode("ascii"),
-        "trail": np.round(trail, 5).tolist(),
+        "trails": [np.round(own[::apart, -1, :3, 3], 5).tolist() for own in (T, *others)],
+        "beside": [_packed(own) for own in others],
         "events": [
             asdict(event) | {"way": _way(event, motion.t[rows], T[:, -1, :3, 3])}
             for event in sorted(motion.events, key=lambda event: event.t)
@@ -265,6 +286,13 @@ def _motion(robot: Robot, motion: PlayedMotion) -> dict[str, Any]:
             for mark in motion.marks
         ],
     }
+
+
+def _packed(T: Reals) -> str:
+    """Transforms (N, k, 4, 4) as positions and quaternions, for ``poses.js``."""
+    turns = scipy.spatial.transform.Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    poses = np.concatenate([T[..., :3, 3], turns.reshape(*T.shape[:2], 4)], axis=-1).astype("<f4")
+    return base64.b64encode(poses.tobytes()).decode("ascii")
 
 
 def _way(event: PlayedEvent, t: Reals, points: Reals) -> list[list[float]]:

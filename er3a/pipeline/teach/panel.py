@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.pages import caveat
+from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
 from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_status
@@ -258,15 +259,48 @@ NEAR_TOUCH = 0.03  # m
 KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
 
 
+NEAR = NearSingular(wrist_rad=np.radians(5.0), elbow_rad=np.radians(5.0), shoulder_m=0.03)
+
+
 def write_teach_page(study: Study, name: str, results: Path, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
-    robot = study.robot(name)
     validated = results / name / "validation"
     told_first = caveat(read_status(validated) if (validated / SUMMARY).exists() else "not_computed")
-    settings = study.section(TrajectorySettings)
+    near = near_singular(study.section(TrajectorySettings))
     scene_file = study.scene(name, "trajectory")
-    scene = load_scene(scene_file) if scene_file else None
-    panel = panel_data(robot, near_singular(settings)) | {
+    inputs = input_records(study.inputs(name, "teach"))
+    write_panel(
+        study.robot(name),
+        output,
+        near=near,
+        scene=load_scene(scene_file) if scene_file else None,
+        robot_pages=study.pages(name),
+        told_first=told_first,
+        command=run_command(study, f"{name}/teach.html"),
+        provenance=Provenance(inputs, code_digest(__name__), config=study.settings(name, "trajectory")),
+    )
+
+
+def write_panel(
+    robot: Robot,
+    output: Path,
+    *,
+    command: str | None,
+    provenance: Provenance,
+    near: NearSingular = NEAR,
+    scene: Scene | None = None,
+    robot_pages: Sequence[str] = (),
+    told_first: Caveat | None = None,
+) -> None:
+    """Write the teach panel of a robot.
+
+    Parameters
+    ----------
+    near : where the panel warns of a singularity
+    robot_pages : those that stand beside it; none outside of a study
+    told_first : what to know of its table, if anything
+    """
+    panel = panel_data(robot, near) | {
         "scene": scene_data(scene.solids if scene else ()),
         "carried": scene_data(scene.carried if scene else ()),
         "floor": floor_of(scene),
@@ -276,7 +310,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         _HERE / "teach.html.j2",
         output,
         robot=robot,
-        robot_pages=study.pages(name),
+        robot_pages=robot_pages,
         joint_names=joint_names(robot),
         joint_colours=JOINTS,
         degrees=float(np.degrees(1.0)),
@@ -284,14 +318,9 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         told_first=told_first,
         panel=panel,
         modules=import_map(sorted(_HERE.glob("*.js"))),
-        command=run_command(study, f"{name}/teach.html"),
-        provenance=_provenance(study, name),
+        command=command,
+        provenance=provenance,
     )
-
-
-def _provenance(study: Study, name: str) -> Provenance:
-    inputs = input_records(study.inputs(name, "teach"))
-    return Provenance(inputs=inputs, code=code_digest(__name__), config=study.settings(name, "trajectory"))
 
 
 def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:

@@ -479,6 +479,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
         robots=robots,
+        article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
         sweeps=sweep_sections(study, results),

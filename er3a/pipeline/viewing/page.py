@@ -62,6 +62,29 @@ SCRIPT_WORDS = {
 }
 
 
+MARKS = {"figure": N_("Figure {number}"), "table": N_("Table {number}")}
+
+
+@dataclass(frozen=True)
+class Numbered:
+    """What a figure or table is called on its page, and its address there."""
+
+    id: str
+    text: str
+
+
+class Numbering:
+    """Counts the figures and tables of a page in its order; those with a name keep their address when others come."""
+
+    def __init__(self) -> None:
+        self._counts = dict.fromkeys(MARKS, 0)
+
+    def __call__(self, kind: str, name: str = "") -> Numbered:
+        self._counts[kind] += 1
+        number = self._counts[kind]
+        return Numbered(f"{kind}-{name or number}", tr(MARKS[kind], number=number))
+
+
 @dataclass(frozen=True)
 class Picture:
     """A figure for a page: the image, what it shows (for those who can't see it), and what to conclude from it.
@@ -189,7 +212,7 @@ def render(
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
-    environment.globals["view_command"] = view_command
+    environment.globals |= {"view_command": view_command, "numbered": Numbering()}
     environment.filters |= {
         "number": number,
         "fixed": fixed,

@@ -1,0 +1,361 @@
+"""What er3a computes for each sentence of the article: from a study's results, and by the library where no stage does.
+
+The article's own inputs stand here as constants, with the section that they are taken from. All else is computed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scipy.stats import kendalltau
+
+from er3a.geometry.transforms import rotation_angle, rpy_of, transform
+from er3a.kinematics.forward import forward, frames, jacobian
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.numerical import solve
+from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.results import read_stage
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectorySummary
+from er3a.pipeline.stages.validation.model import ValidationSummary
+from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceSummary
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.skeleton import skeleton
+from er3a.robots.robot import Robot
+
+EXAMPLE = np.array([0, np.pi / 4, -np.pi / 6, 0, np.pi / 3, 0])  # section 4.1
+TARGET_MM, TARGET_RPY_DEG = (500.0, 200.0, 700.0), (0.0, 90.0, 0.0)  # section 4.2
+MOVE_END = np.array([np.pi / 4, np.pi / 6, -np.pi / 8, np.pi / 3, -np.pi / 4, np.pi / 2])  # section 5.2
+LINE_END_MM, LINE_END_RPY_DEG = (600.0, 300.0, 500.0), (0.0, 180.0, 0.0)  # section 5.2
+DURATION_S, SAMPLES = 5.0, 50  # section 5.2
+WINDOW_Z_M = (0.0, 1.5)  # section 3.2
+CLOUD = 10_000  # section 5.1
+STATEMENTS = "er3a_c60_article"  # the reference set with the article's sentences and table
+MOVE, LINE = "article_joint", "article_line"  # paths of the study
+COMPARED = 1000  # random poses that two measures rank
+NEAR_WRIST_DEG = (5.0, 1.0, 0.1)
+
+
+@dataclass(frozen=True)
+class TableNumbers:
+    """What one table comes to.
+
+    Attributes
+    ----------
+    statements, statements_met : sentences and entries of the article that the table is checked against, if it is
+    checks, checks_met : independent checks of the validation stage
+    upper_arm_deg, forearm_deg : from the vertical, all joints at 0
+    tool_mm, example_mm, example_rpy_deg : tool point at 0, and the pose of the article's example
+    solutions, within_limits : of the article's target; ``nearest_deg`` the one within the limits that is nearest to 0
+    volume_m3 : proven bounds; reach_mm : greatest distance of the tool point from axis 1
+    void_litres : proven bounds of the largest enclosed void, None without one; void_mm : its centre
+    line : of the article's straight line the verdict; None where the study has no such path
+    """
+
+    statements: int | None
+    statements_met: int | None
+    checks: int
+    checks_met: int
+    upper_arm_deg: float
+    forearm_deg: float
+    tool_mm: tuple[float, ...]
+    example_mm: tuple[float, ...]
+    example_rpy_deg: tuple[float, ...]
+    solutions: int
+    within_limits: int
+    nearest_deg: tuple[float, ...] | None
+    volume_m3: tuple[float, float]
+    reach_mm: float
+    void_litres: tuple[float, float] | None
+    void_mm: tuple[float, ...] | None
+    line: str | None
+    line_crossings_s: tuple[float, ...]
+    line_speed_deg_s: float | None
+
+
+@dataclass(frozen=True)
+class ArticleNumbers:
+    """All that the page shows: three tables, and what concerns the printed one alone (mm, deg, s, ratios)."""
+
+    printed: TableNumbers
+    corrected: TableNumbers
+    real: TableNumbers
+    fault: str
+    fault_deg: float
+    missed_before_mm: float
+    missed_after_mm: float
+    literal_rise_mm: float
+    shifted_apart_mm: float
+    circle_mm: float
+    circle_error_mm: float
+    length_m: float
+    degrees_off_mm: float
+    hidden_percent: float
+    wrist_turn_deg: float
+    wrist_gain: tuple[float, ...]
+    residual_mm: float
+    free_beyond_deg: float
+    free_joint: int
+    kept_solved: bool
+    same_pose_rpy_deg: tuple[tuple[float, ...], tuple[float, ...]]
+    same_pose_apart: float
+    cloud_lowest_mm: float
+    cloud_farthest_mm: float
+    cloud_nearest_to_void_mm: float
+    move_speed_deg_s: float
+    move_acceleration_deg_s2: float
+    line_speed_deg_s: float
+    repair_mm: float | None
+    repair_deg: float | None
+    repair_longer_s: float | None
+    ranked_apart_percent: float
+    round_trip_deg: float
+    round_trips: int
+
+
+Agreement = Literal["agrees", "differs", "in_part", "not_examined", "done"]
+EXACT_MM, EXACT_DEG, STATED_DEG = 1e-6, 1e-6, 0.5
+
+
+def agreements(numbers: ArticleNumbers) -> dict[str, Agreement]:
+    """Whether what is computed agrees with what the article says, by the codes of its items.
+
+    "done" is for what can be carried out, but where the article gives nothing to compare with. Items that are missing
+    here have a stage of the pipeline of their own.
+    """
+    printed, corrected = numbers.printed, numbers.corrected
+
+    def agrees(holds: bool) -> Agreement:
+        return "agrees" if holds else "differs"
+
+    return {
+        "payload": "not_examined",
+        "toolbox": "not_examined",
+        "definitions": agrees(numbers.literal_rise_mm < EXACT_MM),
+        "zero_pose": agrees(printed.upper_arm_deg < STATED_DEG and abs(printed.forearm_deg - 90) < STATED_DEG),
+        "circle": agrees(numbers.circle_error_mm < EXACT_MM),
+        "offset": agrees(printed.statements_met == printed.statements),
+        "plot": agrees(numbers.hidden_percent == 0),
+        "wrist": agrees(numbers.wrist_turn_deg > 1 + EXACT_DEG),
+        "target": agrees(numbers.same_pose_apart > EXACT_MM),
+        "ikine": "in_part" if numbers.free_beyond_deg > 0 else "agrees",
+        "ikcon": agrees(numbers.kept_solved),
+        "unreachable": "in_part" if printed.within_limits < corrected.within_limits else "agrees",
+        "eight": agrees(0 < printed.solutions <= 8 and numbers.residual_mm < EXACT_MM),
+        "void": agrees(printed.void_mm is not None and printed.void_mm[2] < 0),
+        "line_singular": "in_part" if printed.line_crossings_s else "agrees",
+        "condition": agrees(numbers.ranked_apart_percent == 0),
+        "key_poses": agrees(printed.checks_met == printed.checks),
+        "boundary": "not_examined",
+        "round_trip": agrees(numbers.round_trip_deg < EXACT_DEG),
+        "hole": agrees(not _shrinks(printed, corrected)),
+    }
+
+
+def _shrinks(printed: TableNumbers, corrected: TableNumbers) -> bool:
+    """Whether the corrected entry takes away most of the printed table's void."""
+    after = corrected.void_litres[1] if corrected.void_litres else 0.0
+    return printed.void_litres is not None and after < 0.5 * printed.void_litres[0]
+
+
+def article_numbers(study: Study, results: Path) -> ArticleNumbers:
+    """Compute what the page shows from the results of the study's three tables."""
+    tables = study.article
+    assert tables is not None
+    robot = study.robot(tables.printed)
+    validation: ValidationSummary = _summary(results, tables.printed, "validation")
+    trajectory: TrajectorySummary = _summary(results, tables.printed, "trajectory")
+    printed, corrected, real = (_table(study, results, name) for name in tables.names)
+    hypothesis = next(found for found in validation.diagnoses if found.reference_set == STATEMENTS).hypotheses[0]
+    fault = hypothesis.faults[0]
+    literal = _points(robot.replace(convention="modified"), _turned(robot, 0))
+    random = random_joints(robot, study.seed, CLOUD)
+    shifted = np.abs(_points(_one_row_down(robot), random) - _points(robot, random))
+    circle = _points(robot, _turned(robot, 0))
+    radius = np.hypot(circle[:, 0], circle[:, 1])
+    target = _target()
+    free, kept = solve(robot, target, np.zeros(6), respect_limits=False), solve(robot, target, np.zeros(6))
+    beyond = np.degrees(np.maximum(free.q - robot.upper, robot.lower - free.q))
+    cloud = 1000 * _points(robot, random)
+    void = np.array(printed.void_mm if printed.void_mm else (np.nan,) * 3)
+    move, line = (_path(trajectory, name) for name in (MOVE, LINE))
+    repair = next((tried.motion for tried in line.avoidance if tried.name == line.strategy), None)
+    rpy = (0.0, 90.0, 0.0), (30.0, 90.0, 30.0)
+    same = [transform(np.zeros(3), np.radians(angles)) for angles in rpy]
+    rounds = validation.round_trips
+    assert rounds is not None
+    return ArticleNumbers(
+        printed=printed,
+        corrected=corrected,
+        real=real,
+        fault=f"{fault.code}{getattr(fault, 'joint', '')}",
+        fault_deg=float(getattr(fault, "fits_deg", np.nan)),
+        missed_before_mm=hypothesis.residual_before,
+        missed_after_mm=hypothesis.residual_after,
+        literal_rise_mm=float(1000 * np.ptp(literal[:, 2])),
+        shifted_apart_mm=float(1000 * shifted.max()),
+        circle_mm=float(1000 * radius.mean()),
+        circle_error_mm=float(1000 * max(np.ptp(radius), np.ptp(circle[:, 2]))),
+        length_m=float(np.abs(robot.a).sum() + np.abs(robot.d).sum()),
+        degrees_off_mm=_off_mm(robot, np.degrees(EXAMPLE), EXAMPLE),
+        hidden_percent=_hidden_percent(robot),
+        wrist_turn_deg=_turn_of_joint_4(robot),
+        wrist_gain=tuple(_wrist_gain(robot, np.radians(angle)) for angle in NEAR_WRIST_DEG),
+        residual_mm=_residual_mm(robot, target),
+        free_beyond_deg=float(beyond.max()),
+        free_joint=int(beyond.argmax()) + 1,
+        kept_solved=bool(np.all(kept.solved)),
+        same_pose_rpy_deg=rpy,
+        same_pose_apart=float(np.abs(same[0] - same[1]).max()),
+        cloud_lowest_mm=float(cloud[:, 2].min()),
+        cloud_farthest_mm=float(np.hypot(cloud[:, 0], cloud[:, 1]).max()),
+        cloud_nearest_to_void_mm=float(np.linalg.norm(cloud - void, axis=1).min()),
+        move_speed_deg_s=max(move.max_joint_speed_deg_s or (np.nan,)),
+        move_acceleration_deg_s2=_greatest_acceleration(results, tables.printed),
+        line_speed_deg_s=max(line.max_joint_speed_deg_s or (np.nan,)),
+        repair_mm=repair.max_deviation_mm if repair else None,
+        repair_deg=repair.max_deviation_deg if repair else None,
+        repair_longer_s=repair.duration_s - line.duration_s if repair else None,
+        ranked_apart_percent=_ranked_apart_percent(robot, study.seed),
+        round_trip_deg=rounds.joint_error_deg,
+        round_trips=rounds.poses,
+    )
+
+
+def _summary(results: Path, robot: str, stage: str):  # type: ignore[no-untyped-def]  # the stage's own
+    return read_stage(results / robot / stage, STAGES[stage]).results.summary
+
+
+def _table(study: Study, results: Path, name: str) -> TableNumbers:
+    robot = study.robot(name)
+    validation: ValidationSummary = _summary(results, name, "validation")
+    workspace: WorkspaceSummary = _summary(results, name, "workspace")
+    trajectory: TrajectorySummary = _summary(results, name, "trajectory")
+    claims = next((found.counts.claims for found in validation.sets if found.name == STATEMENTS), None)
+    checks = validation.counts.independent
+    shoulder, elbow, wrist = (frames(robot, np.zeros(6))[k, :3, 3] for k in (1, 2, 4))
+    forearm = frames(robot, np.zeros(6))[3, :3, 2]
+    forearm = forearm * (1.0 if forearm @ (wrist - elbow) >= 0 else -1.0)
+    example = forward(robot, EXAMPLE)
+    found = inverse(robot, _target())
+    kept = found.q[found.within_limits]
+    nearest = kept[np.abs(kept).max(axis=1).argmin()] if len(kept) else None
+    void = max(workspace.enclosed_voids, key=lambda each: each.volume_m3.lower, default=None)
+    line = next((path for path in trajectory.paths if path.name == LINE), None)
+    return TableNumbers(
+        statements=claims.passed + claims.failed if claims else None,
+        statements_met=claims.passed if claims else None,
+        checks=checks.passed + checks.failed,
+        checks_met=checks.passed,
+        upper_arm_deg=_from_vertical_deg(elbow - shoulder),
+        forearm_deg=_from_vertical_deg(forearm),
+        tool_mm=_mm(forward(robot, np.zeros(6))[:3, 3]),
+        example_mm=_mm(example[:3, 3]),
+        example_rpy_deg=tuple(np.degrees(rpy_of(example)).round(9).tolist()),
+        solutions=len(np.unique(found.branch)),
+        within_limits=len(np.unique(found.branch[found.within_limits])),
+        nearest_deg=None if nearest is None else tuple(np.degrees(nearest).tolist()),
+        volume_m3=(workspace.volume_m3.lower, workspace.volume_m3.upper),
+        reach_mm=1000 * workspace.reach_m.furthest_from_axis,
+        void_litres=_litres(void) if void else None,
+        void_mm=_mm(np.array(void.centroid_m)) if void else None,
+        line=line.verdict if line else None,
+        line_crossings_s=tuple(each.t_s for each in line.singularities if each.crossing) if line else (),
+        line_speed_deg_s=max(line.max_joint_speed_deg_s) if line and line.max_joint_speed_deg_s else None,
+    )
+
+
+def _litres(void: VoidSummary) -> tuple[float, float]:
+    return 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
+
+
+def _mm(point: Reals) -> tuple[float, ...]:
+    return tuple((np.round(1000 * point, 6) + 0.0).tolist())
+
+
+def _target() -> Reals:
+    return transform(np.array(TARGET_MM) / 1000, np.radians(TARGET_RPY_DEG))
+
+
+def _from_vertical_deg(vector: Reals) -> float:
+    return float(np.degrees(np.arccos(np.clip(vector[2] / np.linalg.norm(vector), -1, 1))))
+
+
+def _turned(robot: Robot, joint: int) -> Reals:
+    """Joint values (100, 6), one joint over its range and the others at 0."""
+    q = np.zeros((100, 6))
+    q[:, joint] = np.linspace(robot.lower[joint], robot.upper[joint], len(q))
+    return q
+
+
+def _one_row_down(robot: Robot) -> Robot:
+    """The table as Craig would write it: a and alpha of row i behind joint i stand in row i + 1."""
+    a, alpha = (np.concatenate([[0.0], values[:-1]]) for values in (robot.a, robot.alpha))
+    return robot.replace(convention="modified", a=a, alpha=alpha)
+
+
+def _points(robot: Robot, q: Reals) -> Reals:
+    return forward(robot, q)[:, :3, 3]
+
+
+def random_joints(robot: Robot, seed: int, count: int) -> Reals:
+    """Joint values (count, n), evenly drawn within the limits, as the article draws its cloud."""
+    return np.random.default_rng(seed).uniform(robot.lower, robot.upper, (count, robot.joints))
+
+
+def _off_mm(robot: Robot, q: Reals, right: Reals) -> float:
+    """How far the tool point is off at joint values."""
+    return float(1000 * np.linalg.norm(forward(robot, q)[:3, 3] - forward(robot, right)[:3, 3]))
+
+
+def _hidden_percent(robot: Robot) -> float:
+    """Part of the arm's length that is outside the article's plot window, all joints at 0."""
+    corners = skeleton(robot, np.zeros(6))
+    share = np.linspace(0, 1, 1001)[:, None]
+    steps = [(1 - share) * start + share * end for start, end in pairwise(corners)]
+    weights = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    low, high = WINDOW_Z_M
+    outside = [np.mean((points[:, 2] < low) | (points[:, 2] > high)) for points in steps]
+    return float(100 * np.average(outside, weights=weights))
+
+
+def _turn_of_joint_4(robot: Robot) -> float:
+    """By how much one degree of joint 4 turns the tool at joint 5 = 0 (deg)."""
+    q = np.zeros((2, 6))
+    q[1, 3] = np.radians(1.0)
+    T = forward(robot, q)
+    return float(np.degrees(rotation_angle(T[0, :3, :3], T[1, :3, :3])))
+
+
+def _wrist_gain(robot: Robot, angle: float) -> float:
+    """The fastest wrist joint while the tool turns at one unit about the worst axis, joint 5 at an angle (rad)."""
+    q = np.zeros(6)
+    q[4] = angle
+    return float(np.linalg.norm(np.linalg.inv(jacobian(robot, q)[3:, 3:]), axis=1).max())
+
+
+def _residual_mm(robot: Robot, target: Reals) -> float:
+    """By how much the solutions in closed form miss a target at most."""
+    T = forward(robot, inverse(robot, target).q)
+    return float(1000 * np.linalg.norm(T[:, :3, 3] - target[:3, 3], axis=1).max())
+
+
+def _ranked_apart_percent(robot: Robot, seed: int) -> float:
+    """Of pairs of random poses, those that manipulability and condition number rank differently (Kendall's tau)."""
+    measures = conditioning(robot, random_joints(robot, seed, COMPARED), characteristic_length(robot))
+    tau = kendalltau(measures.manipulability, -measures.condition_number).statistic
+    return float(50 * (1 - tau))
+
+
+def _path(trajectory: TrajectorySummary, name: str) -> PathSummary:
+    return next(path for path in trajectory.paths if path.name == name)
+
+
+def _greatest_acceleration(results: Path, robot: str) -> float:
+    samples = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.checks
+    return float(np.nanmax(np.abs(samples.q_deg_s2[samples.path == MOVE])))

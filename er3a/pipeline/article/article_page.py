@@ -1,0 +1,313 @@
+"""The page on the article: its steps in its order, and three tables compared, in each language of the pages."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from er3a.files.kept_files import write_atomically
+from er3a.geometry.transforms import translation
+from er3a.pipeline.article import article_figures
+from er3a.pipeline.article.article_numbers import LINE, MOVE, ArticleNumbers, TableNumbers, agreements, article_numbers
+from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages import language
+from er3a.pipeline.messages.article import AGREEMENT, ITEMS, SECTIONS, Item
+from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.trajectory import event_word
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, player, player_style
+from er3a.pipeline.results import Provenance, input_records, read_stage, result_records
+from er3a.pipeline.stages.registry import STAGES, all_messages
+from er3a.pipeline.stages.trajectory.model import PathChecks
+from er3a.pipeline.study import ArticleTables, Study
+from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.figures import house_style
+from er3a.pipeline.viewing.heads import stage_head
+from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
+
+APART_M = 1.8  # between two arms that stand side by side
+LANGUAGE_NAMES = {"en": "English", "zh": "中文"}
+STATUS_OF_STAGES = ("collision", "programs", "vision", "dynamics")
+PAGES = {
+    **dict.fromkeys(("teach", "wrist", "same_as_teach"), "teach"),
+    **dict.fromkeys(("zero_pose", "offset", "key_poses", "round_trip", "units"), "validation"),
+    **dict.fromkeys(("target", "ikine", "ikcon", "unreachable", "eight", "choice", "poor_solver"), "inverse"),
+    **dict.fromkeys(("cloud", "void", "hole"), "workspace"),
+    **dict.fromkeys(("jtraj", "animation", "ctraj", "line_singular", "condition", "avoidance"), "trajectory"),
+}
+"""The page of the printed table that shows more of an item, by the item's code."""
+EXAMPLE_DEG = "0,45,-30,0,60,0"
+ERRORS = (
+    "circle_error_mm",
+    "missed_after_mm",
+    "residual_mm",
+    "round_trip_deg",
+    "shifted_apart_mm",
+    "same_pose_apart",
+)
+BADGES = {"agrees": "pass", "differs": "fail", "in_part": "caution", "not_examined": "no_reference", "done": "done"}
+ROLES = {
+    "printed": N_("the article's table"),
+    "corrected": N_("the same with offset 2 = −90°"),
+    "real": N_("the real ER3A-C60"),
+}
+
+
+@dataclass(frozen=True)
+class ArticleRow:
+    """An item as the page shows it; ``status``: code of the agreement, ``badge``: class of its mark."""
+
+    number: int
+    code: str
+    title: str
+    says: str
+    finds: Markup
+    how: str
+    why: str
+    status: str
+    badge: str
+    page: str
+
+
+def write_article(study: Study, results: Path, folder: Path) -> None:
+    """Compute the numbers, keep them as ``article.json`` below ``results``, and write the page in each language."""
+    numbers = article_numbers(study, results)
+    text = json.dumps(asdict(numbers) | {"agreements": agreements(numbers)}, indent=1) + "\n"
+    write_atomically(results / "article.json", lambda file: file.write_text(text, encoding="utf-8"))
+    pages = study.article_pages()
+    for code, name in pages.items():
+        own = study.model_copy(update={"report": study.report.model_copy(update={"language": code})})
+        language.use(code, own.own_titles())
+        with house_style():
+            _write(study, results, numbers, folder / name, {each: pages[each] for each in pages if each != code})
+
+
+def _write(study: Study, results: Path, numbers: ArticleNumbers, output: Path, others: dict[str, str]) -> None:
+    tables = study.article
+    assert tables is not None
+    drawn = article_figures.draw(study, results, numbers)
+    order = ["zero", "player", *(name for name in drawn if name != "zero")]
+    places = {name: k for k, name in enumerate(order, start=1)}
+    rows = list(_rows(study, results, numbers, places))
+    page.render(
+        Path(__file__).with_name("article.html.j2"),
+        output,
+        command=page.run_command(study, output.name),
+        provenance=Provenance(
+            input_records(study.robot_file(name) for name in tables.names) + result_records(results, tables.names),
+            code_digest(__name__, *all_messages()),
+            seed=study.seed,
+        ),
+        others={LANGUAGE_NAMES[code]: name for code, name in others.items()},
+        counts=[(status, BADGES[status], sum(row.status == status for row in rows)) for status in AGREEMENT],
+        agreement_words=AGREEMENT,
+        sections=[(code, title, [rows[k] for k in _of_section(code)]) for code, title in SECTIONS.items()],
+        compared=_compared(numbers),
+        roles=[tr(word) for word in ROLES.values()],
+        robots=[(name, study.robot(name), study.pages(name)) for name in tables.names],
+        table_columns=["i>", "a (mm)>", "α (°)>", "d (mm)>", tr("offset (°)>"), tr("limits (°)>")],
+        table_rows=[_dh_rows(study.robot(name)) for name in tables.names],
+        drawn=drawn,
+        of_section={"3.2": ["wrist"], "5.2": ["move", "line", "measures"]},
+        player=_player(study, results, tables),
+        player_style=player_style(),
+    )
+
+
+def _of_section(section: str) -> list[int]:
+    return [k for k, item in enumerate(ITEMS) if item.section == section]
+
+
+def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str, int]) -> Iterator[ArticleRow]:
+    found, parts = agreements(numbers), _parts(study, results, numbers, places)
+    for place, item in enumerate(ITEMS, start=1):
+        status = found.get(item.code) or _status_of_stage(study, results, item)
+        yield ArticleRow(
+            place,
+            item.code,
+            tr(item.title),
+            tr(item.says),
+            _with_code(parts.get(f"stage_{item.code}") or tr(item.finds, **parts)),
+            item.how,
+            tr(item.why, **parts) if item.why and status != "agrees" else "",
+            status,
+            BADGES[status],
+            _page_on(study.article, item.code) if study.article else "",
+        )
+
+
+def _page_on(tables: ArticleTables, code: str) -> str:
+    """The address of the page that shows more of an item; empty where there is none."""
+    if code in STATUS_OF_STAGES:
+        return f"{tables.real}/{code}.html"
+    place = f"#q={EXAMPLE_DEG}" if code == "same_as_teach" else ""
+    return f"{tables.printed}/{PAGES[code]}.html{place}" if code in PAGES else ""
+
+
+def _with_code(text: str) -> Markup:
+    """A text whose words in backticks are code."""
+    plain, *rest = text.split("`")
+    parts = [Markup("<code>{}</code>").format(part) if k % 2 == 0 else escape(part) for k, part in enumerate(rest)]
+    return escape(plain) + Markup("").join(parts)
+
+
+def _status_of_stage(study: Study, results: Path, item: Item) -> str:
+    if item.code not in STATUS_OF_STAGES:
+        return "done"
+    return "not_examined" if _head(study, results, item.code) is None else "done"
+
+
+def _head(study: Study, results: Path, stage: str) -> page.Head | None:
+    """What a stage found of the real arm; None where it was not computed."""
+    assert study.article is not None
+    name = study.article.real
+    if stage not in study.stages(name):
+        return None
+    head = stage_head(results / name / stage, STAGES[stage])
+    return None if head.status == "not_computed" else head
+
+
+def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str, int]) -> dict[str, Any]:
+    """The fields of the items' texts."""
+    parts: dict[str, Any] = {key: value for key, value in asdict(numbers).items() if not isinstance(value, dict)}
+    parts |= {key: number(float(parts[key]), 2) for key in ERRORS}
+    for letter, table in (("p", numbers.printed), ("c", numbers.corrected), ("r", numbers.real)):
+        parts |= {f"{letter}_{key}": value for key, value in _flat(table).items()}
+    parts |= {f"gain_{k}": value for k, value in enumerate(numbers.wrist_gain)}
+    parts |= {f"figure_{name}": place for name, place in places.items()}
+    for stage in STATUS_OF_STAGES:
+        head = _head(study, results, stage)
+        parts[f"stage_{stage}"] = tr("This study does not examine it.") if head is None else head.text
+    return parts
+
+
+def _flat(table: TableNumbers) -> dict[str, Any]:
+    found = asdict(table)
+    for key, axes in (("tool", "xyz"), ("example", "xyz"), ("void", "xyz")):
+        found |= {f"{key}_{axis}": value for axis, value in zip(axes, found[f"{key}_mm"] or (np.nan,) * 3)}
+    found |= dict(zip(("example_roll", "example_pitch", "example_yaw"), found["example_rpy_deg"]))
+    found |= dict(zip(("volume_low", "volume_high"), found["volume_m3"]))
+    found |= dict(zip(("void_low", "void_high"), found["void_litres"] or (0.0, 0.0)))
+    found["crossings"] = _crossings(table)
+    found["line"] = outcome_word(table.line) if table.line else "–"  # type: ignore[arg-type]
+    return found
+
+
+def _crossings(table: TableNumbers) -> str:
+    return ", ".join(fixed(t, 4) for t in table.line_crossings_s) or "–"
+
+
+def _compared(numbers: ArticleNumbers) -> list[list[str]]:
+    """The rows of the comparison: what is compared, then a cell for each table."""
+    tables = (numbers.printed, numbers.corrected, numbers.real)
+
+    def row(label: str, *cells: str) -> list[str]:
+        return [label, *cells]
+
+    return [
+        row(
+            tr("Statements of the article that hold"),
+            *("–" if t.statements is None else f"{t.statements_met} / {t.statements}" for t in tables),
+        ),
+        row(
+            tr("Independent checks against CAD models and a URDF that pass"),
+            *(f"{t.checks_met} / {t.checks}" for t in tables),
+        ),
+        row(tr("Upper arm from the vertical, all joints at 0"), *(f"{fixed(t.upper_arm_deg, 1)}°" for t in tables)),
+        row(tr("Forearm from the vertical, all joints at 0"), *(f"{fixed(t.forearm_deg, 1)}°" for t in tables)),
+        row(tr("Tool at joint angles 0: x, y, z (mm)"), *(", ".join(fixed(v, 2) for v in t.tool_mm) for t in tables)),
+        row(
+            tr("Branches of the article's target within the limits"),
+            *(f"{t.within_limits} / {t.solutions}" for t in tables),
+        ),
+        row(tr("Greatest reach of the tool from axis 1 (mm)"), *(fixed(t.reach_mm, 1) for t in tables)),
+        row(tr("Reached volume, proven (m³)"), *(_between(t.volume_m3, 3) for t in tables)),
+        row(
+            tr("Largest enclosed void, proven (L)"),
+            *("–" if t.void_litres is None else _between(t.void_litres, 2) for t in tables),
+        ),
+        row(tr("Its centre: z (mm)"), *("–" if t.void_mm is None else fixed(t.void_mm[2], 0) for t in tables)),
+        row(
+            tr("The article's straight line"),
+            *(outcome_word(t.line) if t.line else "–" for t in tables),  # type: ignore[arg-type]
+        ),
+        row(tr("It is singular at t (s)"), *(_crossings(t) for t in tables)),
+    ]
+
+
+def _between(bounds: tuple[float, float], decimals: int) -> str:
+    return f"{fixed(bounds[0], decimals)} … {fixed(bounds[1], decimals)}"
+
+
+def _dh_rows(robot: Robot) -> list[list[str]]:
+    def deg(value: float) -> str:
+        return f"{round(float(np.degrees(value)), 6) + 0.0:g}".replace("-", "−")
+
+    return [
+        [
+            str(k + 1),
+            f"{round(1000 * float(robot.a[k]), 4) + 0.0:g}",
+            deg(robot.alpha[k]),
+            f"{round(1000 * float(robot.d[k]), 4) + 0.0:g}".replace("-", "−"),
+            deg(robot.offset[k]),
+            f"{deg(robot.lower[k])} … {deg(robot.upper[k])}",
+        ]
+        for k in range(robot.rows)
+    ]
+
+
+def _player(study: Study, results: Path, tables: ArticleTables) -> Any:
+    """Both tables side by side: the article's joint move, its line, and joint 1 alone."""
+    printed, corrected = study.robot(tables.printed), study.robot(tables.corrected)
+    beside = corrected.replace(base=translation(0.0, -APART_M / 2, 0.0) @ corrected.base)
+    first = printed.replace(base=translation(0.0, APART_M / 2, 0.0) @ printed.base)
+    texts = {
+        MOVE: tr("The article's joint move (section 5.2), on both tables"),
+        LINE: tr("The article's straight line (section 5.2), from where each table has the tool at joint angles 0"),
+    }
+    motions = []
+    for name, text in texts.items():
+        own, other = (_motion(results, robot, name) for robot in (tables.printed, tables.corrected))
+        q = np.stack([np.interp(own.t_s, other.t_s, column) for column in other.q_deg.T], axis=1)
+        motions.append(
+            PlayedMotion(
+                name,
+                text,
+                own.t_s,
+                meant(first, own.q_deg),
+                _events(results, tables, name),
+                beside=(meant(beside, q),),
+            )
+        )
+    t = np.linspace(0, 4, 81)
+    q = np.zeros((len(t), first.joints))
+    q[:, 0] = np.linspace(first.lower[0], first.upper[0], len(t))
+    motions.append(PlayedMotion("joint_1", tr("Joint 1 alone, over its range (section 2.2)"), t, q, beside=(q,)))
+    signs = [tr("as printed"), tr("offset 2 = −90°")]
+    return player(first, motions, beside=(beside,), signs=signs)
+
+
+def _motion(results: Path, robot: str, name: str) -> PathChecks:
+    checks: PathChecks = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.checks
+    return checks.take((checks.path == name) & checks.reachable)
+
+
+def _events(results: Path, tables: ArticleTables, name: str) -> list[PlayedEvent]:
+    """Where one of both tables is singular on a path."""
+    found = []
+    for robot, sign in ((tables.printed, tr("as printed")), (tables.corrected, tr("offset 2 = −90°"))):
+        summary = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.summary
+        path = next(each for each in summary.paths if each.name == name)
+        for event in path.singularities:
+            if event.crossing:
+                text = tr("{table}: singular ({type})", table=sign, type=event_word(event))
+                found.append(PlayedEvent(event.t_s, event.until_s, text, "caution"))
+    return found

@@ -1,0 +1,510 @@
+"""What the page on the article says of each of its sentences, in the article's order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from er3a.pipeline.messages.language import N_
+
+
+@dataclass(frozen=True)
+class Item:
+    """A thing that the article says or does.
+
+    Attributes
+    ----------
+    code, section : what it is, and where in the article it stands
+    how : what does it in er3a, as written in Python or a terminal; empty where nothing does
+    title, says, finds : what the article says, and what er3a computes, with fields of
+        :class:`er3a.pipeline.article.article_numbers.ArticleNumbers`
+    why : what is shown unless both agree
+    """
+
+    code: str
+    section: str
+    how: str
+    title: str
+    says: str
+    finds: str
+    why: str | None = None
+
+
+ITEMS = (
+    Item(
+        "payload",
+        "1",
+        "",
+        N_("Payload"),
+        N_("The arm is introduced as a desktop arm for 6 kg."),
+        N_("No document that er3a has states a payload of the ER3A-C60; nothing on this page rests on 6 kg."),
+        N_("No source was found for it."),
+    ),
+    Item(
+        "toolbox",
+        "2.1",
+        "",
+        N_("Robotics Toolbox"),
+        N_("MATLAB's Robotics Toolbox is used, version 10 or 11 recommended."),
+        N_("The Toolbox was not run here. er3a does each step by itself."),
+        N_("It needs MATLAB."),
+    ),
+    Item(
+        "definitions",
+        "2.2",
+        "er3a.to_modified(robot)",
+        N_("The four D-H parameters"),
+        N_("The parameters are called standard, and a and α are defined from axis Z(i) to axis Z(i+1) along X(i)."),
+        N_(
+            "Whoever therefore enters the table as modified, row by row, gets an arm whose joint 1 alone moves "
+            "the tool {literal_rise_mm:.0f} mm up and down. Entered as standard it moves it {circle_error_mm} mm."
+        ),
+        N_(
+            "These are the definitions of modified D-H (Craig). They give the same arm only if a and α move one "
+            "row down, as frame i then lies on axis i: {shifted_apart_mm} mm apart."
+        ),
+    ),
+    Item(
+        "convention",
+        "2.2",
+        'er3a.load_robot("table.csv", convention="modified")',
+        N_("Standard or modified"),
+        N_("Manuals use either convention; find out which."),
+        N_(
+            "Every robot file names its convention, `er3a new --dh --modified` reads the other one, and the "
+            "diagnosis tries it as a fault."
+        ),
+    ),
+    Item(
+        "zero_pose",
+        "2.2",
+        "er3a.forward(robot, q, frame=2)",
+        N_("Hand check: the zero pose"),
+        N_("With all joints at 0 the upper arm should be vertical and the forearm horizontal."),
+        N_(
+            "As printed the upper arm is {p_upper_arm_deg:.0f}° and the forearm {p_forearm_deg:.0f}° from the "
+            "vertical, and the tool is at z = {p_tool_z:.0f} mm. With offset 2 = −90° they are "
+            "{c_upper_arm_deg:.0f}° and {c_forearm_deg:.0f}°, and the tool is at z = {c_tool_z:.0f} mm."
+        ),
+        N_(
+            "The table fails the article's own check. One entry repairs it: the diagnosis finds offset 2 = "
+            "{fault_deg:.0f}°, which takes the zero pose from {missed_before_mm:.1f} mm off to {missed_after_mm} "
+            "mm."
+        ),
+    ),
+    Item(
+        "circle",
+        "2.2",
+        "er3a.forward(robot, q)",
+        N_("Hand check: joint 1 alone"),
+        N_("Joint 1 alone must move the tool on a circle."),
+        N_("It does: radius {circle_mm:.2f} mm, {circle_error_mm} mm from a circle over the whole range."),
+    ),
+    Item(
+        "units",
+        "3.1",
+        'er3a.diagnose(robot, "er3a_c60")',
+        N_("Units"),
+        N_(
+            "Millimetres and degrees must become metres and radians; forgetting it is the commonest error (also "
+            "in 6.2)."
+        ),
+        N_(
+            "er3a's files are in mm and degrees, Python is in m and rad. Degrees given as radians put the "
+            "example's tool {degrees_off_mm:.0f} mm off; `er3a.forward` warns of them. All lengths of the table "
+            "add up to {length_m:.2f} m: read as metres it would be 1 000 times that."
+        ),
+    ),
+    Item(
+        "links",
+        "3.1",
+        "er3a.Robot.from_dh(a, alpha, d, lower=..., upper=..., offset=..., base=..., tool=...)",
+        N_("Links, limits, base and tool"),
+        N_("Six links with their limits make the robot; base and tool are transforms that place it."),
+        N_("The same table, limits, base and tool are read here; the foot of this page names the files."),
+    ),
+    Item(
+        "offset",
+        "3.1",
+        "robot.replace(offset=...)",
+        N_("Joint offsets"),
+        N_(
+            "An offset is for a mechanical zero that differs from the table's; here they are assumed to agree, so"
+            " all are 0."
+        ),
+        N_(
+            "With all offsets 0 the table meets {p_statements_met} of {p_statements} of the article's statements,"
+            " with offset 2 = −90° {c_statements_met} of {c_statements}."
+        ),
+        N_("By the article's own zero pose offset 2 is not 0."),
+    ),
+    Item(
+        "plot",
+        "3.2",
+        "er3a.plot(robot, q)",
+        N_("Plot at the zero pose"),
+        N_("The arm is plotted at zero in a window from z = 0 to 1.5 m."),
+        N_(
+            "As printed the tool stands at z = {p_tool_z:.0f} mm: {hidden_percent:.0f} % of the arm's length is "
+            "outside that window (figure {figure_zero}). With offset 2 = −90° it is at {c_tool_z:.0f} mm."
+        ),
+        N_("The window hides the forearm and the tool: the table is not the arm described."),
+    ),
+    Item(
+        "teach",
+        "3.2",
+        "er3a teach ROBOT",
+        N_("Teach panel"),
+        N_("Sliders move the joints and the arm follows, to feel each joint and to try the limits."),
+        N_("The teach panel does that in a browser, with limits, singularities and all solutions of the pose shown."),
+    ),
+    Item(
+        "wrist",
+        "3.2",
+        "er3a.conditioning(robot, q)",
+        N_("Joint 5 near 0"),
+        N_(
+            "With axes 4 and 6 nearly in line, a small move of joint 4 or 6 is said to change the orientation "
+            "violently."
+        ),
+        N_(
+            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere. What grows is "
+            "the joint speed that a turn of the tool needs: {gain_0:.1f}, {gain_1:.1f} and {gain_2:.0f} times the"
+            " tool's own at joint 5 = 5°, 1° and 0.1° (figure {figure_wrist})."
+        ),
+        N_(
+            "It is the other way round: at the singularity the tool loses a direction, and joints must move fast "
+            "for small turns of the tool."
+        ),
+    ),
+    Item(
+        "fkine",
+        "4.1",
+        "er3a.forward(robot, q)",
+        N_("Forward kinematics"),
+        N_("The pose of q = [0, π/4, −π/6, 0, π/3, 0] is computed."),
+        N_(
+            "As printed: ({p_example_x:.2f}, {p_example_y:.2f}, {p_example_z:.2f}) mm. With offset 2 = −90°: "
+            "({c_example_x:.2f}, {c_example_y:.2f}, {c_example_z:.2f}) mm. The article gives no numbers to "
+            "compare."
+        ),
+    ),
+    Item(
+        "rpy",
+        "4.1",
+        "er3a.rpy(T)",
+        N_("Roll, pitch, yaw"),
+        N_("Orientation is read as roll-pitch-yaw (ZYX) or as ZYZ Euler angles."),
+        N_(
+            "Roll, pitch, yaw of the example as printed: {p_example_roll:.2f}°, {p_example_pitch:.2f}°, "
+            "{p_example_yaw:.2f}°."
+        ),
+    ),
+    Item(
+        "same_as_teach",
+        "4.1",
+        "",
+        N_("The same in the teach panel"),
+        N_("The computed position must agree with what the teach panel shows."),
+        N_("Open the example in the panel of this table and compare: both use one table."),
+    ),
+    Item(
+        "target",
+        "4.2",
+        "er3a.inverse(robot, T)",
+        N_("The target"),
+        N_("The target is (0.5, 0.2, 0.7) m with roll, pitch, yaw 0°, 90°, 0°."),
+        N_(
+            "At a pitch of 90° roll and yaw are one turn: 0°, 90°, 0° and 30°, 90°, 30° are the same pose (apart "
+            "by {same_pose_apart})."
+        ),
+        N_(
+            "The example lies on the singularity of roll-pitch-yaw, which the article does not mention. It harms "
+            "no solver, but reading the angles back may give others."
+        ),
+    ),
+    Item(
+        "ikine",
+        "4.2",
+        "er3a.solve(robot, T, q0, respect_limits=False)",
+        N_("ikine and the limits"),
+        N_(
+            "The code's comment says that ikine considers the limits (3.1 says so of the solver too); the text "
+            "below says that it does not."
+        ),
+        N_(
+            "Iteration without limits reaches the target with joint {free_joint} {free_beyond_deg:.0f}° beyond "
+            "its limit."
+        ),
+        N_("The text is right and the comment wrong."),
+    ),
+    Item(
+        "mask",
+        "4.2",
+        "er3a.solve(robot, T, q0, mask=[1, 1, 1, 1, 1, 0])",
+        N_("Mask and start guess"),
+        N_("A mask chooses the degrees of freedom, and the start guess decides which solution is found."),
+        N_("Both are arguments of `er3a.solve`; `er3a.inverse` needs no start guess."),
+    ),
+    Item(
+        "ikcon",
+        "4.2",
+        "er3a.solve(robot, T, q0)",
+        N_("ikcon"),
+        N_("ikcon is recommended because it respects the limits; its second output is taken as an exit flag."),
+        N_(
+            "As printed {p_within_limits} of {p_solutions} branches are within the limits, so nothing that "
+            "respects them can solve the target."
+        ),
+        N_(
+            "By the Toolbox's documentation the second output of ikcon is the remaining error, not a flag, so a "
+            "failure looks like success to code that tests it for being above 0."
+        ),
+    ),
+    Item(
+        "unreachable",
+        "4.2",
+        "er3a.inverse(robot, T)",
+        N_("Why a target fails"),
+        N_("A failure may mean a target out of reach, a singularity, limits, or a poor guess."),
+        N_(
+            "Here it is the table: as printed {p_within_limits} of {p_solutions} branches keep the limits, with "
+            "offset 2 = −90° {c_within_limits} of {c_solutions}; of the real arm {r_within_limits} of "
+            "{r_solutions}."
+        ),
+        N_("The article looks for the cause in target, guess and limits, not in the table."),
+    ),
+    Item(
+        "eight",
+        "4.2",
+        "er3a.inverse(robot, T)",
+        N_("Up to eight solutions"),
+        N_("A wrist-partitioned arm has up to 8 solutions, in closed form."),
+        N_(
+            "{p_solutions} branches are found in closed form; forward kinematics misses the target by "
+            "{residual_mm} mm at most."
+        ),
+    ),
+    Item(
+        "choice",
+        "4.2",
+        'er3a.select(robot, solutions, {"nearest": 1, "limits": 2}, q_ref=q)',
+        N_("Which solution to take"),
+        N_("Take the nearest, one far from singularities, or one clear of obstacles."),
+        N_("`er3a.select` ranks by these rules and mixes of them; the inverse page of each table shows it."),
+    ),
+    Item(
+        "cloud",
+        "5.1",
+        "er3a.forward(robot, q)",
+        N_("Point cloud"),
+        N_("10 000 random joint vectors within the limits are drawn as a cloud."),
+        N_(
+            "So drawn here as printed: from z = {cloud_lowest_mm:.0f} mm on, out to {cloud_farthest_mm:.0f} mm "
+            "from axis 1. The workspace stage proves a volume between {p_volume_low:.2f} and {p_volume_high:.2f} "
+            "m³."
+        ),
+    ),
+    Item(
+        "void",
+        "5.1",
+        "",
+        N_("The void"),
+        N_("The workspace is a hollow shell; a region near and below the base can't be reached."),
+        N_(
+            "As printed the void is of {p_void_low:.0f} to {p_void_high:.0f} L with its centre at z = "
+            "{p_void_z:.0f} mm. With offset 2 = −90° {c_void_low:.2f} to {c_void_high:.2f} L are left, at z = "
+            "{c_void_z:.0f} mm (figure {figure_reach})."
+        ),
+        N_(
+            "The printed table's void lies above the base, not below it. It comes from the missing offset, and "
+            "the shell is then almost filled."
+        ),
+    ),
+    Item(
+        "jtraj",
+        "5.2",
+        "er3a.jtraj(q0, q1, t)",
+        N_("Joint move"),
+        N_("A quintic in joint space takes 5 s with 50 samples; angle, velocity and acceleration are plotted."),
+        N_(
+            "Greatest velocity {move_speed_deg_s:.1f}°/s, greatest acceleration "
+            "{move_acceleration_deg_s2:.1f}°/s² (figure {figure_move}). The curve is the same for any table."
+        ),
+    ),
+    Item(
+        "animation",
+        "5.2",
+        "er3a.plot(robot, q)",
+        N_("Animation with trail"),
+        N_("Both motions are animated with the tool's trail."),
+        N_(
+            "The player on this page shows both, of both tables side by side; the trajectory pages and recordings"
+            " show them too."
+        ),
+    ),
+    Item(
+        "ctraj",
+        "5.2",
+        "er3a.follow(robot, er3a.line(T0, T1, 5.0), t)",
+        N_("Straight line"),
+        N_("50 poses on a straight line are solved one after the other with ikcon, each from the last."),
+        N_("er3a follows the whole line of both tables. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°."),
+    ),
+    Item(
+        "line_singular",
+        "5.2",
+        "",
+        N_("Where the line is singular"),
+        N_("A straight line may cross singular regions; the example is played without a remark."),
+        N_(
+            "As printed the line is singular at t = {p_crossings} s: it starts with axes 4 and 6 in line and "
+            "crosses again. With offset 2 = −90°: t = {c_crossings} s. Joint speeds rise to "
+            "{p_line_speed_deg_s:.0f}°/s and {c_line_speed_deg_s:.0f}°/s (figure {figure_line})."
+        ),
+        N_("The article's own example is the case that it warns of."),
+    ),
+    Item(
+        "condition",
+        "5.2",
+        "er3a.conditioning(robot, q)",
+        N_("Manipulability and condition number"),
+        N_("The condition number is named as an example of manipulability (again in 6.2)."),
+        N_(
+            "Of two random poses the measures disagree in {ranked_apart_percent:.0f} % of the cases on which is "
+            "nearer to a singularity (figure {figure_measures})."
+        ),
+        N_(
+            "Manipulability is the product of the singular values, the condition number the ratio of the largest "
+            "to the smallest. One falls to 0 and the other grows without bound."
+        ),
+    ),
+    Item(
+        "avoidance",
+        "5.2",
+        "",
+        N_("What to do about it"),
+        N_("Stop, go round in joint space, warn the operator, or bend the line by a via point (6.2)."),
+        N_(
+            "All are tried and compared on the trajectory page. On the article's line the best leaves it by "
+            "{repair_mm:.0f} mm and {repair_deg:.1f}° and takes {repair_longer_s:.2f} s longer."
+        ),
+    ),
+    Item(
+        "key_poses",
+        "6.1",
+        'er3a.load_references("er3a_c60")',
+        N_("Key poses against the manual"),
+        N_("Compare key poses with the manual; small errors are allowed."),
+        N_(
+            "No official manual was found. Against CAD models and a URDF export {p_checks_met} of {p_checks} "
+            "independent checks pass as printed, {c_checks_met} of {c_checks} with offset 2 = −90°, and "
+            "{r_checks_met} of {r_checks} of the real arm's own table."
+        ),
+        N_(
+            "The lengths are another robot's: with offset 2 = −90° the table agrees with the article and is still"
+            " no ER3A-C60, which reaches {r_reach_mm:.0f} mm from axis 1, not {p_reach_mm:.0f} mm."
+        ),
+    ),
+    Item(
+        "boundary",
+        "6.1",
+        "",
+        N_("Workspace drawing"),
+        N_("Compare the cloud with the manual's drawing."),
+        N_(
+            "No drawing of this arm was found. For the ER3-600, whose manual has one, the default study makes the"
+            " comparison."
+        ),
+        N_("There is nothing to compare with."),
+    ),
+    Item(
+        "round_trip",
+        "6.1",
+        "",
+        N_("Round trip"),
+        N_("Joints to pose and back must give the joints again."),
+        N_("Over {round_trips} random poses the joints come back within {round_trip_deg}°."),
+    ),
+    Item(
+        "hole",
+        "6.2",
+        "",
+        N_("A hole in the cloud"),
+        N_("A hole in the middle means wrong limits, or a direction turned round, of joints 2 and 3."),
+        N_(
+            "The hole is there as printed ({p_void_low:.0f} L). Neither a limit nor a direction is its cause: one"
+            " offset takes it to {c_void_low:.2f} L."
+        ),
+        N_("Offsets belong on the list of causes."),
+    ),
+    Item(
+        "poor_solver",
+        "6.2",
+        "er3a.solve(robot, T, q0)",
+        N_("Inverse kinematics fails often"),
+        N_("Try other guesses, tilt the target a little, look at the limits."),
+        N_("No guess helps where no branch is within the limits; the inverse page says so, and why, for every target."),
+    ),
+    Item(
+        "collision",
+        "6.3",
+        'er3a.load_scene("scene.yaml")',
+        N_("Collisions"),
+        N_("Links as cylinders and boxes, checked along the path."),
+        "{stage_collision}",
+    ),
+    Item(
+        "programs",
+        "6.3",
+        "er3a.write_program(...)",
+        N_("CSV and robot programs"),
+        N_("Trajectories are written as CSV or as controller programs (.src, .script)."),
+        "{stage_programs}",
+    ),
+    Item(
+        "vision",
+        "6.3",
+        "er3a.calibrate_hand_eye(...)",
+        N_("Camera"),
+        N_("A calibrated camera gives a part's pose in the base frame, and inverse kinematics the joints to grasp it."),
+        "{stage_vision}",
+    ),
+    Item(
+        "dynamics",
+        "6.3",
+        "er3a.torques(robot, q, qd, qdd)",
+        N_("Dynamics"),
+        N_("With masses, centres and inertias, torques can be computed, to choose motors."),
+        "{stage_dynamics}",
+    ),
+    Item(
+        "toolset",
+        "6.3",
+        "er3a new cell --dh table.csv",
+        N_("The next robot"),
+        N_("Wrap it all up, so that the next robot takes less time."),
+        N_("`er3a new` makes such a study of any table or URDF."),
+    ),
+)
+
+SECTIONS = {
+    "1": N_("Project"),
+    "2.1": N_("Tools"),
+    "2.2": N_("Kinematics and D-H parameters"),
+    "3.1": N_("The model"),
+    "3.2": N_("Seeing it"),
+    "4.1": N_("Forward kinematics"),
+    "4.2": N_("Inverse kinematics"),
+    "5.1": N_("Workspace"),
+    "5.2": N_("Trajectories"),
+    "6.1": N_("Checking the model"),
+    "6.2": N_("Symptoms and causes"),
+    "6.3": N_("Further uses"),
+}
+AGREEMENT = {
+    "agrees": N_("agrees"),
+    "differs": N_("differs"),
+    "in_part": N_("in part"),
+    "not_examined": N_("not examined"),
+    "done": N_("can be done"),
+}

@@ -1,0 +1,89 @@
+"""An arm drawn with Matplotlib, in a window or a notebook: one pose, or a motion with the tool's trail."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot
+from matplotlib.animation import FuncAnimation
+from matplotlib.figure import Figure
+
+from er3a.errors import ShapeError
+from er3a.geometry.transforms import as_floats
+from er3a.kinematics.forward import forward, frames
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
+from er3a.pipeline.viewing.skeleton import skeleton
+from er3a.robots.joint_limits import size_of
+from er3a.robots.robot import Robot
+
+TOOL_AXES = ("#b42318", "#18794e", "#0b5c94")
+MOST_FRAMES = 200
+AXES_LENGTH = 0.12  # of the tool's axes, in parts of the arm's size
+
+
+def plot(robot: Robot, q: Reals, seconds: float = 5.0) -> Figure | FuncAnimation:
+    """Draw an arm: its links, its joints, and its tool's axes (x red, y green, z blue).
+
+    Parameters
+    ----------
+    q : (n,), rad or m: a figure; (N, n): an animation with the tool's trail, which a notebook plays
+    seconds : how long the animation lasts
+
+    Returns
+    -------
+    drawn : a figure or an animation of Matplotlib: ``plt.show()`` opens it, ``.savefig`` or ``.save`` keeps it
+
+    Raises
+    ------
+    ShapeError
+        if q is neither
+    """
+    values = as_floats(q, "q")
+    if values.ndim not in (1, 2) or values.shape[-1] != robot.joints or not len(values):
+        raise ShapeError("q", values.shape, f"({robot.joints},) or (N, {robot.joints})")
+    motion = values if values.ndim == 2 else values[None]
+    motion = motion[np.unique(np.linspace(0, len(motion) - 1, MOST_FRAMES).round().astype(int))]
+    figure = pyplot.figure()
+    axes: Any = figure.add_subplot(projection="3d")
+    trail = forward(robot, motion)[:, :3, 3]
+    _frame(axes, robot, motion)
+    parts = _parts(axes, robot)
+
+    def show(number: int) -> list[Any]:
+        arm, joints, tool, way = parts
+        corners, T = skeleton(robot, motion[number]), frames(robot, motion[number])
+        arm.set_data_3d(*corners.T)
+        joints._offsets3d = tuple(T[:-1, :3, 3].T)
+        for c, line in enumerate(tool):
+            end = T[-1, :3, 3] + AXES_LENGTH * size_of(robot) * T[-1, :3, c]
+            line.set_data_3d(*np.stack([T[-1, :3, 3], end]).T)
+        way.set_data_3d(*trail[: number + 1].T)
+        return [arm, joints, way, *tool]
+
+    show(0)
+    if values.ndim == 1:
+        return figure
+    animation = FuncAnimation(figure, show, frames=len(motion), interval=1000 * seconds / len(motion))
+    pyplot.rcParams["animation.html"] = "jshtml"
+    pyplot.close(figure)  # a notebook would show it beside the animation
+    return animation
+
+
+def _parts(axes: Any, robot: Robot) -> tuple[Any, Any, list[Any], Any]:
+    """The drawn parts: links, joints, the tool's axes, its trail."""
+    (arm,) = axes.plot([], [], [], "-", color=MUTED, linewidth=4)
+    joints = axes.scatter(*np.zeros((3, robot.rows)), color=[JOINTS[k % len(JOINTS)] for k in range(robot.rows)], s=45)
+    tool = [axes.plot([], [], [], "-", color=colour, linewidth=2)[0] for colour in TOOL_AXES]
+    (way,) = axes.plot([], [], [], "-", color=INK, linewidth=1)
+    return arm, joints, tool, way
+
+
+def _frame(axes: Any, robot: Robot, motion: Reals) -> None:
+    """Axes of one scale that hold the whole motion."""
+    points = np.concatenate([skeleton(robot, each) for each in motion])
+    middle, half = (points.max(axis=0) + points.min(axis=0)) / 2, 0.55 * np.ptp(points, axis=0).max()
+    axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title=robot.title)
+    axes.set(**{f"{name}lim": (at - half, at + half) for name, at in zip("xyz", middle)})
+    axes.set_box_aspect((1, 1, 1))
