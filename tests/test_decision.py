@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from er3a.pipeline.messages.pages import decision
+from er3a.pipeline.messages.pages import decision, next_step
 from er3a.pipeline.viewing.page import LED, led
 
 
@@ -43,3 +43,25 @@ def test_a_long_verdict_is_cut_at_the_end_of_a_clause_and_loses_nothing(end, gap
 def test_a_short_verdict_and_one_without_clauses_stay_whole():
     assert led("All is well. Nothing is open.") == ("All is well. Nothing is open.", "")
     assert led("word " * 100) == ("word " * 100, "")
+
+
+@pytest.mark.parametrize(
+    ("table", "failed", "more", "page"),
+    [
+        ("fail", {"inverse": "inverse"}, {"instead": "other"}, "#other"),
+        ("fail", {}, {}, "arm/validation.html"),
+        ("fail", {}, {"instead": "other", "same_arm": True}, "arm/validation.html"),
+        ("caution", {"inverse": "inverse"}, {"measurement": "measure a1"}, "arm/inverse.html"),
+        ("caution", {}, {"measurement": "measure a1"}, "arm/validation.html"),
+        ("no_reference", {}, {}, "arm/validation.html"),
+    ],
+)
+def test_the_next_step_leads_to_the_page_that_says_how(table, failed, more, page):
+    found = next_step("arm", table, failed, **more)
+    assert found is not None
+    assert found.page == page
+
+
+def test_nothing_is_next_where_nothing_is_open():
+    assert next_step("arm", "pass", {}) is None
+    assert next_step("arm", "caution", {}) is None

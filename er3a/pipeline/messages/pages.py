@@ -162,6 +162,43 @@ def decision(
 
 
 @dataclass(frozen=True)
+class NextStep:
+    """What to do next with a robot's model, and the page that says how, from the index."""
+
+    text: str
+    page: str
+
+
+def next_step(
+    robot: str,
+    table: str,
+    failed: Mapping[str, str],
+    *,
+    instead: str | None = None,
+    same_arm: bool = False,
+    measurement: str = "",
+) -> NextStep | None:
+    """The step that helps most; None where nothing is open. ``failed``: titles of stages that failed, by name;
+    ``measurement``: the one that validation proposes; the others as of :func:`decision`."""
+    validation = f"{robot}/validation.html"
+    if table == "fail" and same_arm:
+        return NextStep(tr("Next: take the corrected table from the validation page."), validation)
+    if table == "fail" and instead:
+        return NextStep(tr("Next: use {robot}, which the same evidence bears out.", robot=instead), f"#{instead}")
+    if table == "fail":
+        return NextStep(tr("Next: see which entries the evidence contradicts, and what would mend them."), validation)
+    if failed:
+        stage, title = next(iter(failed.items()))
+        return NextStep(
+            tr("Next: see why {stage} fails, and what to do about it.", stage=title), f"{robot}/{stage}.html"
+        )
+    if table == "no_reference":
+        text = tr("Next: gather the manufacturer's data, or compare the table with a URDF: er3a compare TABLE URDF.")
+        return NextStep(text, validation)
+    return NextStep(tr("Next: {what}.", what=measurement), validation) if measurement else None
+
+
+@dataclass(frozen=True)
 class Caveat:
     """What to know first, and the status of validation that it comes from."""
 

@@ -26,7 +26,8 @@ from er3a.files.kept_files import write_atomically
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.messages.pages import caveat, decision
+from er3a.pipeline.messages.pages import caveat, decision, next_step
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
@@ -504,11 +505,11 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     expected = study.entry(name).expect
     stages = [stage for stage in study.stages(name) if stage in STAGES]
     heads = {stage: stage_head(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
-    failed = [
-        tr(STAGES[stage].title)
+    failed = {
+        stage: tr(STAGES[stage].title)
         for stage, head in heads.items()
         if head.status == "fail" and expected.get(stage) != "fail"  # one that is expected is a demonstration
-    ]
+    }
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     shown = sorted(heads.values(), key=lambda head: FIRST.index(head.status))
     meant = [  # to fail, or to hold what fails: these are counted apart from what passes
@@ -517,9 +518,13 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         if (head.demonstrations and head.status == "pass")
         or (head.status in ("caution", "fail") and head.status == expected.get(head.stage))
     ]
+    finding = heads["validation"].finding if "validation" in heads else None
+    same_arm, instead = isinstance(finding, DefinedOtherwise), table_instead(study, name, results.parent)
+    measurement = say(finding.next_measurement) if isinstance(finding, LeftOpen) and finding.next_measurement else ""
     return {
         "robot": study.robot(name),
         "table": table,
+        "next": next_step(name, table, failed, instead=instead, same_arm=same_arm, measurement=measurement),
         "heads": [(head, *page.led(head.text)) for head in shown],
         "counts": [
             (status, sum(head.status == status and head.stage not in meant for head in shown)) for status in FIRST
@@ -529,16 +534,16 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "decision": decision(
             table,
-            failed,
-            table_instead(study, name, results.parent),
-            _geometry(heads.get("validation")),
-            same_arm="validation" in heads and isinstance(heads["validation"].finding, DefinedOtherwise),
+            [*failed.values()],
+            instead,
+            _geometry(finding),
+            same_arm=same_arm,
         ),
     }
 
 
-def _geometry(head: page.Head | None) -> tuple[int, int] | None:
+def _geometry(finding: object) -> tuple[int, int] | None:
     """How many of how many entries of a table's geometry are settled, where only part of it is."""
-    if head is None or not isinstance(head.finding, LeftOpen):
+    if not isinstance(finding, LeftOpen):
         return None
-    return next(((part.settled, part.entries) for part in head.finding.parts if part.part == "geometry"), None)
+    return next(((part.settled, part.entries) for part in finding.parts if part.part == "geometry"), None)
