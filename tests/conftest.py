@@ -55,7 +55,8 @@ settings.load_profile("no test asserts on time")
 gc.disable()
 
 
-def pytest_collection_finish() -> None:
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop() -> None:
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
     gc.enable()

@@ -204,7 +204,7 @@ def test_a_scara_serves_the_boxes_it_is_said_to(random):
     done = tool_capability(robot, CapabilitySettings(directions=12), 0.05)
     assert isinstance(done.placement, PlacementSummary)
     assert done.placement.places
-    for place in done.placement.places:
+    for place in done.placement.places[:3]:
         corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T / 2
         for point in place.centre_m + corners * place.size_m:
             assert reached(robot, lambda T, point=point: T[:3, 3] - point, random, 6)
