@@ -32,6 +32,20 @@ from testing.small_study import STUDY, fresh
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 ROBOT = "er3_600"  # the one of those tests for which one is enough
 LONGEST_S = 900
+LONGEST_FILES = (
+    "integration/test_pipeline.py",
+    "integration/test_wheel.py",
+    "identifiability/test_evidence.py",
+    "stages/test_workspace.py",
+    "stages/test_trajectory.py",
+    "kinematics/test_by_class.py",
+    "stages/test_validation.py",
+    "workspace/test_general.py",
+    "integration/test_killed_run.py",
+    "integration/test_offices.py",
+    "test_command_line.py",
+)
+ROOT = Path(__file__).resolve().parents[1]
 
 settings.register_profile("no test asserts on time", deadline=None)
 settings.load_profile("no test asserts on time")
@@ -41,7 +55,8 @@ settings.load_profile("no test asserts on time")
 gc.disable()
 
 
-def pytest_collection_finish() -> None:
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop() -> None:
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
     gc.enable()
@@ -66,8 +81,12 @@ def _process_number() -> int:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """One order in all processes; tests of the small study or of a stage's results of it are long; time limits."""
-    items.sort(key=lambda item: item.path)
+    """Tests of the small study or of a stage's results of it are long; time limits of long ones and of Snakemake's.
+
+    Processes are given one file after the other (pyproject.toml): the longest first, those with short tests last.
+    """
+    ranks = {ROOT / "tests" / name: rank for rank, name in enumerate(LONGEST_FILES)}
+    items.sort(key=lambda item: (ranks.get(item.path, len(ranks)), item.path.parent == ROOT / "tests", item.path))
     for item in items:
         fixtures = getattr(item, "fixturenames", ())
         if {"small_study", "small_results"} & set(fixtures):
@@ -132,7 +151,6 @@ def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> 
     return called
 
 
-ROOT = Path(__file__).resolve().parents[1]
 RUN_PARTS = ("results", "reports", "logs", ".snakemake")  # what a run leaves
 ALL_THERE = "all results, recordings and reports are there"  # the message of rule all, which does nothing
 

@@ -23,7 +23,6 @@ ENTRIES = [f"{column}{joint}" for column in COLUMNS for joint in range(1, 7)]
 STARTS, PASSES, PROBE = 48, 60, 1e-6
 CORRUPTED = [
     ("er3a_c60", {"d6": 0.01192, "alpha5": 0.01197}),
-    ("er3a_c60", {"a2": -0.03, "offset3": 0.4}),
     ("er3_600", {"alpha4": 0.9, "offset5": -0.3}),
 ]
 

@@ -8,18 +8,17 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-import er3a
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.continuous import Extents
 from er3a.identifiability.entries import continuous_of, gauge_of
-from er3a.identifiability.entry_evidence import Evidence
 from er3a.identifiability.feasible import Region
 from er3a.identifiability.proposals import LookAtMotion, proposals_of
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import tables_of
 from testing import plain_oracle as oracle
+from tests.identifiability.test_evidence import evidence
 
 pytestmark = pytest.mark.long
 
@@ -33,11 +32,6 @@ TOLERANCE_MM, TOLERANCE_DEG = 5.0, 0.5
 BEYOND = 1.2
 FEASIBLE = 1.05
 """Half-widths: what the search for extremes, here on grids and there by climbing, may differ by."""
-
-
-@cache
-def evidence(name: str) -> Evidence:
-    return er3a.evidence(load_robot(name))
 
 
 @cache

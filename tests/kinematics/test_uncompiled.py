@@ -5,6 +5,8 @@ Compiled, over many arms and poses, they are tested in ``test_classes`` and ``te
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -26,6 +28,20 @@ def by_search(rows, T, starts):
         if np.abs(root.fun).max() < 1e-10:
             found.append(root.x)
     return found
+
+
+@pytest.mark.parametrize("name", ["crx", "manseur_doty"])
+def test_each_reading_of_the_loop_by_itself_finds_the_rows_of_all(name, random):
+    arm, own = prepared(links(name)), random.uniform(-np.pi, np.pi, (1, 6))
+    T = np.array([pose_by_hand(ROWS[name], q) for q in own])
+    every = solve_six_revolute(arm, T)
+    assert {reading.sense for reading in arm.readings} == {1.0, -1.0}
+    for reading in arm.readings:
+        alone = solve_six_revolute(replace(arm, readings=(reading,)), T)
+        assert nearest(alone.q[0], own[0]) < 1e-8
+        if alone.certainty[0] == CERTAIN:
+            assert alone.count[0] == every.count[0]
+            assert all(nearest(every.q[0], row) < 1e-8 for row in alone.q[0, : alone.count[0]])
 
 
 @pytest.mark.parametrize("name", ["crx", "manseur_doty"])

@@ -45,6 +45,7 @@ from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach.panel import write_teach_page
 from er3a.pipeline.viewing.index import write_index
+from er3a.planning import tool_proof
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.intervals import AboveLimit
 from testing.on_demand import OnDemand
@@ -411,7 +412,8 @@ def test_choices_that_do_not_fit_are_refused(study, tmp_path, change, message):
 
 
 @pytest.mark.long
-def test_extreme_paths_give_results(study, tmp_path):
+def test_extreme_paths_give_results(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(tool_proof, "MOST_INTERVALS", 4000)  # the proof from a singular start uses up what it may
     far = {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}
     paths = [
         LINE | {"name": "still", "end": LINE["start"]},

@@ -100,15 +100,15 @@ def test_empty_cells_hold_no_point_and_filled_ones_are_reached(make, random):
     robot = make()
     proven = prove_robot(robot, 1500, 500, 1)
     span = robot.upper - robot.lower
-    q = robot.lower + span * np.clip(random.uniform(-0.2, 1.2, (20_000, robot.joints)), 0, 1)  # many at limits
+    q = robot.lower + span * np.clip(random.uniform(-0.2, 1.2, (8000, robot.joints)), 0, 1)  # many at limits
     q = np.array([row for row in q if not beyond_sums(robot, row).any()])
     points = tools_by_hand(robot, q)[:, :3, 3]
     assert len(points) > 1000
     assert not (states(proven, points) == EMPTY).any()
 
     box = random.uniform(points.min(axis=0), points.max(axis=0), (4000, 3))
-    filled = box[states(proven, box) == FILLED][:12]
-    assert len(filled) == 12
+    filled = box[states(proven, box) == FILLED][:6]
+    assert len(filled) == 6
     assert all(is_reached(robot, point, random) for point in filled)
 
 

