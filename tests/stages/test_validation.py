@@ -553,14 +553,15 @@ def other_conventions(content) -> None:
 
 @pytest.mark.long
 def test_any_number_of_conventions_is_no_other_arm(study, tmp_path):
-    stored = computed(edited_robot(study, tmp_path, other_conventions), tmp_path / "out")
+    other = edited_robot(study, tmp_path, other_conventions)
+    stored = computed(other, tmp_path / "out")
     found = stored.results.summary.verdict.finding
     assert isinstance(found, DefinedOtherwise)
     assert not any(each.another_arm for each in stored.results.summary.sets)
     assert BaseElsewhere((-100.0, 0.0, 330.0), 0.0).kind in {fault.kind for fault in found.diagnosis.faults}
     assert {fault.joint for fault in found.diagnosis.faults if fault.kind == "offset"} >= {2, 3}
     assert "the same arm, defined otherwise" in say(found)
-    assert "This is the robot, but its zeros" in page_of(study, stored, tmp_path)
+    assert "This is the robot, but its zeros" in page_of(other, stored, tmp_path)
 
 
 @pytest.mark.long
