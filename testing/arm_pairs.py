@@ -183,9 +183,8 @@ def with_wrong_entries(random: np.random.Generator, arm: Arm) -> tuple[Arm, Wron
             amount = random.choice(LENGTHS_M) if lengths else np.radians(random.choice(ANGLES_DEG))
             wrong = changed(wrong, entries[i], amount * random.choice([1, -1]))
         if _known(entries, effect, chosen) and _known(entries, effects(wrong, entries), chosen):
-            if any(
-                column == "a" and abs(wrong.a[k] + arm.a[k]) < 1e-9 for column, k in map(entries.__getitem__, chosen)
-            ):
+            rows = [entries[i][1] for i in chosen if entries[i][0] == "a"]
+            if (np.abs(wrong.a + arm.a)[rows] < 1e-9).any():
                 continue  # the same normal, the other way
             same = np.abs(effect.T @ effect) > ALIKE * np.outer(size, size)
             alike = [frozenset(name(entries[j]) for j in np.flatnonzero(same[i])) for i in chosen]

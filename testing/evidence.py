@@ -34,6 +34,7 @@ PAGES = (
     "teach",
     "pages",
     "fleet",
+    "comparison",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md", "slurm": "cluster.md"}
 CAMPAIGNS = (*PAGES, *PARTS)

@@ -271,7 +271,7 @@ def _named(robot: Robot, found: EntryDifference) -> Difference:
     column, link = found.column, found.link
     angle = column in ("alpha", "beta", "theta")
     scale = np.degrees(1.0) if angle else 1000.0
-    one, other = (float(np.round(scale * value, 9)) + 0.0 for value in (found.one, found.other))
+    one, other = (float(np.round(scale * value, 6)) + 0.0 for value in (found.one, found.other))
     alike = tuple(_name(robot, *each) for each in found.alike)
     return Difference(_name(robot, column, link), one, other, other - one, "deg" if angle else "mm", alike)
 

@@ -1,9 +1,9 @@
 """Whether a table is the arm that references describe, with zeros, directions, base or flange defined otherwise.
 
 Where references state the line of every joint axis, these lines are an arm, and the table is matched with it
-(:mod:`er3a.comparison.mechanism`): geometry first. Only if that agrees are zeros, directions, base and flange taken from
-the match, any number of them at once, and fitted to all references that the arm's shape and place answer. The table is
-the same arm if all of these are met.
+(:mod:`er3a.comparison.mechanism`): geometry first. Only if that agrees are zeros, directions, base and flange taken
+from the match, any number of them at once, and fitted to all references that the arm's shape and place answer. The
+table is the same arm if all of these are met.
 """
 
 from __future__ import annotations

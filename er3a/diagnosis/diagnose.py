@@ -31,9 +31,17 @@ from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, least_greatest, mov
 from er3a.diagnosis.ranking import UNITS, Case, Ranking, case_of, rank_case, usable
 from er3a.kinematics.table_batch import Tables, frames_of, robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
-from er3a.references.predict import predict_tables
-from er3a.references.quantities import MM, Pose, Side, Unit
-from er3a.references.reference import Reference, ReferenceSet, expected_of, lengths_of, quantities_of, vectors_of
+from er3a.references.predict import predict_tables, search
+from er3a.references.quantities import MM, Extreme, Pose, Side, Unit
+from er3a.references.reference import (
+    Reference,
+    ReferenceSet,
+    conflicts,
+    expected_of,
+    lengths_of,
+    quantities_of,
+    vectors_of,
+)
 from er3a.robots.robot import Robot
 
 STEP_DEG = 45.0
@@ -41,6 +49,9 @@ MOST_COMPARED = 60
 APART_MM = 1.0
 APART_RAD = 1e-3
 SIDES: tuple[Side, ...] = ("lower", "upper")
+REACH_STARTS = 40
+TRIED_RAD = tuple(np.radians([1.0, 10.0, 37.0, 90.0, 150.0, 180.0]).tolist())
+TRIED_M = 0.001, 0.01, 0.1, 0.5
 
 
 def what_decides(tables: Tables, robot: Robot) -> NextMeasurement | None:
@@ -111,6 +122,37 @@ def resolution_of(case: Case) -> Resolution:
         half_turns=tuple(number.name for number in half_turns if noticed[number] is not None),
         unseen=(*(number.name for number, size in noticed.items() if size is None), *reversible),
     )
+
+
+def unseen_of(case: Case) -> tuple[str, ...]:
+    """Entries that no reference reacts to, whatever their value, and joints that could be reversed."""
+    entries = [number for number in case.numbers if number.column]
+    if not entries:
+        rows = range(1, case.given.d.shape[-1] + 1)
+        names = [f"{name}{row}" for name in ("a", "alpha", "d", "offset") for row in rows]
+    else:
+        names = [number.name for number in entries if _never_missed(case, number)]
+    return (*names, *_reversible(case))
+
+
+def _never_missed(case: Case, number: FreeNumber) -> bool:
+    """Whether no change of an entry that a table could have moves what the references say."""
+    sizes = np.array(TRIED_RAD if number.is_angle else TRIED_M)
+    before = case.difference(case.given)[0]
+    tables = case.given[np.zeros(2 * len(sizes), dtype=int)]
+    amounts = np.concatenate([sizes, -sizes])[:, None]
+    changed = case.difference(moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts))
+    return bool((np.abs(changed - before) <= case.uncertainty * MEETS).all())
+
+
+def _reversible(case: Case) -> list[str]:
+    before = case.difference(case.given)[0]
+    found = []
+    for joint in range(case.given.direction.shape[-1]):
+        turned = case.given.with_column("direction", [joint], -case.given.direction[:, [joint]])
+        if (np.abs(case.difference(turned)[0] - before) <= case.uncertainty * MEETS).all():
+            found.append(f"direction{joint + 1}")
+    return found
 
 
 def least_noticed(case: Case, number: FreeNumber) -> float | None:
@@ -213,13 +255,34 @@ class Hypothesis(ByValue, Displayed):
 
 
 class Hypotheses(list[Hypothesis], Displayed):
-    """Hypotheses, best first; a list."""
+    """Hypotheses, best first; a list.
+
+    Attributes
+    ----------
+    not_examined : entries of the table that could have any value without a reference being missed (``alpha6``), and
+        joints that could be reversed (``direction5``); an empty list says nothing about them
+    missed : references that no hypothesis rests on, and that the table misses: extremes over the limits, such as reach
+    """
+
+    def __init__(
+        self,
+        hypotheses: Sequence[Hypothesis] = (),
+        not_examined: tuple[str, ...] = (),
+        missed: tuple[Reference, ...] = (),
+    ):
+        super().__init__(hypotheses)
+        self.not_examined, self.missed = not_examined, missed
 
     __repr__ = Displayed.__repr__
 
     def sheet(self) -> Sheet:
-        """A row for each."""
-        return sheet_of(self, f"{len(self)} hypotheses" if self else "No hypothesis")
+        """A row for each, and what an empty list says nothing about."""
+        heading = f"{len(self)} hypotheses" if self else "No hypothesis"
+        if self.missed:
+            heading += f"; reach that is missed: {len(self.missed)}"
+        if self.not_examined:
+            heading += f"; not examined: {', '.join(self.not_examined)}"
+        return sheet_of(self, heading)
 
 
 def sheet_of(hypotheses: Sequence[Hypothesis], heading: str) -> Sheet:
@@ -273,9 +336,37 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Hy
     Returns
     -------
     ranked : at most 10, those that explain first; empty if the references are met, or if no one or two faults do better
-        than the table as it is
+        than the table as it is. What it could not look at stands in ``not_examined``, and extremes over the limits that
+        the table misses in ``missed``
     """
-    return Hypotheses(diagnosis_of(robot, references).hypotheses)
+    stated = usable(references)
+    unseen = unseen_of(case_of(robot, stated)) if stated else every_entry(robot)
+    return Hypotheses(diagnosis_of(robot, references).hypotheses, unseen, extremes_missed(robot, references))
+
+
+def every_entry(robot: Robot) -> tuple[str, ...]:
+    """Names of all entries and directions of a table."""
+    names = ("a", "alpha", "d", "offset", "direction")
+    return tuple(f"{name}{row}" for name in names for row in range(1, robot.rows + 1))
+
+
+def extremes_missed(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
+    """References about extremes over the limits, such as reach, that a table misses: authoritative ones if there are
+    any, without those that contradict each other; none of limits that are crossed."""
+    if (robot.lower > robot.upper).any():
+        return ()
+    every = references.checkable if isinstance(references, ReferenceSet) else references
+    stated = [r for r in every if r.expected is not None and isinstance(r.quantity, Extreme)]
+    stated = [r for r in stated if r.authoritative] or stated
+    contradicted = {i for pair in conflicts(stated) for i in pair}
+    found = []
+    for i, reference in enumerate(stated):
+        if isinstance(reference.quantity, Extreme) and i not in contradicted:
+            expected, uncertainty = expected_of([reference])
+            value = search(robot, reference.quantity, REACH_STARTS)[0]
+            if abs(value - expected[0]) > uncertainty[0] * MEETS:
+                found.append(reference)
+    return tuple(found)
 
 
 def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Diagnosis:

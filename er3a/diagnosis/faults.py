@@ -183,7 +183,7 @@ class WrongScale:
 
 @dataclass(frozen=True)
 class BaseElsewhere:
-    """The references' base stands elsewhere than the table's: ``shift_mm`` of the arm in the base's frame, and a turn."""
+    """The references' base stands elsewhere: ``shift_mm`` and ``turn_deg`` are the arm's in the base's frame."""
 
     shift_mm: tuple[float, float, float]
     turn_deg: float

@@ -178,10 +178,11 @@ def _likely_unit(lengths: list[float]) -> LengthUnit:
         off = [[abs(x * scale - round(x * scale / step) * step) for x in lengths] for step, _, _ in ROUND_MM]
         return any(len(set(lengths)) >= least and max(gaps) < near for gaps, (_, near, least) in zip(off, ROUND_MM))
 
-    if max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0):
-        if max(lengths) >= SHORTEST_ARM_MM or not is_round(1000.0):
-            return "in"
-    return "m" if max(lengths) < SHORTEST_ARM_MM else "mm"
+    metres = max(lengths) < SHORTEST_ARM_MM
+    in_inches = max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0)
+    if in_inches and not (metres and is_round(1000.0)):
+        return "in"
+    return "m" if metres else "mm"
 
 
 def _unit(row: dict[str, Any]) -> str:

@@ -2,138 +2,67 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import er3a
 from er3a.comparison.compare import best_of
-
-KINDS = ("generic", "industrial", "parallel", "coincident", "nearly_parallel", "slides", "scara")
-
-
-def rot(axis: int, angle: float) -> np.ndarray:
-    T = np.eye(4)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    T[i, i] = T[j, j] = np.cos(angle)
-    T[j, i] = np.sin(angle)
-    T[i, j] = -T[j, i]
-    return T
+from er3a.files.arm_file import read_arm
+from er3a.formats.urdf_tree import read_chain
+from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries
+from testing.published_tables import PAIRS, best_alignment_mm, urdf_flange, urdf_path, write_csv
+from testing.readme import README
 
 
-def shift(x: float, y: float, z: float) -> np.ndarray:
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    return T
+def robot(arm: Arm) -> er3a.Robot:
+    ends = {"lower": np.where(arm.sliding, 0.0, -2.5), "upper": np.where(arm.sliding, 0.5, 2.5)}
+    return er3a.Robot(name="arm", title="arm", convention="standard", **ends, **vars(arm))
 
 
-def flange_of(robot: er3a.Robot, q: np.ndarray) -> np.ndarray:
-    """Standard D-H, as any textbook has it; of er3a only the numbers."""
-    T = robot.base
-    for k in range(robot.rows):
-        x = robot.direction[k] * q[k]
-        theta, d = (robot.offset[k], robot.d[k] + x) if robot.sliding[k] else (robot.offset[k] + x, robot.d[k])
-        T = T @ rot(2, theta) @ shift(0, 0, d) @ shift(robot.a[k], 0, 0) @ rot(0, robot.alpha[k])
-    return T @ robot.flange
-
-
-def table(rng: np.random.Generator, kind: str) -> dict[str, np.ndarray]:
-    n = 4 if kind == "scara" else int(rng.integers(4, 9))
-    a, d = rng.choice([0, 0, 0.1, 0.25, 0.42], (2, n)) * rng.uniform(0.9, 1.1, (2, n))
-    alpha = np.radians(rng.choice([90.0, -90.0, 0.0, 180.0], n))
-    sliding = np.zeros(n, dtype=bool)
-    k = int(rng.integers(0, n - 1))
-    if kind == "generic":
-        a, d, alpha = rng.uniform(-0.5, 0.5, n), rng.uniform(-0.5, 0.5, n), rng.uniform(-3, 3, n)
-    if kind == "industrial":
-        a, d = (np.resize(own, n) for own in ([0.15, 0.6, 0.13, 0.0, 0.0], [0.4, 0.0, 0.0, 0.64, 0.0, 0.1]))
-        alpha = np.radians(np.resize([-90.0, 0.0, -90.0, 90.0, -90.0, 0.0], n))
-    if kind == "parallel":
-        alpha[:3], a[:3] = np.radians(rng.choice([0.0, 180.0], 3)), rng.uniform(0.1, 0.5, 3)
-    if kind == "coincident":
-        a[k], alpha[k] = 0.0, rng.choice([0.0, np.pi])
-    if kind == "nearly_parallel":
-        alpha[k] = np.radians(10 ** rng.uniform(-6, 0.4))
-    if kind == "slides":
-        sliding = rng.random(n) < 0.3
-    if kind == "scara":
-        a, d, alpha = np.array([0.25, 0.25, 0, 0]), np.array([0.2, 0, 0, 0.05]), np.array([0, np.pi, 0, 0])
-        sliding = np.arange(4) == 2
-    offset = np.where(sliding, np.radians(rng.choice([0.0, 90.0, 180.0, 30.0], n)), rng.uniform(-3, 3, n))
-    return {
-        "a": a,
-        "d": d,
-        "alpha": alpha,
-        "offset": offset,
-        "direction": rng.choice([1.0, -1.0], n),
-        "sliding": sliding,
-    }
-
-
-def robot(values: dict[str, np.ndarray], **placed: np.ndarray) -> er3a.Robot:
-    sliding = values["sliding"]
-    ends = {"lower": np.where(sliding, 0.0, -2.5), "upper": np.where(sliding, 0.5, 2.5)}
-    return er3a.Robot(name="arm", title="arm", convention="standard", **ends, **values, **placed)
-
-
-def pose(rng: np.random.Generator) -> np.ndarray:
-    turns = [rot(axis, rng.uniform(-3, 3)) for axis in (2, 1, 0)]
-    return shift(*rng.uniform(-0.5, 0.5, 3)) @ turns[0] @ turns[1] @ turns[2]
-
-
-def defined_elsewhere(rng: np.random.Generator, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The same arm with other zeros, directions, ends, and other feet of normals between parallel axes."""
-    n, own = len(values["a"]), {key: value.copy() for key, value in values.items()}
-    own["offset"] = np.where(own["sliding"], own["offset"], rng.uniform(-3, 3, n))
-    own["direction"] = rng.choice([1.0, -1.0], n)
-    own["d"] = np.where(own["sliding"], own["d"] + rng.uniform(-0.2, 0.2, n), own["d"])
-    own["d"][[0, -1]], own["a"][-1], own["alpha"][-1] = rng.uniform(-0.3, 0.3, 2), 0.05, rng.uniform(-3, 3)
-    for k in np.flatnonzero(np.abs(np.sin(own["alpha"][:-1])) < 1e-12):
-        moved = rng.uniform(-0.2, 0.2)
-        own["d"][k] += moved
-        own["d"][k + 1] -= moved * np.cos(own["alpha"][k])
-    return own
+def arm_of(robot: er3a.Robot) -> Arm:
+    return Arm(*(getattr(robot, field) for field in Arm.__dataclass_fields__))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_right_table_is_accused(kind):
-    rng = np.random.default_rng(KINDS.index(kind))
-    for _ in range(12):
-        values = table(rng, kind)
-        printed = robot(values)
+    random = np.random.default_rng(KINDS.index(kind))
+    for _ in range(8):
+        arm = random_arm(random, kind)
+        printed = robot(arm)
         assert er3a.compare(printed, printed).verdict == "equal"
-        other = robot(defined_elsewhere(rng, values), base=pose(rng), flange=pose(rng))
-        found = er3a.compare(printed, other)
+        other = defined_elsewhere(random, arm)
+        found = er3a.compare(printed, robot(other))
         assert (found.verdict, found.geometry.differences) == ("same_arm", ())
         assert found.aligned_mm < 0.5
-        q = rng.uniform(printed.lower, printed.upper, (20, printed.joints))
-        gaps = [np.linalg.norm((flange_of(printed, row) - flange_of(other, row))[:3, 3]) for row in q]
+        q = random.uniform(printed.lower, printed.upper, (20, printed.joints))
+        gaps = [np.linalg.norm((flange_at(arm, row) - flange_at(other, row))[:3, 3]) for row in q]
         assert found.as_printed_mm > 1000 * max(gaps) * 0.5
-        mended = er3a.compare(found.corrected, other)
-        assert mended.verdict == "equal"
-        far = max(np.linalg.norm((flange_of(found.corrected, row) - flange_of(other, row))[:3, 3]) for row in q)
+        mended = arm_of(found.corrected)
+        assert er3a.compare(found.corrected, robot(other)).verdict == "equal"
+        far = max(np.linalg.norm((flange_at(mended, row) - flange_at(other, row))[:3, 3]) for row in q)
         assert 1000 * far == pytest.approx(0, abs=4.0)  # angles that agree to 0.1 deg stay as printed
 
 
-@pytest.mark.parametrize("kind", ["generic", "industrial", "parallel"])
-@pytest.mark.parametrize("moved", [False, True])
-def test_wrong_entries_are_named(kind, moved):
-    rng = np.random.default_rng(5)
-    for _ in range(4):
-        values = table(rng, kind)
-        printed = robot(values)
-        n, wrong = printed.joints, {key: value.copy() for key, value in values.items()}
-        block = 3 if kind == "parallel" else 0  # d in front of it belongs to the base
-        names = [("a", k) for k in range(n - 1)] + [("alpha", k) for k in range(n - 1) if k > block]
-        chosen = [names[i] for i in rng.permutation(len(names))[: rng.integers(1, 5)]]
-        for column, k in chosen:
-            wrong[column][k] += np.radians(rng.choice([0.2, 2, 37])) if column == "alpha" else rng.choice([6e-4, 0.05])
-        other = robot(wrong)
-        if moved:
-            other = robot(defined_elsewhere(rng, wrong), base=pose(rng), flange=pose(rng))
-        found = er3a.compare(printed, other)
+@pytest.mark.parametrize("kind", KINDS)
+def test_wrong_entries_are_named(kind):
+    random = np.random.default_rng(100 + KINDS.index(kind))
+    for case in range(8):
+        arm = random_arm(random, kind)
+        made = with_wrong_entries(random, arm)
+        if made is None:
+            continue
+        other, wrong = made
+        if case % 2:
+            other = defined_elsewhere(random, other)
+        found = er3a.compare(robot(arm), robot(other))
         assert found.verdict == "other_arm"
-        assert {each.entry for each in found.geometry.differences} == {f"{column}{k + 1}" for column, k in chosen}
-        assert er3a.compare(found.corrected, other).geometry.same
+        named = [frozenset({each.entry, *each.alike}) for each in found.geometry.differences]
+        assert len(named) == len(wrong.entries)
+        for entry, alike in zip(wrong.entries, wrong.alike):
+            assert any(name(entry) in own or own & alike for own in named), (entry, named)
+        assert er3a.compare(found.corrected, robot(other)).geometry.same
 
 
 def article() -> er3a.Robot:
@@ -143,7 +72,15 @@ def article() -> er3a.Robot:
 def test_the_articles_table_is_another_arm():
     found = er3a.compare(article(), er3a.load_robot("er3a_c60"))
     assert found.verdict == "other_arm"
-    assert [each.entry for each in found.geometry.differences] == ["a1", "a2", "a3", "d4"]
+    assert {each.entry: (each.a, each.b) for each in found.geometry.differences} == {
+        "a1": (0, 50),
+        "a2": (650, 270),
+        "a3": (0, 70),
+        "d4": (651.61, 299),
+    }
+    assert (found.directions.reversed, found.base.turn.deg, found.flange.turn.deg) == ((2, 3, 5), 0, 0)
+    text = " ".join(README.read_text(encoding="utf-8").split())
+    assert f"1 {found.as_printed_mm - 1000:.0f} mm off as printed, and {found.aligned_mm:.0f} mm off after" in text
     assert er3a.compare(found.corrected, er3a.load_robot("er3a_c60")).verdict == "equal"
 
 
@@ -186,3 +123,65 @@ def test_the_arm_that_fits_best_comes_first():
     right = er3a.load_robot("er3_600")
     others = {f"{mm}": right.replace(a=right.a + np.array([0, mm / 1000, 0, 0, 0, 0])) for mm in (300, 20, 0, -50)}
     assert [name for name, _ in best_of(right, others)] == ["0", "20", "-50", "300"]
+
+
+def with_columns(folder, *, scale: float = 1.0, twice: bool = False):
+    """The table of a UR5 as a person would type it in, lengths times a factor."""
+    (pair,) = (each for each in PAIRS if each.table == "UR5" and each.source.startswith("roboticstoolbox"))
+    path = write_csv(pair, folder / "table.csv")
+    lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+    for cells in lines[1:]:
+        for place in (2, 4):
+            cells[place] = f"{float(cells[place]) * scale:.6f}"
+        if twice:
+            cells[3] = f"{np.degrees(float(cells[3])):.4f}"
+    path.write_text("\n".join(",".join(cells) for cells in lines), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(("given", "note"), [({"scale": 1e-3}, "read as metres"), ({"twice": True}, "converted twice")])
+def test_other_units_are_taken_for_what_they_are(given, note, tmp_path):
+    right = read_arm(str(with_columns(tmp_path))).robot
+    slipped = read_arm(str(with_columns(tmp_path, **given)))
+    assert any(note in text for text in slipped.notes)
+    assert er3a.compare(slipped.robot, right).geometry.same
+
+
+def test_inches_are_recognised_where_they_are_round_millimetres(tmp_path):
+    path = tmp_path / "inches.csv"
+    lengths = ((0, 13.779528), (10.629921, 0), (2.755906, 0), (0, 11.771654), (0, 0), (0, 3.090551))
+    rows = [f"{k},{a},{alpha},{d}" for k, ((a, d), alpha) in enumerate(zip(lengths, (-90, 0, -90, 90, -90, 0)), 1)]
+    path.write_text("\n".join(["joint,a_mm,alpha_deg,d_mm", *rows]), encoding="utf-8")
+    found = read_arm(str(path))
+    assert found.robot.a[1] == pytest.approx(0.27, abs=1e-6)
+    assert any("read as inches" in text for text in found.notes)
+    assert read_arm(str(path), length_unit="mm").robot.a[1] == pytest.approx(0.010629921)
+
+
+def test_short_lengths_beside_long_ones_are_meant(tmp_path):
+    path = tmp_path / "short.csv"
+    rows = ("1,0,90,284.8", "2,0,90,1", "3,-0.35,-90,410", "4,0,0,50")
+    path.write_text("\n".join(["joint,a_mm,alpha_deg,d_mm", *rows]), encoding="utf-8")
+    arm = read_arm(str(path)).robot
+    assert arm.d[1] == pytest.approx(0.001)
+    assert er3a.compare(arm, arm).verdict == "equal"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("place", range(len(PAIRS)))
+def test_what_is_said_of_published_tables_holds_without_er3a(place, tmp_path):
+    pair = PAIRS[place]
+    if not (path := urdf_path(pair)).is_file():
+        pytest.skip("the package with this URDF is not installed")
+    printed = read_arm(str(write_csv(pair, tmp_path / "table.csv"))).robot
+    chain = read_chain(path, None, pair.tip, False).joints
+    found = er3a.compare(printed, read_arm(str(path), tip=pair.tip).robot)
+    q = np.random.default_rng(place).uniform(-np.pi, np.pi, (20, printed.joints))
+    frames = np.stack([urdf_flange(path, chain[0].parent, chain[-1].child, row) for row in q])
+    mended = arm_of(er3a.to_standard(found.corrected))
+    gaps = [np.linalg.norm((flange_at(mended, row) - T)[:3, 3]) for row, T in zip(q, frames)]
+    assert 1000 * max(gaps) < 1.0
+    own = arm_of(er3a.to_standard(printed))
+    start = replace(mended, a=own.a, alpha=own.alpha, d=own.d)
+    left = best_alignment_mm(start, frames, q)
+    assert (left > 1.0) == (found.verdict == "other_arm")

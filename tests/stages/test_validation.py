@@ -17,7 +17,7 @@ import er3a
 import er3a.pipeline.messages.validation
 from er3a.calibration.outcomes import Misfit, MorePositions, NoCorrectionFound
 from er3a.diagnosis.conclusions import MostLikelyFault, NoFewFaultsExplain, NothingToExplain
-from er3a.diagnosis.faults import WrongOffset
+from er3a.diagnosis.faults import BaseElsewhere, WrongOffset
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
@@ -42,6 +42,7 @@ from er3a.pipeline.stages.validation.model import (
     RESULTS,
     AnotherArm,
     Contradicted,
+    DefinedOtherwise,
     LeftOpen,
     NothingToCompare,
     NumbersMissing,
@@ -535,12 +536,32 @@ def test_a_named_fault_is_in_the_verdict_and_on_the_page(study, tmp_path):
     wrong = edited_robot(study, tmp_path, lambda c: c["zero"]["rows"][1].update(offset_deg=0))
     stored = computed(wrong, tmp_path / "out")
     found = stored.results.summary.verdict.finding
-    assert isinstance(found, Contradicted)
+    assert isinstance(found, DefinedOtherwise)
     assert found.diagnosis.faults == (MISSING_OFFSET,)
     assert "Most likely fault: joint 2: offset −90 deg missing" in say(found)
     page = page_of(wrong, stored, tmp_path)
     assert "the named fault corrected: it meets the stated axes" in page
     assert page.index("<h2>Diagnosis") < page.index("<h2>Checks")
+
+
+def other_conventions(content) -> None:
+    for row, offset, direction in ((1, 90, -1), (2, 30, 1), (3, 180, 1), (4, -90, -1)):
+        content["zero"]["rows"][row]["offset_deg"] += offset
+        content["zero"]["rows"][row]["direction"] *= direction
+    content["base"] = {"xyz_mm": [100, 0, -330], "source": "made here", "grade": "claim"}
+
+
+@pytest.mark.long
+def test_any_number_of_conventions_is_no_other_arm(study, tmp_path):
+    other = edited_robot(study, tmp_path, other_conventions)
+    stored = computed(other, tmp_path / "out")
+    found = stored.results.summary.verdict.finding
+    assert isinstance(found, DefinedOtherwise)
+    assert not any(each.another_arm for each in stored.results.summary.sets)
+    assert BaseElsewhere((-100.0, 0.0, 330.0), 0.0).kind in {fault.kind for fault in found.diagnosis.faults}
+    assert {fault.joint for fault in found.diagnosis.faults if fault.kind == "offset"} >= {2, 3}
+    assert "the same arm, defined otherwise" in say(found)
+    assert "This is the robot, but its zeros" in page_of(other, stored, tmp_path)
 
 
 @pytest.mark.long

@@ -1,0 +1,69 @@
+"""Any number of zeros, directions, bases and flanges that are defined otherwise is no fault of another kind; what no
+reference reacts to is named."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import er3a
+from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere
+from er3a.geometry.transforms import rot_z, translation
+from er3a.references.quantities import MM
+
+
+def other_conventions(robot: er3a.Robot, seed: int) -> er3a.Robot:
+    random = np.random.default_rng(seed)
+    offset, direction = robot.offset.copy(), robot.direction.copy()
+    zeros, reversed_joints = (random.permutation(4)[: random.integers(2, 5)] + 1 for _ in range(2))
+    offset[zeros] += np.radians(random.choice([90.0, -90.0, 37.0, 12.5], len(zeros)))
+    direction[reversed_joints] *= -1
+    base = robot.base @ translation(0.1, 0, -0.33) @ rot_z(random.choice([0.0, 0.7]))
+    return robot.replace(offset=offset, direction=direction, base=base)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
+def test_conventions_are_named_whatever_their_number(name, seed):
+    right = er3a.load_robot(name)
+    best = er3a.diagnose(other_conventions(right, seed), name)[0]
+    assert best.explains
+    assert all(isinstance(fault, CONVENTIONS) for fault in best.faults)
+    assert any(isinstance(fault, BaseElsewhere) for fault in best.faults)
+    if name == "er3_600":
+        return  # whose documents leave the directions of joints 1, 4, 5 and 6 open
+    q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, 6))
+    stated = er3a.forward(right, q)[:, :3, 3] * MM
+    assert np.abs(er3a.forward(best.corrected, q)[:, :3, 3] * MM - stated).max() < 1.0
+
+
+@pytest.mark.parametrize(("column", "rows", "amount"), [("a", [1], 0.03), ("alpha", [1, 3], 0.6), ("d", [3], 0.02)])
+def test_another_geometry_is_no_convention(column, rows, amount):
+    right = er3a.load_robot("er3_600")
+    values = getattr(right, column).copy()
+    values[rows] += amount
+    found = er3a.diagnose(other_conventions(right, 0).replace(**{column: values}), "er3_600")
+    assert not any(isinstance(fault, BaseElsewhere) for each in found for fault in each.faults)
+
+
+def test_an_empty_list_says_what_it_says_nothing_about():
+    right = er3a.load_robot("er3_600")
+    offset, alpha = right.offset.copy(), right.alpha.copy()
+    offset[5], alpha[5] = 0.6, 1.0
+    found = er3a.diagnose(right.replace(offset=offset, alpha=alpha), "er3_600")
+    assert found == []
+    assert {"offset6", "alpha6"} <= set(found.not_examined)
+    assert not {"a2", "d4", "alpha3", "offset2"} & set(found.not_examined)
+    assert "not examined" in str(found)
+    assert {"a1", "offset6", "direction3"} <= set(er3a.diagnose(right, []).not_examined)
+
+
+def test_reach_on_a_data_sheet_counts():
+    right = er3a.load_robot("er3a_c60")
+    stated = er3a.load_references("er3a_c60").references
+    reach = [each for each in stated if each.group == "reach"]
+    assert er3a.diagnose(right, reach).missed == ()
+    longer = right.replace(a=right.a + np.array([0, 0.5, 0, 0, 0, 0]))
+    found = er3a.diagnose(longer, reach)
+    assert found == []
+    assert found.missed
