@@ -46,6 +46,7 @@ STANDS_FOR = {
     "check-program": {"FILE": "data/programs/pick_place.src", "R": "er3a_c60"},
     "program": {},
     "calibrate": {"ROBOT": "er3a_c60", "MEASUREMENTS.csv": "measured.csv", "FILE.csv": "measured.csv"},
+    "import-calibration": {"ROBOT": "ur5e"},
     "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
     "compare": {"A": "er3a_c60", "B": "er3_600", "table.csv": "er3a_c60_article", "arm.urdf": "er3a_c60"},
     "--help": {},
@@ -208,6 +209,8 @@ def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(tmp_path
     )  # where a study has its own; all else comes with er3a
     trimesh.creation.box((80, 60, 200)).export(tmp_path / "upper_arm.stl")
     write_measured(tmp_path / "measured.csv")
+    deltas = (f"delta_{key} = [0, 0, 0, 0, 0, 0]" for key in ("theta", "a", "d", "alpha"))
+    (tmp_path / "calibration.conf").write_text("\n".join(deltas), encoding="utf-8")
     for verb, stands_for in STANDS_FOR.items():
         named_only = 2 if verb == "program" else 1  # words of a line that is no more than the command's name
         of_verb = [words for own, *words in lines if own == verb and (len(words) >= named_only or verb == "--help")]

@@ -3,9 +3,10 @@
 Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, where they are known, ``offset_deg`` and
 ``direction`` (theta = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. Where a joint slides,
 ``type`` says "prismatic" (else "revolute") and ``theta_deg`` where its theta stands; its limits and speed stand in
-``lower_mm``, ``upper_mm``, ``speed_mm_s``. A cell that does not apply to a joint is left empty. A column ``convention``
-(standard or modified, the same in all rows) counts more than what the reader is asked for. Any of these columns may be
-in metres, inches or radians instead, and named so: ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``.
+``lower_mm``, ``upper_mm``, ``speed_mm_s``. Calibrated tables may have ``beta_deg``, Hayati's turn about y, and
+``calibrated`` (true), which admits lengths below 2 mm. A cell that does not apply to a joint is left empty. A column
+``convention`` (standard or modified, the same in all rows) counts more than what the reader is asked for. Any of these
+columns may be in metres, inches or radians instead, and named so: ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any, Literal
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
-from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile
+from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MOST_DEG
 from er3a.files.yaml_file import parse
 from er3a.robots.robot import CONVENTIONS, MOST_JOINTS, Convention, Grade
@@ -29,6 +30,8 @@ OPTIONAL = {
     "convention": CsvColumn(str, choices=CONVENTIONS),
     "type": CsvColumn(str, choices=("revolute", "prismatic")),
     "theta_deg": _OF_KIND,
+    "beta_deg": CsvColumn(float),
+    "calibrated": CsvColumn(str, choices=("true", "false")),
     "offset_deg": _OF_KIND,
     "direction": CsvColumn(int),
     "lower_deg": _OF_KIND,
@@ -116,6 +119,8 @@ def read_dh_table(
         notes.append(f"no limits in the table: 0 to {ASSUMED_SLIDE_MM:g} mm were assumed for all joints that slide")
     if any(f"speed_{unit}_s" not in given for unit in kinds):
         notes.append("no speeds in the table: those that the study assumes stand in for them")
+    if _far_normals(rows, convention):
+        notes.append("d of more than 5 m that cancel: read as a calibrated table, with Hayati's beta in place of them")
     content = _content(rows, given, name, convention, path.name)
     if as_printed and (short or length_unit):
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
@@ -202,6 +207,18 @@ def _check_kind(path: Path, row: dict[str, Any], given: set[str]) -> None:
             raise InputError(path, where, f"joint {row['joint']} {kind}", "Leave the cell empty, or correct its type")
 
 
+def _far_normals(rows: list[dict[str, Any]], convention: str) -> bool:
+    shift = 1 if convention == "modified" else 0
+    alphas = [row["alpha_deg"] for row in rows[shift:]] + [0.0] * shift
+    return far_normals([(row["d_mm"], alpha) for row, alpha in zip(rows, alphas)])
+
+
+def _calibrated(rows: list[dict[str, Any]], convention: str) -> bool:
+    """Whether the table says so, has turns about y, or normals far away that cancel."""
+    stated = any(row.get("calibrated") == "true" or row.get("beta_deg") for row in rows)
+    return stated or _far_normals(rows, convention)
+
+
 def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention: str, source: str) -> dict[str, Any]:
     def group(row_of: Callable[[dict[str, Any]], dict[str, Any]], known: bool) -> dict[str, Any]:
         grade: Grade = "claim" if known else "inferred"
@@ -210,7 +227,7 @@ def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention:
 
     def table(row: dict[str, Any]) -> dict[str, Any]:
         kind = {"type": "prismatic", "theta_deg": row.get("theta_deg") or 0.0} if _unit(row) == "mm" else {}
-        return kind | {key: row[key] for key in ("a_mm", "alpha_deg", "d_mm")}
+        return kind | {key: row[key] for key in ("a_mm", "alpha_deg", "d_mm", "beta_deg") if key in row}
 
     def zero(row: dict[str, Any]) -> dict[str, Any]:
         turns = {"offset_deg": row.get("offset_deg") or 0.0} if _unit(row) == "deg" else {}
@@ -231,7 +248,7 @@ def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention:
         "name": name,
         "title": name,
         "zero_pose": "not stated",
-        "dh": {"convention": convention} | group(table, known=True),
+        "dh": {"convention": convention, "calibrated": _calibrated(rows, convention)} | group(table, known=True),
         "zero": group(zero, known=bool(given & {"offset_deg", "direction"})),
         "limits": group(limits, known=all(f"lower_{unit}" in given for unit in units)),
     }

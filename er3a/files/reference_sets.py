@@ -14,11 +14,11 @@ from er3a.files.csv_file import CsvColumn, Written, read_csv
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.shipped import names, own_or_shipped
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
-from er3a.references.quantities import Quantity
+from er3a.references.quantities import ZERO_POSE, Pose, Quantity
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
 from er3a.references.seen import COARSE_DEG, SEEN
-from er3a.robots.robot import GRADES, Robot
+from er3a.robots.robot import GRADES, MOST_JOINTS, Robot
 
 Fields = dict[str, Any]
 Fault = tuple[str, str, str]
@@ -44,7 +44,9 @@ _SOURCE = {
 _POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
 _XYZ = ("x_mm", "y_mm", "z_mm")
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
-_POSE = tuple(f"q{joint}_deg" for joint in range(1, 7))
+_POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
+_FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MOST_JOINTS + 1))
+_POSE_COLUMNS = dict.fromkeys(_POSE, _NUMBER) | dict.fromkeys(_FURTHER, CsvColumn(Written, always=False))
 
 
 @dataclass(frozen=True)
@@ -96,14 +98,21 @@ def _axis_faults(fields: Fields) -> Iterator[Fault]:
 
 def _position_fields(fields: Fields) -> Fields:
     values = dict(fields)
-    values["pose"] = tuple(values.pop(name) for name in _POSE)
+    values["pose"] = _pose(values)
     values["xyz_mm"] = tuple(values.pop(name) for name in _XYZ)
     return values
 
 
+def _pose(fields: Fields) -> Pose:
+    """The joint values, taken out of the fields: six, and those of further joints up to the last that is not 0."""
+    values = [fields.pop(name) for name in (*_POSE, *_FURTHER)]
+    last = max((k for k, value in enumerate(values) if value), default=0)
+    return tuple(value or 0.0 for value in values[: max(last + 1, len(_POSE))])
+
+
 def _observation_fields(fields: Fields) -> Fields:
     values = dict(fields)
-    values["pose"] = tuple(values.pop(name) for name in _POSE)
+    values["pose"] = _pose(values)
     return values
 
 
@@ -155,7 +164,7 @@ FORMATS: dict[str, Format] = {
         {
             "name": _WORD,
             "point": _POINT,
-            **dict.fromkeys(_POSE, _NUMBER),
+            **_POSE_COLUMNS,
             **dict.fromkeys(_XYZ, _OPTIONAL),
             "uncertainty_mm": _OPTIONAL,
         },
@@ -208,7 +217,7 @@ FORMATS: dict[str, Format] = {
     ),
     "observations": Format(
         {
-            **dict.fromkeys(_POSE, _NUMBER),
+            **_POSE_COLUMNS,
             "joint": _JOINT,
             "point": _POINT,
             "seen": CsvColumn(str, choices=SEEN),
@@ -315,7 +324,6 @@ WIDE_DEG = 30.0
 STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
 LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm")
 ANGLES = ("lower_deg", "upper_deg", "speed_deg_s")
-POSE = tuple(f"q{joint}_deg" for joint in range(1, 7))
 
 
 @dataclass(frozen=True)
@@ -332,10 +340,14 @@ METRES = Mistaken("mm", "metres", f"Multiply by 1000; {AS_WRITTEN}")
 RADIANS = Mistaken("deg", "radians", f"Convert to degrees; {AS_WRITTEN}")
 
 
-def load_references(name_or_folder: str | Path) -> ReferenceSet:
+def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> ReferenceSet:
     """Load a reference set by its name in data/manual_refs, or by the path of a folder.
 
     A name is looked up below the working folder first, then among the references that come with er3a.
+
+    Parameters
+    ----------
+    robot : whose joints the rows have to be about
 
     Raises
     ------
@@ -355,6 +367,8 @@ def load_references(name_or_folder: str | Path) -> ReferenceSet:
     documents = load_documents(folder / FILE)
     for file in files:
         check_origins(file, tables[file.stem], documents)
+        if robot is not None:
+            _check_joints(file, tables[file.stem], robot)
     return reference_set(folder.name, tables, documents)
 
 
@@ -391,6 +405,20 @@ def check_reference_file(path: str | Path) -> tuple[Row, ...]:
     return rows
 
 
+def _check_joints(path: Path, rows: Iterable[Row], robot: Robot) -> None:
+    """Refuse rows about joints that a robot does not have: :class:`InputError` naming the row."""
+    for row in rows:
+        joint, pose = getattr(row, "joint", 1), getattr(row, "pose", ())
+        if joint > robot.joints:
+            column, problem = "joint", f"there is no joint {joint}"
+        elif any(pose[robot.joints :]):
+            column, problem = f"q{len(pose)}_deg", f"the pose has {len(pose)} joints"
+        else:
+            continue
+        remedy = f"{robot.name} has {robot.joints} joints: correct the row, or the robot's references"
+        raise InputError(path, f"row {row.line}, column {column}", problem, remedy)
+
+
 def _documents_beside(path: Path) -> Documents | None:
     """The documents of a table's set; None if there are none that can be read, which is another file's fault."""
     try:
@@ -416,8 +444,8 @@ def _check_row(path: Path, format: Format, fields: Fields) -> None:
         if column in UNCERTAINTIES and value <= 0:
             remedy = "Half the last digit that the source prints, if it gives none"
             faults.append((column, f"{value:g} is not positive", remedy))
-    if fields.get("joint", 1) not in range(1, 7):
-        faults.append(("joint", f"there is no joint {fields['joint']}", "Write a number from 1 to 6"))
+    if fields.get("joint", 1) not in range(1, MOST_JOINTS + 1):
+        faults.append(("joint", f"there is no joint {fields['joint']}", f"Write a number from 1 to {MOST_JOINTS}"))
     for column, problem, remedy in (*faults, *format.faults(fields)):
         raise InputError(path, f"row {fields['row']}, column {column}", problem, remedy)
 
@@ -431,7 +459,7 @@ def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
         _check_mixed(path, table, LENGTHS, SHORTEST_BESIDE_LONG_MM, LONG_MM, METRES)
     if format.mixed_limits:
         _check_mixed(path, table, ANGLES, WIDEST_IN_RADIANS, WIDE_DEG, RADIANS)
-    if POSE[0] in format.columns:
+    if _POSE[0] in format.columns:
         _check_angles(path, table)
     _check_span(path, table, ANGLES, WIDEST_IN_RADIANS, RADIANS)
 
@@ -465,9 +493,9 @@ def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
 
 def _check_angles(path: Path, table: list[Fields]) -> None:
     """Refuse poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
-    all_small = max(_sizes(table, list(POSE))) < WIDEST_IN_RADIANS
+    all_small = max(_sizes(table, [*_POSE, *_FURTHER])) < WIDEST_IN_RADIANS
     for fields in table:
-        for column in POSE:
+        for column in (*_POSE, *(each for each in _FURTHER if fields[each] is not None)):
             steps = fields[column] / STEP_IN_RADIANS
             if round(steps) and abs(fields[column]) < WIDEST_IN_RADIANS and abs(steps - round(steps)) < NEAR_STEP:
                 where, degrees = f"row {fields['row']}, column {column}", f"{round(steps) * 15:g}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
@@ -19,6 +19,8 @@ from er3a.robots.robot import MOST_JOINTS, Grade, PairRule
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 SHORTEST_PLAIN_LENGTH_MM = 2.0
 LONGEST_LENGTH_MM = 20_000.0
+FAR_NORMAL_MM = 5_000.0
+FARTHEST_NORMAL_MM = 1e8  # of axes that are parallel to 0.001 mrad
 RESIDUE_MM = 1e-3
 LEAST_LONGEST_MM = 10.0
 """A length as short as that is what a derivation leaves over, in mm or in metres."""
@@ -142,11 +144,22 @@ class CouplingRow(WeightedJoints):
 
 
 class DhTable(Sourced):
-    """Denavit-Hartenberg rows. ``calibrated: true`` admits lengths below 2 mm, which otherwise count as metres."""
+    """Denavit-Hartenberg rows. ``calibrated: true`` admits lengths below 2 mm, which otherwise count as metres.
+
+    It admits d of many metres that cancel, too, as factories' calibrations have them between nearly parallel axes: such
+    rows are taken to Hayati's (``beta_deg``) when the file is read.
+    """
 
     convention: Literal["standard", "modified"]
     calibrated: bool = False
     rows: list[DhRow]
+
+    @property
+    def has_far_normals(self) -> bool:
+        """Whether d of calibrated rows is many metres and cancels; see :func:`far_normals`."""
+        alphas = [row.alpha_deg for row in self.rows][1 if self.convention == "modified" else 0 :]
+        rows = [(row.d_mm, alpha) for row, alpha in zip(self.rows, [*alphas, 0.0])]
+        return self.calibrated and far_normals(rows)
 
 
 class Zero(Sourced):
@@ -405,12 +418,13 @@ class RobotFile(StrictModel):
                 problem = f"dh.rows[{i}].beta_deg: {row.beta_deg:g} deg in a table that is not calibrated"
                 raise ValueError(f"{problem} | Set dh.calibrated: true, or remove it")
             _check_angle(f"zero.rows[{i}].offset_deg", self.zero.rows[i].offset_deg or 0.0)
+        self._check_far_normals()
         angles = [row.alpha_deg for row in self.dh.rows] + [row.offset_deg or 0.0 for row in self.zero.rows]
         if look_like_radians(angles):
             small = ", ".join(f"{angle:g}" for angle in angles if 0 < abs(angle) < RADIANS_BELOW_DEG)
             suspect(f"dh.rows, zero.rows: {small} deg may be radians")
         for key in ("base", "flange", "tool"):
-            check_placement(key, getattr(self, key), self.dh.calibrated)
+            check_placement(key, getattr(self, key), self.dh.calibrated and key == "base")
         longest, least = max(max(abs(row.a_mm), abs(row.d_mm)) for row in self.dh.rows), LEAST_LONGEST_MM
         if self.dh.calibrated:  # lengths that were derived may all be short
             placed = [abs(value) for each in (self.base, self.flange, self.tool) if each for value in each.xyz_mm]
@@ -420,6 +434,16 @@ class RobotFile(StrictModel):
                 f"dh.rows: the longest length is {longest:g} mm, which can only be metres | Multiply by 1000"
             )
         return self
+
+    def _check_far_normals(self) -> None:
+        """Refuse d of hundreds of metres that do not cancel, and bodies in frames as far away."""
+        if any(abs(row.d_mm) > LONGEST_LENGTH_MM for row in self.dh.rows) and not self.dh.has_far_normals:
+            problem = "dh.rows: d of more than 20 m that does not cancel between nearly parallel axes"
+            raise ValueError(f"{problem} | Write the lengths in mm")
+        for group in ("envelopes", "inertia"):
+            if self.dh.has_far_normals and getattr(self, group):
+                problem = f"{group}: frames of rows with d of many metres are as far away"
+                raise ValueError(f"{problem} | Leave {group} out, or write the table with beta_deg and a short d_mm")
 
     @model_validator(mode="after")
     def _limits_plausible(self):
@@ -498,13 +522,28 @@ def check_placement(field: str, placement: Placement | None, calibrated: bool = 
 
 
 def _check_length(field: str, value: float, calibrated: bool) -> None:
-    if abs(value) > LONGEST_LENGTH_MM:
-        raise ValueError(f"{field}: {value:g} mm is longer than any robot's link | Write the length in mm")
+    far = abs(value) > LONGEST_LENGTH_MM
+    if far and not (calibrated and field.endswith("d_mm") and abs(value) <= FARTHEST_NORMAL_MM):
+        remedy = "Write the length in mm"
+        if field.endswith("d_mm"):
+            remedy += "; if rows cancel each other (a factory's calibration), set dh.calibrated: true"
+        raise ValueError(f"{field}: {value:g} mm is longer than any robot's link | {remedy}")
     if RESIDUE_MM < abs(value) < SHORTEST_PLAIN_LENGTH_MM and not calibrated:
         raise ValueError(
             f"{field}: {value:g} mm looks like metres | Write {value * 1000:g}; if so short a length is meant "
             "(a calibrated table), set dh.calibrated: true"
         )
+
+
+def far_normals(rows: Sequence[tuple[float, float]]) -> bool:
+    """Whether d (mm) of a table's rows, each with its alpha (deg), is that of normals of nearly parallel axes: of many
+    metres that cancel, between rows whose axes are parallel to 1 deg."""
+    far = [k for k, (d, _) in enumerate(rows) if abs(d) > FAR_NORMAL_MM]
+    if not far:
+        return False
+    between = range(far[0], far[-1] + 1)
+    nearly = all(abs(math.sin(math.radians(rows[k][1]))) < math.sin(math.radians(1.0)) for k in between[:-1])
+    return nearly and abs(sum(rows[k][0] for k in between)) <= FAR_NORMAL_MM
 
 
 def _check_angle(field: str, value: float) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
+from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals, wrapped
 from er3a.errors import InputError, InputWarning
 from er3a.files.dh_table import read_dh_table
 from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields, masses_of
@@ -26,8 +27,9 @@ from er3a.files.robot_file import (
 from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel, load
-from er3a.geometry.transforms import transform
+from er3a.geometry.transforms import rot_x, rot_y, transform, translation
 from er3a.numerics.arrays import Reals
+from er3a.robots.conventions import to_standard
 from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
 from er3a.robots.robot import CombinedLimit, Convention, ConvexPiece, Envelope, Grade, Robot, Source, robot_name
 
@@ -120,8 +122,24 @@ def robot_of(content: RobotFile) -> Robot:
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
         origins=_origins(content),
     )
+    if content.dh.has_far_normals:
+        robot = with_near_rows(robot)
     groups_of_masses = [getattr(content, group) for group in MASS_GROUPS]
     return robot.replace(masses=masses_of(robot, *groups_of_masses)) if any(groups_of_masses) else robot
+
+
+def with_near_rows(robot: Robot) -> Robot:
+    """The same arm with rows between nearly parallel axes measured within it: by Hayati's beta in place of a common
+    normal far away. A standard table; base, flange and tool stay."""
+    before = to_standard(robot)
+    found, last = without_far_normals(mechanism_of(robot)), robot.rows - 1
+    found = with_senses(found, np.ones(robot.rows), np.where(found.a * before.a[:last] < 0, -1.0, 1.0))
+    behind = translation(before.a[last], 0, 0) @ rot_x(before.alpha[last]) @ rot_y(before.beta[last]) @ before.flange
+    d = np.array(found.d)
+    d[0] += (np.linalg.inv(before.base) @ found.base)[2, 3]
+    d[last] += (found.flange @ np.linalg.inv(behind))[2, 3]
+    ends = {key: np.append(getattr(found, key), getattr(before, key)[last]) for key in ("a", "alpha", "beta")}
+    return before.replace(d=d, offset=wrapped(found.offset), **ends)
 
 
 def _si(degrees: float | None, millimetres: float | None) -> float:

@@ -13,7 +13,7 @@ import yaml
 from er3a.errors import InputWarning
 from er3a.files.kept_files import write_atomically
 from er3a.files.mass_fields import SLIDING, TURNING, BodyFields
-from er3a.files.robot_file import LEAST_LONGEST_MM, SHORTEST_PLAIN_LENGTH_MM, RobotFile
+from er3a.files.robot_file import LEAST_LONGEST_MM, RESIDUE_MM, SHORTEST_PLAIN_LENGTH_MM, RobotFile
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
@@ -146,7 +146,7 @@ def _short(lengths_mm: np.ndarray) -> bool:
 
 def _shifted(base: np.ndarray) -> bool:
     """Whether a base is where only a calibration puts it, less than 2 mm off."""
-    return bool(0 < np.abs(base[:3, 3]).max() * 1000 < SHORTEST_PLAIN_LENGTH_MM)
+    return bool(RESIDUE_MM < np.abs(base[:3, 3]).max() * 1000 < SHORTEST_PLAIN_LENGTH_MM)
 
 
 def _limit_rows(robot: Robot) -> list[dict]:

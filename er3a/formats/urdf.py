@@ -53,7 +53,7 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source, robot_name
 
 PARALLEL = 1e-12
-NEARLY_PARALLEL = 1e-3  # rad
+NEARLY_PARALLEL = math.radians(1.0)  # as far as arms are made wrong; on links of 0.1 m a normal is 6 m away, or more
 SAME_POINT_M = 1e-12
 TIE = 1e-9
 """Directions that differ by less are equally near: rounding must not choose between two tables."""

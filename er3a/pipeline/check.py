@@ -154,7 +154,7 @@ def check_study(path: Path) -> Study:
             robot, entry = study.robot(name), study.entry(name)
         except InputError as error:
             raise InputError(error.file or path, error.field, error.problem, error.remedy) from None
-        sets = [load_references(reference) for reference in robot.references]
+        sets = [load_references(reference, robot) for reference in robot.references]
         check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
         read_targets(entry.targets)
         for planned in load_paths(entry.paths).paths:

@@ -271,7 +271,8 @@ class PoseOutside(QuantityAtPose):
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
-        q = np.radians(self.pose)
+        joints = state.lower.shape[-1]
+        q = np.radians([*self.pose, *ZERO_POSE, *ZERO_POSE][:joints])
         excess: Reals = np.maximum(np.maximum(state.lower - q, q - state.upper).max(axis=-1), 0.0)
         return np.degrees(excess)
 

@@ -90,6 +90,22 @@ def export_urdf(
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
+def import_calibration(
+    file: Annotated[Path, typer.Argument(help="a Universal Robots calibration.conf, or extract_calibration's YAML")],
+    robot: Annotated[str, typer.Option(help="the arm's nominal table: a robot's name or file")],
+    output: Annotated[Path, typer.Option(help="the robot file to write")],
+):
+    """Make a robot file of a factory's own calibration; d of many metres that cancel become Hayati's rows."""
+    from er3a.files.factory_calibration import load_factory_calibration
+    from er3a.files.robot_library import load_robot
+    from er3a.files.robot_writer import write_robot
+
+    found = load_factory_calibration(file, load_robot(robot))
+    write_robot(found.replace(name=output.stem, title=f"{found.title}, as calibrated by its factory"), output)
+    print(f"{output}: written")
+
+
+@app.command(rich_help_panel=ROBOT_FILES)
 def mesh(
     file: Annotated[Path, typer.Argument(help="a closed mesh: STL, OBJ, DAE or GLB")],
     unit: Annotated[Unit, typer.Option(help="of the mesh's lengths: m or mm")],

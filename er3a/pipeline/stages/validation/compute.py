@@ -81,6 +81,7 @@ from er3a.references.quantities import (
 from er3a.references.reference import Documents, ReferenceSet, expected_of, quantities_of, vectors_of
 from er3a.references.rows import AxisRow, EnvelopeRow, PositionRow
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Grade, Robot
 
 
@@ -188,10 +189,11 @@ def key_poses_table(robot: Robot, sets: list[ReferenceSet], extremes: Extremes) 
     rows = []
     for references in sets:
         for look in (*_positions(references), *_corners(references), *_extremes(references, extremes)):
-            T = frames(robot, np.radians(np.array(look.pose)))
+            pose = (*look.pose, *ZERO_POSE)[: robot.joints]
+            T = frames(robot, meant(robot, np.array(pose)))
             model = point_of(T, look.point)
             stated = look.stated(model, T)
-            head = (references.name, look.source, look.grade, look.group, look.name, look.point, look.pose)
+            head = (references.name, look.source, look.grade, look.group, look.name, look.point, pose)
             rows.append((*head, stated, model, float(np.linalg.norm(model - stated))))
     table = KeyPoses.of_rows(rows)
     return table.take(np.argsort((table.q_deg != 0).any(axis=1), kind="stable"))
