@@ -9,6 +9,7 @@ import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.pairs import PairsUnexamined
+from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
@@ -66,9 +67,15 @@ def compute(study: Study, name: str) -> ProgramsResults:
         lines.append(_lines(entry.name, check))
         instructions.append(_instructions(entry.name, check, len(robot.lower)))
         motions.append(motion)
+    least = {
+        each.name: None if each.least_clearance_mm is None else each.least_clearance_mm / 1000
+        for each in summaries
+        if each.expect in (None, "pass")
+    }
+    assumed = shapes_assumed(robot, options.assumed_margin, least)
     return ProgramsResults(
         summary=ProgramsSummary(
-            verdict=_verdict(summaries).without(bodies_of(robot, scene).unexamined),
+            verdict=_verdict(summaries).without(bodies_of(robot, scene).unexamined).resting_on(assumed),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
             assumed_speed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
@@ -88,6 +95,7 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
         assumed_speed=assumed_speeds(robot, paths),
         acceleration_time=paths.acceleration_time_s,
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,
+        assumed_margin=paths.assumed_margin_mm / 1000,
         assumed=AssumedRates(
             own.tool_speed_mm_s / 1000, own.tool_acceleration_mm_s2 / 1000, own.joint_speed_percent / 100
         ),

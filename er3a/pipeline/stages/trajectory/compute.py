@@ -11,6 +11,7 @@ import numpy as np
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
+from er3a.collision.shapes import shapes_assumed
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
@@ -417,8 +418,12 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         acceleration_time_s=settings.acceleration_time_s,
         jerk_deg_s3=None if limits.jerk is None else _shown(robot, limits.jerk),
     )
+    least = {
+        path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
+    }
+    assumed_shapes = shapes_assumed(robot, settings.assumed_margin_mm / 1000, least)
     summary = TrajectorySummary(
-        verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined),
+        verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined).resting_on(assumed_shapes),
         figures=_figures(paths, length, used),
         characteristic_length_m=length,
         near=thresholds,
