@@ -11,7 +11,7 @@ import numpy as np
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
-from er3a.collision.shapes import shapes_assumed
+from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
@@ -26,6 +26,7 @@ from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations,
 from er3a.pipeline.stages.trajectory.judgement import (
     Judgement,
     Surroundings,
+    clear_until,
     clearance_rows,
     collisions,
     judge,
@@ -72,6 +73,7 @@ from er3a.robots.robot import Robot
 
 LEAST_RATIO = 1e-3  # of the limits, below which a path counts as standing still
 FAULTS: tuple[PathVerdict, ...] = ("unreachable", "none found", "leaves limits", "collides", "too fast")
+ROUNDED = 0.0005  # m, by which a pose may be off that is written with one decimal of mm and two of deg
 ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
 
@@ -385,6 +387,8 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, surroundings.bodies, study.seed)
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning)
+    assumed_margin = settings.assumed_margin_mm / 1000
+    margin = (assumed_margin if arm_shapes(robot).assumed else surroundings.tolerance) + ROUNDED
     tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
@@ -402,7 +406,8 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         tables.append(_checks(robot, motion, found, near, limits))
         clearances.append(clearance_rows(each.name, along))
         strategies.append(avoided.rows)
-        paths.append(path_summary(robot, motion, found, along, avoided, limits))
+        last = clear_until(surroundings, motion, found, along, margin)
+        paths.append(replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
         asked = settings.programs, settings.write_unsafe
         programs.append(program_files(robot, motion, paths[-1].verdict, *asked, repair))
@@ -421,7 +426,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     least = {
         path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
     }
-    assumed_shapes = shapes_assumed(robot, settings.assumed_margin_mm / 1000, least)
+    assumed_shapes = shapes_assumed(robot, assumed_margin, least)
     summary = TrajectorySummary(
         verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined).resting_on(assumed_shapes),
         figures=_figures(paths, length, used),
