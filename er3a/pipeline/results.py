@@ -96,12 +96,53 @@ class Figure:
     of: int | None = None
 
 
+LeftOutSubject = Literal[
+    "obstacles",
+    "bare_links",
+    "unexamined_pairs",
+    "allowed_pairs",
+    "joined_pairs",
+    "shallow_overlaps",
+    "own_speeds",
+    "jerk",
+    "torques",
+    "paths",
+    "path_stretches",
+    "strategies",
+    "program_lines",
+    "program_starts",
+    "outer_axes",
+    "controller_ramps",
+    "joint_vectors",
+    "lost_cells",
+]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that a stage did not examine.
+
+    Attributes
+    ----------
+    names : of what; empty for all
+    amount : a setting, limit or count that it depends on
+    """
+
+    subject: LeftOutSubject
+    names: tuple[str, ...] = ()
+    amount: float | None = None
+
+
 @dataclass(frozen=True)
 class Summary:
-    """What all summaries begin with; a stage's own says what its verdict can be."""
+    """What all summaries begin with; a stage's own says what its verdict can be.
+
+    ``not_examined``: what settings, inputs and limits leave out of the verdict.
+    """
 
     verdict: Verdict[Any]
     figures: tuple[Figure, ...]
+    not_examined: tuple[LeftOut, ...] = field(default=(), kw_only=True)
 
 
 SummaryT = TypeVar("SummaryT", bound=Summary)

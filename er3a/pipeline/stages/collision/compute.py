@@ -25,7 +25,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.collision.model import (
@@ -46,6 +46,7 @@ from er3a.pipeline.stages.collision.model import (
     ShapesOverlap,
     TargetClearances,
 )
+from er3a.pipeline.stages.left_out import left_out_of_collisions
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
 from er3a.pipeline.study import Study
@@ -187,6 +188,11 @@ def compute(study: Study, name: str) -> CollisionResults:
             places=places_found,
             mounting=mounting,
             closest=closest,
+            not_examined=(
+                *left_out_of_collisions(bodies, scene, settings.penetration_tolerance_mm),
+                LeftOut("joint_vectors", amount=settings.samples),
+                LeftOut("lost_cells", amount=places_found.reached - places_found.clear),
+            ),
         ),
         matrix=matrix,
         pairs=pairs,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -20,9 +21,10 @@ from er3a.kinematics.singularity import NearSingular, characteristic_length, con
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
-from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.trajectory.judgement import (
     Judgement,
     Surroundings,
@@ -437,6 +439,12 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
         not_followed=tuple(skipped),
+        not_examined=(
+            *left_out_of_collisions(surroundings.bodies, scene, settings.penetration_tolerance_mm),
+            *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
+            *_left_out(paths, skipped, only),
+            LeftOut("torques"),
+        ),
     )
     return TrajectoryResults(
         summary=summary,
@@ -446,6 +454,16 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         avoidance=AvoidanceRows.stacked(strategies).of_joints(robot.slides),
         programs=ProgramFiles.stacked(programs),
     )
+
+
+def _left_out(paths: list[PathSummary], skipped: list[PathNotFollowed], only: StrategyName | None) -> Iterator[LeftOut]:
+    """Paths that were not followed, stretches that bounds leave open, strategies that the study does not ask for."""
+    if skipped:
+        yield LeftOut("paths", tuple(path.name for path in skipped))
+    if open_ := tuple(path.name for path in paths if path.undecided):
+        yield LeftOut("path_stretches", open_)
+    if only:
+        yield LeftOut("strategies", tuple(name for name in get_args(StrategyName) if name != only))
 
 
 def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> PathChecks:

@@ -278,7 +278,7 @@ def clear_until(
         spare = bodies.least(motion.joints(t))[0] - margin
         return np.minimum(spare, (apart(t) - kept).min(axis=1)) if joined.size else spare
 
-    stops = [part.start for part in (*found.limits, *found.beyond)]
+    stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
     end = min([first, *(BEFORE_STOP * stop for stop in stops)])
     for _ in range(ATTEMPTS):
         grid = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
