@@ -303,7 +303,7 @@ TEXTS = texts(
 
 @say.register
 def _(found: ProgramCounts) -> str:
-    passed = sentence("programs.programs", count=found.programs + len(found.demonstrations), passed=found.passed)
+    passed = sentence("programs.programs", count=found.programs, passed=found.passed)
     unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
     others = []
     for outcome, names in unsound.items():

@@ -133,7 +133,7 @@ def _(found: PathCounts) -> str:
     for verdict, names in unsafe.items():
         parts = {"count": len(names), "word": outcome_word(verdict), "names": ", ".join(names)}
         faults.append(sentence("trajectory.fault", **parts) if names else "")
-    safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
+    safe = sentence("trajectory.paths", count=found.paths, safe=found.safe)
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
         faults.append(sentence("trajectory.not_followed", **parts))

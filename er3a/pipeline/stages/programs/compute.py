@@ -267,12 +267,12 @@ def _verdict(
 
 def _figures(programs: list[ProgramSummary]) -> tuple[Figure, ...]:
     asked = [each for each in programs if each.expect in (None, "pass")]
-    instructions = sum(each.motions for each in programs)
+    instructions = sum(each.motions for each in asked)
     clear = [each.least_clearance_mm for each in asked if each.least_clearance_mm is not None]
     return (
-        Figure("programs_passed", sum(each.outcome == "pass" for each in programs), "", of=len(programs)),
-        Figure("instructions_passed", sum(each.passed for each in programs), "", of=instructions),
-        Figure("instructions_caution", sum(each.caution for each in programs), ""),
-        Figure("instructions_failed", sum(each.failed for each in programs), ""),
+        Figure("programs_passed", sum(each.outcome == "pass" for each in asked), "", of=len(asked)),
+        Figure("instructions_passed", sum(each.passed for each in asked), "", of=instructions),
+        Figure("instructions_caution", sum(each.caution for each in asked), ""),
+        Figure("instructions_failed", sum(each.failed for each in asked), ""),
         Figure("least_clearance", min(clear, default=None), "mm"),
     )
