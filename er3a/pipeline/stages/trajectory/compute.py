@@ -101,6 +101,7 @@ class AvoidanceTask:
 
     Attributes
     ----------
+    margin : m, that a motion which is advised keeps from bodies, if any does
     only : the strategy that the study asks for; None to compare all
     """
 
@@ -110,6 +111,7 @@ class AvoidanceTask:
     only: StrategyName | None
     surroundings: Surroundings
     planning: PlanningTask
+    margin: float
 
     def avoid(self, motion: Motion, found: Judgement, along: ClearanceAlong) -> Avoided:
         """Compare the strategies where a path is not safe; find its fastest time law where it can be run as it is.
@@ -133,7 +135,8 @@ class AvoidanceTask:
         met = {result.name: self._meets(result.cost) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
-        chosen = best(free, meets)
+        roomy = [result for result in free if self._keeps_margin(met[result.name][1] if result.name in met else None)]
+        chosen = best(roomy, meets) or best(free, meets)
         tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
@@ -200,6 +203,9 @@ class AvoidanceTask:
         if least is None:
             return None, None
         return PairOverlaps(least.between, -least.least_mm) if along.contacts else None, least.least_mm
+
+    def _keeps_margin(self, clearance_mm: float | None) -> bool:
+        return clearance_mm is None or clearance_mm >= 1000 * self.margin
 
     def _tables(self, motion: Motion, results: list[StrategyResult], quickest: Timed | None) -> Iterator[AvoidanceRows]:
         for result in results:
@@ -388,9 +394,9 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     surroundings = Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, surroundings.bodies, study.seed)
-    avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning)
     assumed_margin = settings.assumed_margin_mm / 1000
     margin = (assumed_margin if arm_shapes(robot).assumed else surroundings.tolerance) + ROUNDED
+    avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning, margin)
     tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
