@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -289,9 +289,8 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
             rows = np.concatenate([motion.bodies.distances(motion.bodies.ends(q[inside[0]]), every)[None], rows])
         touches: dict[Pair, Touch] = {}
         for k in np.flatnonzero(rows.min(axis=0) <= 0).tolist():
-            touch = _touch(
-                motion.bodies.pairs[k], times[inside], rows[:, k], lambda at, k=k: apart(at, np.array([k])), near
-            )
+            own = partial(apart, pairs=np.array([k]))
+            touch = _touch(motion.bodies.pairs[k], times[inside], rows[:, k], own, near)
             other = touches.get(touch.pair, touch)
             deeper = max(touch, other, key=lambda each: each.depth)
             touches[touch.pair] = Touch(touch.pair, max(min(touch.start, other.start), start), deeper.depth, deeper.at)

@@ -86,6 +86,23 @@ class PairsUnexamined:
     code: Literal["pairs_unexamined"] = "pairs_unexamined"
 
 
+@dataclass(frozen=True)
+class ShapesAssumed:
+    """No document gives the shapes of an arm's links, so that what is said of collisions rests on assumed ones.
+
+    Attributes
+    ----------
+    given : whether the robot's file gives shapes, inferred ones; else they were guessed from its table
+    margin_mm : within which of assumed shapes nothing is settled
+    near : what comes so near to them without touching, by name
+    """
+
+    given: bool
+    margin_mm: float
+    near: tuple[str, ...] = ()
+    code: Literal["shapes_assumed"] = "shapes_assumed"
+
+
 def link_label(number: int) -> str:
     """A link's name in columns of text."""
     return "base" if number == BASE else f"link_{number}"

@@ -13,13 +13,13 @@ which is about how thick small industrial arms are: an estimate. The column belo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout, cylinder_points
-from er3a.collision.pairs import BASE, link_label
+from er3a.collision.pairs import BASE, ShapesAssumed, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts
 from er3a.kinematics.forward import frames
@@ -49,6 +49,11 @@ class ArmShapes:
     grade: Grade
     bare: tuple[int, ...]
 
+    @property
+    def assumed(self) -> bool:
+        """Whether no document gives them."""
+        return self.grade == "inferred"
+
 
 @derived
 def arm_shapes(robot: Robot) -> ArmShapes:
@@ -59,6 +64,21 @@ def arm_shapes(robot: Robot) -> ArmShapes:
     shaped = {capsule.link for capsule in robot.envelopes} | {piece.link for piece in robot.hulls}
     bare = tuple(link for link in range(robot.rows + 1) if link not in shaped)
     return ArmShapes(robot.envelopes, robot.hulls, True, source.grade if source else "inferred", bare)
+
+
+def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:
+    """What is to be said of collisions where the arm's shapes are assumed; None where a document gives them.
+
+    Parameters
+    ----------
+    margin : m, within which of assumed shapes nothing is settled
+    clearances : m, least ones by name; None or negative for what is not known, or overlaps
+    """
+    shapes = arm_shapes(robot)
+    if not shapes.assumed:
+        return None
+    near = tuple(name for name, least in clearances.items() if least is not None and 0 <= least < margin)
+    return ShapesAssumed(shapes.given, 1000 * margin, near)
 
 
 def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:

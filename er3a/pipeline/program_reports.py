@@ -74,7 +74,8 @@ def lines_of(checked: CheckedFile, verdicts: bool = False) -> list[str]:
         return [_error_line(checked)]
     told = [(each.place, _finding_line(each)) for each in checked.check.findings]
     if verdicts:
-        told += [(each.place, _verdict_line(each)) for each in checked.check.verdicts]
+        of_what = " of assumed shapes" if checked.check.shapes else ""
+        told += [(each.place, _verdict_line(each, of_what)) for each in checked.check.verdicts]
         told.sort(key=lambda pair: (shown(pair[0].file), pair[0].line))
     return [text for _, text in told]
 
@@ -98,12 +99,12 @@ def _finding_line(each: LocatedFinding) -> str:
     return f"{_where(each.place)}: {WORDS[each.level]}: {say(each.finding)}{times} [{each.finding.code}]"
 
 
-def _verdict_line(verdict: MotionVerdict) -> str:
+def _verdict_line(verdict: MotionVerdict, of_what: str) -> str:
     parts = [f"{verdict.text}"]
     if verdict.duration_s is not None:
         parts.append(f"{verdict.duration_s:.2f} s")
     if verdict.least_clearance_mm is not None:
-        parts.append(f"clearance {as_text(verdict.least_clearance_mm, '.1f')} mm")
+        parts.append(f"clearance {as_text(verdict.least_clearance_mm, '.1f')} mm{of_what}")
     return f"{_where(verdict.place)}: {WORDS[verdict.level]}: {'; '.join(parts)} [motion]"
 
 
@@ -141,6 +142,12 @@ def cycle_line(checked: CheckedFile) -> str:
     more = f", and {cycle.waits} wait{'s' if cycle.waits > 1 else ''} for signals" if cycle.waits else ""
     less = "" if cycle.complete else ", without the motions whose path is unknown"
     return f"{shown(checked.file)}: {what} takes about {time}{more}{less}"
+
+
+def shapes_line(checked: Sequence[CheckedFile]) -> str:
+    """On what shapes of the arm collisions rest; empty where a document gives them."""
+    found = next((each.check.shapes for each in checked if each.check and each.check.shapes), None)
+    return "" if found is None else say(found)
 
 
 def not_examined_line(checked: CheckedFile) -> str:
@@ -187,6 +194,7 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                 "level": check.level,
                 "complete": check.execution.complete,
                 "not_examined": [{**_place_record(one.place), "what": one.what} for one in check.not_examined],
+                "shapes_assumed": check.shapes is not None,
                 "cycle": plain(check.cycle),
                 "findings": [_finding_record(one) for one in check.findings],
                 "motions": [_verdict_record(one) for one in check.verdicts],

@@ -29,7 +29,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from er3a.by_value import ByValue
-from er3a.collision.pairs import Pair, PairsUnexamined
+from er3a.collision.pairs import Pair, PairsUnexamined, ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
@@ -38,7 +38,9 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import table_types
 
-FORMAT_VERSION = 6
+FORMAT_VERSION = 7
+BESIDE = ("unexamined", "shapes")
+"""What a verdict can have beside its finding."""
 SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
 
@@ -50,22 +52,30 @@ FindingT = TypeVar("FindingT", bound=Finding)
 class Verdict(Generic[FindingT]):
     """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
 
-    ``unexamined``: pairs of bodies whose collisions were not looked at because their shapes can't be right.
+    ``unexamined``: pairs of bodies whose collisions were not looked at because their shapes can't be right. ``shapes``:
+    on what shapes of the arm it rests, if no document gives them.
     """
 
     status: Status
     finding: FindingT
     unexamined: tuple[Pair, ...] = ()
+    shapes: ShapesAssumed | None = None
 
     @property
-    def findings(self) -> tuple[FindingT | PairsUnexamined, ...]:
-        """What it found, then what was not looked at, each a sentence."""
-        return (self.finding, PairsUnexamined(self.unexamined)) if self.unexamined else (self.finding,)
+    def findings(self) -> tuple[FindingT | PairsUnexamined | ShapesAssumed, ...]:
+        """What it found, then what was not looked at and what was assumed, each a sentence."""
+        unexamined = (PairsUnexamined(self.unexamined),) if self.unexamined else ()
+        return (self.finding, *unexamined, *((self.shapes,) if self.shapes else ()))
 
     def without(self, unexamined: tuple[Pair, ...]) -> Verdict[FindingT]:
         """The verdict where collisions of some pairs were not looked at: no pass, if there are any."""
         status: Status = "caution" if unexamined and self.status == "pass" else self.status
-        return Verdict(status, self.finding, unexamined)
+        return replace(self, status=status, unexamined=unexamined)
+
+    def resting_on(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
+        """The verdict where shapes of the arm are assumed: no pass, if anything comes too near to them."""
+        status: Status = "caution" if shapes and shapes.near and self.status == "pass" else self.status
+        return replace(self, status=status, shapes=shapes)
 
 
 @dataclass(frozen=True)
@@ -86,12 +96,53 @@ class Figure:
     of: int | None = None
 
 
+LeftOutSubject = Literal[
+    "obstacles",
+    "bare_links",
+    "unexamined_pairs",
+    "allowed_pairs",
+    "joined_pairs",
+    "shallow_overlaps",
+    "own_speeds",
+    "jerk",
+    "torques",
+    "paths",
+    "path_stretches",
+    "strategies",
+    "program_lines",
+    "program_starts",
+    "outer_axes",
+    "controller_ramps",
+    "joint_vectors",
+    "lost_cells",
+]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that a stage did not examine.
+
+    Attributes
+    ----------
+    names : of what; empty for all
+    amount : a setting, limit or count that it depends on
+    """
+
+    subject: LeftOutSubject
+    names: tuple[str, ...] = ()
+    amount: float | None = None
+
+
 @dataclass(frozen=True)
 class Summary:
-    """What all summaries begin with; a stage's own says what its verdict can be."""
+    """What all summaries begin with; a stage's own says what its verdict can be.
+
+    ``not_examined``: what settings, inputs and limits leave out of the verdict.
+    """
 
     verdict: Verdict[Any]
     figures: tuple[Figure, ...]
+    not_examined: tuple[LeftOut, ...] = field(default=(), kw_only=True)
 
 
 SummaryT = TypeVar("SummaryT", bound=Summary)
@@ -346,8 +397,8 @@ def plain(value: Any) -> Any:
 
 def _verdict_record(verdict: Verdict[Any]) -> dict[str, Any]:
     params = plain(verdict.finding)
-    left_out = {"unexamined": plain(verdict.unexamined)} if verdict.unexamined else {}
-    return {"status": verdict.status, "code": params.pop("code"), "params": params, **left_out}
+    more = {key: plain(value) for key in BESIDE if (value := getattr(verdict, key))}
+    return {"status": verdict.status, "code": params.pop("code"), "params": params, **more}
 
 
 def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tuple[Any, Provenance]:
@@ -356,8 +407,8 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
     try:
         if isinstance(verdict, dict):
             finding = verdict["params"] | {"code": verdict["code"]}
-            left_out = {key: verdict[key] for key in ("unexamined",) if key in verdict}
-            own["verdict"] = {"status": verdict["status"], "finding": finding, **left_out}
+            more = {key: verdict[key] for key in BESIDE if key in verdict}
+            own["verdict"] = {"status": verdict["status"], "finding": finding, **more}
         of_stage: Any = summary_type(kind)
         return _adapter(of_stage).validate_python(own), _adapter(Provenance).validate_python(stored.get("provenance"))
     except ValidationError as error:

@@ -21,7 +21,8 @@ class TrajectorySettings(StrictModel):
     to reach full speed in ``acceleration_time_s``, unless their greatest accelerations are given
     (``acceleration_deg_s2``, one for each joint). ``jerk_deg_s3`` bounds the jerk; left out, nothing does.
     ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between
-    points. Safe paths are written as programs in the languages ``programs``; others only with ``write_unsafe``, with
+    points. Where no document gives the shapes of the arm's links, a verdict within ``assumed_margin_mm`` of them is a
+    caution. Safe paths are written as programs in the languages ``programs``; others only with ``write_unsafe``, with
     the reason in the file.
     """
 
@@ -39,5 +40,6 @@ class TrajectorySettings(StrictModel):
     jerk_deg_s3: Annotated[list[Annotated[float, Field(gt=0, le=1e9)]], Field(min_length=1)] | None = None
     scene: Text | None = None
     penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
+    assumed_margin_mm: Annotated[float, Field(ge=0, le=1000)] = 20.0
     programs: list[LanguageName] = ["krl", "urscript", "rpl", "xpl", "csv"]
     write_unsafe: bool = False

@@ -11,8 +11,9 @@ from typing import Literal
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.collision.pairs import PairsUnexamined
+from er3a.collision.pairs import PairsUnexamined, ShapesAssumed
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular
@@ -69,6 +70,7 @@ class CheckOptions(ByValue):
     assumed_speed : (n,), rad/s or m/s, of joints whose speed no document gives
     acceleration_time : s, in which each joint is taken to reach its full speed
     penetration_tolerance : m; no overlap deeper than this goes unnoticed
+    assumed_margin : m, within which of the arm's shapes a motion is a caution where no document gives them
     measures : whether to look for collisions
     most_motions : that differ, and a multiple of them that are carried out; of those behind them only the targets are
         checked, which is said
@@ -82,6 +84,7 @@ class CheckOptions(ByValue):
     assumed_speed: Reals | None = None
     acceleration_time: float = 0.25
     penetration_tolerance: float = 0.001
+    assumed_margin: float = 0.02
     measures: bool = True
     most_motions: int = MOST_MOTIONS
     assumed: AssumedRates = field(default_factory=AssumedRates)
@@ -174,6 +177,7 @@ class ProgramCheck(ByValue):
     main : numbers of the steps of the way with the most motions
     not_examined : in the order of the text; each has a finding, of at least caution but for the way of a motion whose
         start is not known
+    shapes : on which what is said of collisions rests, if no document gives them
     """
 
     execution: Execution
@@ -184,6 +188,7 @@ class ProgramCheck(ByValue):
     main: tuple[int, ...]
     cycle: CycleTime
     not_examined: tuple[NotExamined, ...] = ()
+    shapes: ShapesAssumed | None = None
 
 
 def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
@@ -204,7 +209,8 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     options = options or CheckOptions()
     execution = execute(program, robot, options.start, options.frames, options.limits, options.keep_on)
     limits = assumed_limits(robot, options)
-    obstacles = obstacles_of(robot, options.scene, options.penetration_tolerance) if options.measures else None
+    around = options.scene, options.penetration_tolerance, options.assumed_margin
+    obstacles = obstacles_of(robot, *around) if options.measures else None
     checker = StepChecker(robot, CheckRules(options.near, limits, options.assumed), obstacles, execution)
     checker.start = options.start
     end = _checked_until(checker, options)
@@ -218,7 +224,8 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
     cycle = _cycle(execution, checker.motions, main, way)
-    return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle, missed)
+    shapes = shapes_assumed(robot, options.assumed_margin, {}) if options.measures else None
+    return ProgramCheck(execution, level, located, verdicts, checker.motions, way, cycle, missed, shapes)
 
 
 def _checked_until(checker: StepChecker, options: CheckOptions) -> int:

@@ -230,6 +230,16 @@ class MotionCollides:
 
 
 @dataclass(frozen=True)
+class ClearOfAssumed:
+    """The arm is clear of assumed shapes by less than what such shapes may be wrong by."""
+
+    pair: Pair
+    clearance_mm: float
+    margin_mm: float
+    code: Literal["clear_of_assumed"] = "clear_of_assumed"
+
+
+@dataclass(frozen=True)
 class ZoneCollides:
     """The arm is free on the programmed way, but not on each way round the corner that the zone allows."""
 
@@ -412,6 +422,7 @@ CheckFinding = (
     | ConfigurationNotRead
     | ConfigurationGuessed
     | MotionCollides
+    | ClearOfAssumed
     | PairsUnexamined
     | ZoneCollides
     | ZoneNotSettled

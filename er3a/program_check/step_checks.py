@@ -38,11 +38,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.by_value import ByValue
-from er3a.collision.along import clearance_along
+from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import link_frames
+from er3a.collision.shapes import arm_shapes, link_frames
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
@@ -60,6 +60,7 @@ from er3a.program_check.program_check_findings import (
     ArcHasNoCircle,
     BodiesTouch,
     CheckFinding,
+    ClearOfAssumed,
     ConfigurationGuessed,
     ConfigurationNotRead,
     ExternalAxesLeftOut,
@@ -560,10 +561,12 @@ class Obstacles:
     Attributes
     ----------
     tolerance : m, of an overlap that may go unnoticed
+    assumed_margin : m, within which of the arm's shapes nothing is settled; 0 where a document gives them
     """
 
     scene: Scene | None
     tolerance: float
+    assumed_margin: float
     bodies: dict[int, Bodies]
 
     def of(self, arm: Robot) -> Bodies:
@@ -573,9 +576,10 @@ class Obstacles:
         return self.bodies[id(arm)]
 
 
-def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float) -> Obstacles:
-    """What a robot must not meet, itself among it."""
-    return Obstacles(scene, tolerance, {id(robot): Bodies(robot, scene)})
+def obstacles_of(robot: Robot, scene: Scene | None, tolerance: float, assumed_margin: float) -> Obstacles:
+    """What a robot must not meet, itself among it; ``assumed_margin`` holds if its shapes are assumed."""
+    margin = assumed_margin if arm_shapes(robot).assumed else 0.0
+    return Obstacles(scene, tolerance, margin, {id(robot): Bodies(robot, scene)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -754,7 +758,7 @@ class StepChecker:
         along = clearance_along(bodies, way.joints, way.rates, way.t, ends, self.obstacles.tolerance)
         least = float(along.distance[along.least]) if along.least >= 0 else None
         if not along.contacts:
-            return replace(motion, clearance=least)
+            return self._clear(replace(motion, clearance=least), along)
         touches: dict[Pair, BodiesTouch] = {}
         for touch in (each for contact in along.contacts for each in contact.touches):  # in the order of time
             at = None if motion.kind == "joint" else way.along_mm(touch.start)
@@ -763,6 +767,17 @@ class StepChecker:
         hit = MotionCollides(tuple(touches.values()))
         moments = {**motion.moments, hit: along.contacts[0].start}
         return replace(motion, findings=(*motion.findings, hit), clearance=least, moments=moments)
+
+    def _clear(self, motion: CheckedMotion, along: ClearanceAlong) -> CheckedMotion:
+        """A motion that meets nothing, with what is to be said where it comes near to assumed shapes."""
+        assert self.obstacles is not None
+        margin = self.obstacles.assumed_margin
+        pair = along.pair[along.least] if along.least >= 0 else None
+        if pair is None or motion.clearance is None or motion.clearance >= margin:
+            return motion
+        near = ClearOfAssumed(pair, 1000 * motion.clearance, 1000 * margin)
+        moments = {**motion.moments, near: float(along.t[along.least])}
+        return replace(motion, findings=(*motion.findings, near), moments=moments)
 
     def _corner(self, first: int, second: int) -> None:
         """Check the corner between two motions, if a zone lets the arm round it."""

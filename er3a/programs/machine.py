@@ -119,11 +119,15 @@ def deciding(program: Program, modal: frozenset[str]) -> frozenset[str]:
 
 
 def changed_beside(program: Program, dialect: Dialect, itself: str = "") -> frozenset[str]:
-    """Names of the variables that threads and interrupts, but for one ``itself``, change beside the program."""
+    """Names of the variables that threads and interrupts, but for one ``itself``, change beside the program.
+
+    What motions depend on without naming it, as the tool, is not among them: a routine that sets it is named as one
+    that moves the arm beside the program, and the two are followed apart.
+    """
     routines = program.routines
     asked = {each.what.function for each in program.operations() if isinstance(each, Beside)}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
-    return _changed_in(program, _with_called(program, started), dialect)
+    return _changed_in(program, _with_called(program, started), dialect) - dialect.modal
 
 
 def _with_called(program: Program, names: Iterable[str]) -> set[str]:
@@ -698,7 +702,8 @@ class Machine:
         name = start.what.function
         routine = self.program.routines.get(name)
         unknown = routine is None and (start.kind == "thread" or not self.dialect.harmless(start.what))
-        if not unknown and name not in self.moving:
+        sets = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect) & self.dialect.modal
+        if not unknown and name not in self.moving and not sets:
             self._note(way, start.place, Aside(start.text))
             return
         before = way.step
@@ -725,7 +730,7 @@ class Machine:
             way.memory.here = Position()
 
     def _changed_later(self, way: RunWay) -> frozenset[str]:
-        """Names of the variables that a way may still change."""
+        """Names of the variables, of those that have names in motions, that a way may still change."""
         found: set[str] = set()
         called: set[str] = set()
         for frame in way.frames:
@@ -742,7 +747,8 @@ class Machine:
                 waiting += [operation.otherwise] if isinstance(operation, Branch) else []
                 found.update(_shared(operation, self.dialect))
                 called.update(_next(operation))
-        return frozenset(found) | _changed_in(self.program, _with_called(self.program, called), self.dialect)
+        found |= _changed_in(self.program, _with_called(self.program, called), self.dialect)
+        return frozenset(found) - self.dialect.modal
 
     def _return(self, way: RunWay, operation: Return) -> None:
         memory = way.memory

@@ -183,6 +183,13 @@ def test_what_an_interrupt_sets_is_followed_on_both_sides(tmp_path):
     assert codes(found)["above_limit"] == [5]
 
 
+def test_an_interrupt_that_sets_a_frame_is_named_and_leaves_the_programs_own_frames(tmp_path):
+    body = f"{FRAMES}INTERRUPT DECL 4 WHEN $IN[1] DO shift( )\nPTP {axes(NEAR)}\nLIN_REL {{Z 5}}"
+    found = check(tmp_path, krl(body, "DEF shift( )\n$BASE={X 0,Y 0,Z 10,A 0,B 0,C 0}\nEND\n"), "a.src")
+    assert codes(found) == {"moves_beside": [4], "speed_not_given": [5, 6]}
+    assert found.level == "caution"
+
+
 def test_the_arm_stands_anywhere_behind_resume(tmp_path):
     body = f"INTERRUPT DECL 5 WHEN $IN[2] DO stop( )\nPTP {axes(NEAR)}"
     found = check(tmp_path, krl(body, "DEF stop( )\nBRAKE\nRESUME\nEND\n"), "a.src")

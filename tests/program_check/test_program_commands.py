@@ -8,9 +8,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from er3a.pipeline import cli  # noqa: F401
+from er3a.pipeline import (
+    cli,  # noqa: F401
+    program_reports,
+)
 from er3a.pipeline.commands.options import app
+from er3a.pipeline.program_reports import PathProgram
 from er3a.programs.languages import read_program
+from er3a.programs.program_findings import TargetsLeftOut
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = "data/programs/faults"
@@ -155,3 +160,23 @@ def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
     kinds = [(tmp_path / f"weld_{number}.script").read_text() for number in (1, 2, 3)]
     assert "movec(" in kinds[1]
     assert "movel(" not in kinds[0] + kinds[2]
+
+
+def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch):
+    made = PathProgram("line", "safe", {"line.src": "DEF line( )\nEND\n"}, (TargetsLeftOut(1),))
+    monkeypatch.setattr(program_reports, "programs_of", lambda *_: iter([made]))
+    words = ("program", "write", "data/paths/er3a_c60.yaml", "--robot", "er3a_c60", "--language", "krl")
+    done = run(*words, "--output", str(tmp_path))
+    assert (tmp_path / "line.src").is_file()
+    assert done.exit_code == 1
+    assert "left out" in done.stderr
+
+
+def test_assumed_shapes_and_ways_from_nowhere_are_named():
+    done = run("check-program", "data/programs/weld_seam.src", "--robot", "er3a_c60", "--verdicts", "--json")
+    (record,) = json.loads(done.stdout)
+    assert record["shapes_assumed"] is True
+    assert {each["what"] for each in record["not_examined"]} == {"way"}
+    done = check("data/programs/weld_seam.src", "--verdicts")
+    assert "mm of assumed shapes [motion]" in done.stdout
+    assert "No document gives the shapes of the arm's links" in done.stderr

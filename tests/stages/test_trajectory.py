@@ -191,8 +191,11 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert 0 < stop.motion.done_ratio < 1
     assert paths["line_out"].strategy is None
     assert "out of reach from t =" in advice(paths["line_out"])
-    met = paths["line_collides"].collisions[0]
-    assert f"Nothing overlaps before t = {met.t0_s:.4g} s ({met.s0_m * 1000:.1f} mm)" in advice(paths["line_collides"])
+    last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
+    assert 0 < last.t_s < met.t0_s
+    assert f"up to t = {last.t_s:.4g} s ({last.s_m * 1000:.1f} mm): end the path there" in advice(
+        paths["line_collides"]
+    )
     assert paths["line_limits"].strategy == "planned" or "limit" in advice(paths["line_limits"])
     mended = paths["line_wrist"]
     assert mended.chosen.motion.max_joint_speed_ratio <= mended.max_joint_speed_ratio * (1 + 1e-6)

@@ -71,6 +71,7 @@ def check_program(
         lines_of,
         not_examined_line,
         sarif_of,
+        shapes_line,
         summary_line,
     )
     from er3a.pipeline.progress import TimeBudget, shown_work
@@ -99,6 +100,8 @@ def check_program(
             for line in (cycle_line(each), not_examined_line(each)):
                 if line:
                     print_note(line)
+        if line := shapes_line(checked):
+            print_note(line)
         print_note(summary_line(checked))
     if any(each.check is None for each in checked):
         raise typer.Exit(2)

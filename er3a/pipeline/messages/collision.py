@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import BASE, TRIED, CarriedAndLink, LinkAndSolid, LinkPair, PairsUnexamined, link_label
+from er3a.collision.pairs import (
+    BASE,
+    TRIED,
+    CarriedAndLink,
+    LinkAndSolid,
+    LinkPair,
+    PairsUnexamined,
+    ShapesAssumed,
+    link_label,
+)
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
@@ -40,6 +49,15 @@ TEXTS = texts(
         "pairs_unexamined": (
             "Collisions not examined, because the shapes overlap in every joint vector tried ({count}): {pairs}."
         ),
+        "shapes_assumed#given": (
+            "No document gives the shapes of the arm's links: collisions are judged by assumed shapes, and clear means "
+            "clear of these."
+        ),
+        "shapes_assumed#guessed": (
+            "The robot's file gives no shapes: collisions are judged by capsules guessed from its table, and clear "
+            "means clear of these."
+        ),
+        "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes, and so not settled: {names}.",
         "link#base": "base",
         "link#number": "link {number}",
         "collision.never_free": "No joint vector within the limits is collision-free (proven): {pairs} always overlap.",
@@ -61,6 +79,11 @@ TEXTS = texts(
             "{percent:.1f} % of the joint space is collision-free. Of {places} cells reached, {clear} are proven "
             "reachable without collision, {joined} of these by a proven motion from home; at most {lost:.1f} % of the "
             "cells are lost to collisions."
+        ),
+        "collision.free_space#assumed": (
+            "{percent:.1f} % of the joint space is free of collisions of the assumed shapes. Of {places} cells "
+            "reached, {clear} are reachable without collision of these, {joined} of them by a motion from home that "
+            "is clear of them; at most {lost:.1f} % of the cells are lost to collisions."
         ),
         "collision.free_space#doubt": (
             "Pairs of links that may or may not collide, and are therefore checked: {undecided}."
@@ -93,6 +116,15 @@ def _(found: PairsUnexamined) -> str:
     return say_as(found, count=TRIED, pairs=joined(named, ", "))
 
 
+@say.register
+def _(found: ShapesAssumed) -> str:
+    rests = say_as(found, "given" if found.given else "guessed")
+    if not found.near:
+        return rests
+    near = sentence("shapes_assumed.near", margin_mm=found.margin_mm, names=", ".join(found.near))
+    return joined([rests, near], " ")
+
+
 def _link(number: int) -> str:
     return sentence("link#base") if number == BASE else sentence("link#number", number=number)
 
@@ -121,7 +153,12 @@ def _(found: HomeCollides) -> str:
 def _(found: FreeSpace) -> str:
     if not found.clear:
         return say_as(found, "none")
-    free = say_as(found, "free", percent=100 * found.free_ratio, lost=100 * (1 - found.clear / found.places))
+    free = say_as(
+        found,
+        "assumed" if found.assumed else "free",
+        percent=100 * found.free_ratio,
+        lost=100 * (1 - found.clear / found.places),
+    )
     if not found.undecided:
         return free
     doubt = say_as(found, "doubt")

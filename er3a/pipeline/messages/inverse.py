@@ -125,7 +125,7 @@ def _(found: AllSolved) -> str:
     where = _where(found.collisions)
     if not found.demonstrations:
         return say_as(found, "every", where=where)
-    some = say_as(found, "some", total=found.targets + len(found.demonstrations), where=where)
+    some = say_as(found, "some", total=found.targets, where=where)
     return _and_demonstrations(some, found.demonstrations)
 
 
@@ -139,7 +139,7 @@ def _(found: NoneSolved) -> str:
 def _(found: SomeUnsolved) -> str:
     some = say_as(
         found,
-        total=found.targets + len(found.demonstrations),
+        total=found.targets,
         where=_where(found.collisions),
         none_for=_none_for(found.unsolved),
     )

@@ -77,6 +77,7 @@ REMEDIES: dict[str, str] = {
     "motion_collides": N_(
         "Go round by a via point, take another configuration or tool orientation, or move what stands in the way."
     ),
+    "clear_of_assumed": N_("Give shapes from a drawing or model in the robot's file, or keep the motion farther away."),
     "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
     "zone_not_settled": N_("Make the zone smaller, or move the corner away from what is near."),
@@ -165,6 +166,9 @@ TEXTS = texts(
                 "the interrupt {routine} can move the arm at any time; its motions were checked apart, from where it "
                 "is not known"
             ),
+        ),
+        "clear_of_assumed": (
+            "clear of {pair} by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by {margin_mm:g} mm"
         ),
         "zone_collides": "a corner path that the blending zone allows collides: {pair}, {depth_mm:.1f} mm deep",
         "zone_not_settled": (
@@ -299,7 +303,7 @@ TEXTS = texts(
 
 @say.register
 def _(found: ProgramCounts) -> str:
-    passed = sentence("programs.programs", count=found.programs + len(found.demonstrations), passed=found.passed)
+    passed = sentence("programs.programs", count=found.programs, passed=found.passed)
     unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
     others = []
     for outcome, names in unsound.items():

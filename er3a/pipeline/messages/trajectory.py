@@ -100,8 +100,9 @@ TEXTS = texts(
             "in its program"
         ),
         "advice.clear_until": (
-            "Nothing overlaps before t = {t:.4g} s ({far:.1f} mm): end the path there, or move its end or the body "
-            "that it hits"
+            "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm): end the path there, with the "
+            "tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg (joints {q}), or move its end or the body "
+            "that it hits: {pair} touch at {contact} mm"
         ),
         "advice.chosen": "{way}: {tool}, and {time}",
         "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
@@ -132,7 +133,7 @@ def _(found: PathCounts) -> str:
     for verdict, names in unsafe.items():
         parts = {"count": len(names), "word": outcome_word(verdict), "names": ", ".join(names)}
         faults.append(sentence("trajectory.fault", **parts) if names else "")
-    safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
+    safe = sentence("trajectory.paths", count=found.paths, safe=found.safe)
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
         faults.append(sentence("trajectory.not_followed", **parts))
@@ -311,10 +312,22 @@ def _slower_throughout(path: PathSummary) -> str:
 
 def _clear(path: PathSummary) -> str:
     """How far a path that collides could be used; empty for others."""
-    if not path.collisions or path.unreachable or not path.collisions[0].s0_m:
+    last = path.clear_until
+    if last is None or path.unreachable:
         return ""
-    first = path.collisions[0]
-    return ". " + sentence("advice.clear_until", t=first.t0_s, far=first.s0_m * 1000)
+    parts = {
+        "xyz": _numbers(last.xyz_mm, 1),
+        "rpy": _numbers(last.rpy_deg, 2),
+        "q": _numbers(last.q_deg, 2),
+        "contact": _numbers(last.contact_mm, 0),
+    }
+    pair = say(path.collisions[0].cause.touches[0].pair)
+    text = sentence("advice.clear_until", margin=last.margin_mm, t=last.t_s, far=last.s_m * 1000, pair=pair, **parts)
+    return ". " + text
+
+
+def _numbers(values: tuple[float, ...], digits: int) -> str:
+    return ", ".join(f"{value + 0.0:.{digits}f}" for value in values)
 
 
 def reasons(tried: TriedStrategy) -> str:

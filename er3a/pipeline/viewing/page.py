@@ -24,6 +24,7 @@ from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.messages.pages import Caveat, caveat, glossary
 from er3a.pipeline.messages.say import say_all
 from er3a.pipeline.results import Provenance, Stored, read_status
@@ -142,7 +143,8 @@ class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
     ``finding`` is what the sentence says; ``caveats`` by the stage that it rests on: what to know first;
-    ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to.
+    ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to. ``not_examined``: what
+    the verdict leaves out, and of which.
     """
 
     robot: str
@@ -154,6 +156,7 @@ class Head:
     caveats: Mapping[str, Caveat]
     demonstrations: int
     finding: Any
+    not_examined: tuple[tuple[str, str], ...] = ()
 
 
 def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
@@ -178,7 +181,10 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     meant = len(getattr(verdict.finding, "demonstrations", ()))
     text = say_all(verdict.findings)
-    return Head(stored.robot, stage, verdict.status, text, shown, stored.provenance, caveats, meant, verdict.finding)
+    missed = tuple((left_out_text(each), ", ".join(each.names)) for each in stored.results.summary.not_examined)
+    return Head(
+        stored.robot, stage, verdict.status, text, shown, stored.provenance, caveats, meant, verdict.finding, missed
+    )
 
 
 def render(

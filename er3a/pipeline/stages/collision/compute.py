@@ -18,13 +18,15 @@ from er3a.collision.free_space import (
 )
 from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import Pair
+from er3a.collision.shapes import shapes_assumed
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Verdict
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.collision.model import (
     BaseInSolid,
@@ -44,6 +46,7 @@ from er3a.pipeline.stages.collision.model import (
     ShapesOverlap,
     TargetClearances,
 )
+from er3a.pipeline.stages.left_out import left_out_of_collisions
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
 from er3a.pipeline.study import Study
@@ -165,9 +168,14 @@ def compute(study: Study, name: str) -> CollisionResults:
     wrong = ShapesOverlap(bodies.unexamined, space.whole.value) if bodies.unexamined else None
     undecided = int((matrix.state == "undecided").sum())
     home_found = None if at_home is None else HomeCollides(at_home, float(-least[0] * 1000), space.whole.value)
+    closest = (*at_targets, *on_paths)
+    margin = study.section(TrajectorySettings).assumed_margin_mm / 1000
+    assumed = shapes_assumed(robot, margin, {each.name: each.clearance_mm / 1000 for each in closest})
     return CollisionResults(
         summary=CollisionSummary(
-            verdict=_verdict(pairs, mounting, wrong or home_found, _free_space(space, places_found, undecided)),
+            verdict=_verdict(
+                pairs, mounting, wrong or home_found, _free_space(space, places_found, undecided, assumed is not None)
+            ).resting_on(assumed),
             figures=_figures(space, places_found, matrix),
             scene=scene.title if scene else None,
             samples=settings.samples,
@@ -179,7 +187,12 @@ def compute(study: Study, name: str) -> CollisionResults:
             penetration_tolerance_mm=settings.penetration_tolerance_mm,
             places=places_found,
             mounting=mounting,
-            closest=(*at_targets, *on_paths),
+            closest=closest,
+            not_examined=(
+                *left_out_of_collisions(bodies, scene, settings.penetration_tolerance_mm),
+                LeftOut("joint_vectors", amount=settings.samples),
+                LeftOut("lost_cells", amount=places_found.reached - places_found.clear),
+            ),
         ),
         matrix=matrix,
         pairs=pairs,
@@ -242,8 +255,8 @@ def _places_summary(places: ClearPlaces) -> PlacesSummary:
     )
 
 
-def _free_space(space: JointSpace, places: PlacesSummary, undecided: int) -> FreeSpace:
-    return FreeSpace(space.whole.value, places.reached, places.clear, places.joined, undecided)
+def _free_space(space: JointSpace, places: PlacesSummary, undecided: int, assumed: bool) -> FreeSpace:
+    return FreeSpace(space.whole.value, places.reached, places.clear, places.joined, undecided, assumed)
 
 
 def _verdict(

@@ -55,6 +55,7 @@ class FreeSpace:
     ----------
     places, clear, joined : cells reached, with an arm free of overlap, and joined to home by a proven motion
     undecided : pairs of links of which it is not known whether they can meet
+    assumed : whether no document gives the shapes of the arm's links, so that nothing is proven of the arm itself
     """
 
     free_ratio: float
@@ -62,6 +63,7 @@ class FreeSpace:
     clear: int
     joined: int
     undecided: int
+    assumed: bool = False
     code: Literal["collision.free_space"] = "collision.free_space"
 
 

@@ -76,19 +76,32 @@ def workspace(results: CollisionResults) -> Picture:
         ax.set_title(title)
     figure.colorbar(mesh, ax=axes.tolist(), label=tr("reached cells lost to collisions (%)"), shrink=0.8)
     found = results.summary.places
-    caption = tr(
-        "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of"
-        " {reached} cells reached, {clear} have a collision-free configuration (proven), {joined} of these "
-        "connected to home by a proven motion. In the others none was found in {tries} tries in all, so their "
-        "volume of {lost} L overestimates the loss. Ringed: columns with collision-free cells that are not "
-        "connected to home.",
-        cell=cell,
-        reached=found.reached,
-        clear=found.clear,
-        joined=found.joined,
-        tries=found.tries_in_lost,
-        lost=fixed(found.lost_m3 * 1000, 0),
-    )
+    numbers = {
+        "cell": cell,
+        "reached": found.reached,
+        "clear": found.clear,
+        "joined": found.joined,
+        "tries": found.tries_in_lost,
+        "lost": fixed(found.lost_m3 * 1000, 0),
+    }
+    if results.summary.verdict.shapes:
+        caption = tr(
+            "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of "
+            "{reached} cells reached, {clear} have a configuration that is clear of the assumed shapes, {joined} of "
+            "these connected to home by a motion that is. In the others none was found in {tries} tries in all, so "
+            "their volume of {lost} L overestimates the loss. Ringed: columns with collision-free cells that are not "
+            "connected to home.",
+            **numbers,
+        )
+    else:
+        caption = tr(
+            "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of"
+            " {reached} cells reached, {clear} have a collision-free configuration (proven), {joined} of these "
+            "connected to home by a proven motion. In the others none was found in {tries} tries in all, so their "
+            "volume of {lost} L overestimates the loss. Ringed: columns with collision-free cells that are not "
+            "connected to home.",
+            **numbers,
+        )
     return Picture(figure, tr("Two views of the cells reached. {conclusion}", conclusion=caption), caption)
 
 

@@ -12,6 +12,7 @@ from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import shapes_assumed
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.geometry.transforms import rotation_angle, rpy_of, transform
@@ -409,7 +410,9 @@ def compute(study: Study, name: str) -> InverseResults:
     trips = batch_round_trips(robot, random, wanted) if complete else None
     worst = _worst_residuals(solutions, trips)
     summary = InverseSummary(
-        verdict=_verdict(results, worst, trips, scene is not None).without(bodies_of(robot, scene).unexamined),
+        verdict=_verdict(results, worst, trips, scene is not None)
+        .without(bodies_of(robot, scene).unexamined)
+        .resting_on(shapes_assumed(robot, study.section(TrajectorySettings).assumed_margin_mm / 1000, {})),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,

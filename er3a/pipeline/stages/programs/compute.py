@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.pairs import PairsUnexamined
+from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
 from er3a.pipeline.stages.programs.model import (
     AllProgramsPass,
@@ -34,7 +36,7 @@ from er3a.pipeline.stages.trajectory.motion import assumed_speeds, near_singular
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
 from er3a.program_check.motion_checks import AssumedRates
-from er3a.program_check.program_check_findings import CheckFinding, Level, worst_of
+from er3a.program_check.program_check_findings import CheckFinding, ExternalAxesLeftOut, Level, worst_of
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.languages import read_program
@@ -58,26 +60,56 @@ def compute(study: Study, name: str) -> ProgramsResults:
     summaries: list[ProgramSummary] = []
     lines: list[Lines] = []
     instructions: list[Instructions] = []
+    unknown_starts: list[str] = []
     motions: list[ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
         motion, starts = _motion(entry.name, check, len(robot.lower))
         summaries.append(_summary(entry, check, starts))
+        if any(each.what == "way" for each in check.not_examined):
+            unknown_starts.append(entry.name)
         lines.append(_lines(entry.name, check))
         instructions.append(_instructions(entry.name, check, len(robot.lower)))
         motions.append(motion)
+    least = {
+        each.name: None if each.least_clearance_mm is None else each.least_clearance_mm / 1000
+        for each in summaries
+        if each.expect in (None, "pass")
+    }
+    assumed = shapes_assumed(robot, options.assumed_margin, least)
     return ProgramsResults(
         summary=ProgramsSummary(
-            verdict=_verdict(summaries).without(bodies_of(robot, scene).unexamined),
+            verdict=_verdict(summaries).without(bodies_of(robot, scene).unexamined).resting_on(assumed),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
             assumed_speed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
             programs=tuple(summaries),
+            not_examined=(
+                *left_out_of_collisions(bodies_of(robot, scene), scene, 1000 * options.penetration_tolerance),
+                *left_out_of_rates(np.isfinite(robot.speed), jerk=False),
+                *_left_out(summaries, unknown_starts),
+            ),
         ),
         lines=Lines.stacked(lines) if lines else Lines.empty(),
         instructions=Instructions.stacked(instructions) if instructions else Instructions.empty(),
         motion=ProgramMotion.stacked(motions) if motions else ProgramMotion.empty(),
     )
+
+
+def _left_out(programs: Sequence[ProgramSummary], unknown_starts: Sequence[str]) -> Iterator[LeftOut]:
+    """Lines that were not examined, ways from where the arm is not known to stand, and what no check sees."""
+    lines = tuple(f"{each.name}: {', '.join(map(str, each.not_examined))}" for each in programs if each.not_examined)
+    if lines:
+        yield LeftOut("program_lines", lines)
+    if unknown_starts:
+        yield LeftOut("program_starts", tuple(unknown_starts))
+    outer = tuple(
+        each.name for each in programs if any(isinstance(at.finding, ExternalAxesLeftOut) for at in each.findings)
+    )
+    if outer:
+        yield LeftOut("outer_axes", outer)
+    yield LeftOut("controller_ramps")
+    yield LeftOut("torques")
 
 
 def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
@@ -88,6 +120,7 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
         assumed_speed=assumed_speeds(robot, paths),
         acceleration_time=paths.acceleration_time_s,
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,
+        assumed_margin=paths.assumed_margin_mm / 1000,
         assumed=AssumedRates(
             own.tool_speed_mm_s / 1000, own.tool_acceleration_mm_s2 / 1000, own.joint_speed_percent / 100
         ),
@@ -234,12 +267,12 @@ def _verdict(
 
 def _figures(programs: list[ProgramSummary]) -> tuple[Figure, ...]:
     asked = [each for each in programs if each.expect in (None, "pass")]
-    instructions = sum(each.motions for each in programs)
+    instructions = sum(each.motions for each in asked)
     clear = [each.least_clearance_mm for each in asked if each.least_clearance_mm is not None]
     return (
-        Figure("programs_passed", sum(each.outcome == "pass" for each in programs), "", of=len(programs)),
-        Figure("instructions_passed", sum(each.passed for each in programs), "", of=instructions),
-        Figure("instructions_caution", sum(each.caution for each in programs), ""),
-        Figure("instructions_failed", sum(each.failed for each in programs), ""),
+        Figure("programs_passed", sum(each.outcome == "pass" for each in asked), "", of=len(asked)),
+        Figure("instructions_passed", sum(each.passed for each in asked), "", of=instructions),
+        Figure("instructions_caution", sum(each.caution for each in asked), ""),
+        Figure("instructions_failed", sum(each.failed for each in asked), ""),
         Figure("least_clearance", min(clear, default=None), "mm"),
     )

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
+from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
@@ -19,12 +21,14 @@ from er3a.kinematics.singularity import NearSingular, characteristic_length, con
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
-from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.trajectory.judgement import (
     Judgement,
     Surroundings,
+    clear_until,
     clearance_rows,
     collisions,
     judge,
@@ -71,6 +75,7 @@ from er3a.robots.robot import Robot
 
 LEAST_RATIO = 1e-3  # of the limits, below which a path counts as standing still
 FAULTS: tuple[PathVerdict, ...] = ("unreachable", "none found", "leaves limits", "collides", "too fast")
+ROUNDED = 0.0005  # m, by which a pose may be off that is written with one decimal of mm and two of deg
 ROWS = 250  # of each motion in the table
 CLEARANCE_TIMES = 41
 
@@ -96,6 +101,7 @@ class AvoidanceTask:
 
     Attributes
     ----------
+    margin : m, that a motion which is advised keeps from bodies, if any does
     only : the strategy that the study asks for; None to compare all
     """
 
@@ -105,6 +111,7 @@ class AvoidanceTask:
     only: StrategyName | None
     surroundings: Surroundings
     planning: PlanningTask
+    margin: float
 
     def avoid(self, motion: Motion, found: Judgement, along: ClearanceAlong) -> Avoided:
         """Compare the strategies where a path is not safe; find its fastest time law where it can be run as it is.
@@ -128,7 +135,8 @@ class AvoidanceTask:
         met = {result.name: self._meets(result.cost) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
-        chosen = best(free, meets)
+        roomy = [result for result in free if self._keeps_margin(met[result.name][1] if result.name in met else None)]
+        chosen = best(roomy, meets) or best(free, meets)
         tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
@@ -195,6 +203,9 @@ class AvoidanceTask:
         if least is None:
             return None, None
         return PairOverlaps(least.between, -least.least_mm) if along.contacts else None, least.least_mm
+
+    def _keeps_margin(self, clearance_mm: float | None) -> bool:
+        return clearance_mm is None or clearance_mm >= 1000 * self.margin
 
     def _tables(self, motion: Motion, results: list[StrategyResult], quickest: Timed | None) -> Iterator[AvoidanceRows]:
         for result in results:
@@ -383,7 +394,9 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     surroundings = Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, surroundings.bodies, study.seed)
-    avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning)
+    assumed_margin = settings.assumed_margin_mm / 1000
+    margin = (assumed_margin if arm_shapes(robot).assumed else surroundings.tolerance) + ROUNDED
+    avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning, margin)
     tables: list[PathChecks] = []
     clearances: list[Clearances] = []
     strategies: list[AvoidanceRows] = []
@@ -401,7 +414,8 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         tables.append(_checks(robot, motion, found, near, limits))
         clearances.append(clearance_rows(each.name, along))
         strategies.append(avoided.rows)
-        paths.append(path_summary(robot, motion, found, along, avoided, limits))
+        last = clear_until(surroundings, motion, found, along, margin)
+        paths.append(replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
         asked = settings.programs, settings.write_unsafe
         programs.append(program_files(robot, motion, paths[-1].verdict, *asked, repair))
@@ -417,8 +431,12 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         acceleration_time_s=settings.acceleration_time_s,
         jerk_deg_s3=None if limits.jerk is None else _shown(robot, limits.jerk),
     )
+    least = {
+        path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
+    }
+    assumed_shapes = shapes_assumed(robot, assumed_margin, least)
     summary = TrajectorySummary(
-        verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined),
+        verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined).resting_on(assumed_shapes),
         figures=_figures(paths, length, used),
         characteristic_length_m=length,
         near=thresholds,
@@ -427,6 +445,12 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
         not_followed=tuple(skipped),
+        not_examined=(
+            *left_out_of_collisions(surroundings.bodies, scene, settings.penetration_tolerance_mm),
+            *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
+            *_left_out(paths, skipped, only),
+            LeftOut("torques"),
+        ),
     )
     return TrajectoryResults(
         summary=summary,
@@ -436,6 +460,16 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         avoidance=AvoidanceRows.stacked(strategies).of_joints(robot.slides),
         programs=ProgramFiles.stacked(programs),
     )
+
+
+def _left_out(paths: list[PathSummary], skipped: list[PathNotFollowed], only: StrategyName | None) -> Iterator[LeftOut]:
+    """Paths that were not followed, stretches that bounds leave open, strategies that the study does not ask for."""
+    if skipped:
+        yield LeftOut("paths", tuple(path.name for path in skipped))
+    if open_ := tuple(path.name for path in paths if path.undecided):
+        yield LeftOut("path_stretches", open_)
+    if only:
+        yield LeftOut("strategies", tuple(name for name in get_args(StrategyName) if name != only))
 
 
 def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> PathChecks:
@@ -505,6 +539,7 @@ def _fails(path: PathSummary) -> bool:
 
 
 def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tuple[Figure, ...]:
+    asked = [path for path in paths if path.expect in (None, "safe")]  # demonstrations are counted apart
     events = [event for path in paths for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]
     agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)
@@ -516,7 +551,7 @@ def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tup
     speed, limit, unit = max(speeds, key=lambda each: each[0] / each[1], default=(None, None, "deg/s"))
     colliding = sum(bool(path.collisions) for path in paths)
     return (
-        Figure("safe", sum(path.verdict == "safe" for path in paths), "", of=len(paths)),
+        Figure("safe", sum(path.verdict == "safe" for path in asked), "", of=len(asked)),
         Figure("singular_poses", sum(event.crossing for event in events), ""),
         Figure("near_passes", sum(not event.crossing for event in events), ""),
         Figure("colliding", colliding, ""),

@@ -7,13 +7,21 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+import scipy
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.stages.trajectory.model import BodiesOverlap, Clearances, LeastClearance, PairTouches
+from er3a.pipeline.stages.trajectory.model import (
+    BodiesOverlap,
+    Clearances,
+    ClearUntil,
+    LeastClearance,
+    PairTouches,
+)
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.intervals import (
     AccelerationTooGreatIfAssumed,
@@ -32,9 +40,12 @@ from er3a.planning.polynomial_checks import GreatestRates, LimitCheck, RateCheck
 from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Undecided, jerk_intervals
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 ASSUMED = (TooFastIfAssumed, AccelerationTooGreatIfAssumed)
+STEPS_TO_CONTACT, ATTEMPTS = 1000, 5
+BEFORE_STOP = 0.99  # of the time until limits or reach are left
 SPEED_STEP = 1e-5  # share of the duration
 
 
@@ -239,6 +250,65 @@ def least_clearance(along: ClearanceAlong) -> LeastClearance | None:
     if least < 0 or (pair := along.pair[least]) is None:
         return None
     return LeastClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
+
+
+def clear_until(
+    surroundings: Surroundings, motion: Motion, found: Judgement, along: ClearanceAlong, margin: float
+) -> ClearUntil | None:
+    """The last point of a motion up to which it keeps a margin (m); None if it meets nothing, or keeps it nowhere.
+
+    The point is looked for on a grid up to the first contact, or to where the motion leaves limits or reach, and
+    proven: where the clearance along the motion up to it is less, it is moved back. Of links that touch by design at
+    their joint, which have no margin to keep there, those that overlap elsewhere keep half of their first distance.
+    """
+    if not along.contacts:
+        return None
+    bodies, robot, first = surroundings.bodies, surroundings.bodies.robot, along.contacts[0].start
+    met = {pair for contact in along.contacts for pair in contact.pairs}
+    joined = np.array([k for k, pair in enumerate(bodies.pairs) if bodies.joined[k] and pair in met], int)
+
+    def apart(t: Reals) -> Reals:
+        """Distances (k, joined), m, at times (k,)."""
+        return np.array([bodies.distances(bodies.ends(q), joined) for q in motion.joints(t)])
+
+    kept = np.minimum(margin, apart(np.zeros(1))[0] / 2) if joined.size else np.empty(0)
+
+    def beyond(t: Reals) -> Reals:
+        """By how much (k,), m, more than the margin is kept at times (k,)."""
+        spare = bodies.least(motion.joints(t))[0] - margin
+        return np.minimum(spare, (apart(t) - kept).min(axis=1)) if joined.size else spare
+
+    stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
+    end = min([first, *(BEFORE_STOP * stop for stop in stops)])
+    for _ in range(ATTEMPTS):
+        grid = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
+        least = beyond(grid)
+        if not least[0] > 0:
+            return None
+        k = int(np.argmax(least <= 0))
+        if k > 0:
+            end = scipy.optimize.brentq(lambda t: beyond(np.array([t]))[0], grid[k - 1], grid[k], xtol=1e-9 * first)
+        known = np.append(motion.t[motion.t < end], end)
+        until = clearance_along(
+            bodies, motion.joints, motion.rate_bounds, known, known[[0, -1]], surroundings.tolerance
+        )
+        short = until.distance < margin - surroundings.tolerance
+        if not short.any():
+            break
+        end = float(until.t[int(np.argmax(short))])
+    else:
+        return None
+    pose, q = motion.tool(np.array([end]))[0], motion.joints(np.array([end, first]))
+    touching = bodies.surface_points(q[1], int(bodies.least(q[1:])[1][0])).mean(axis=0)
+    return ClearUntil(
+        1000 * margin,
+        end,
+        float(motion.way(np.array([end]))[0]),
+        tuple((1000 * pose[:3, 3]).tolist()),
+        tuple(np.degrees(rpy_of(pose)).tolist()),
+        tuple(shown(robot, q[0]).tolist()),
+        tuple((1000 * touching).tolist()),
+    )
 
 
 def clearance_rows(name: str, along: ClearanceAlong) -> Clearances:

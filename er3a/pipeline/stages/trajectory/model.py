@@ -189,6 +189,25 @@ class LeastClearance:
 
 
 @dataclass(frozen=True)
+class ClearUntil:
+    """The last point of a path that collides, from whose start to there it keeps a margin.
+
+    Attributes
+    ----------
+    xyz_mm, rpy_deg : of the tool in the base frame; q_deg : in mm where a joint slides
+    contact_mm : where the first bodies touch, further on
+    """
+
+    margin_mm: float
+    t_s: float
+    s_m: float
+    xyz_mm: tuple[float, ...]
+    rpy_deg: tuple[float, ...]
+    q_deg: tuple[float, ...]
+    contact_mm: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class StrategyMotion:
     """A strategy's motion, against the path as programmed.
 
@@ -243,6 +262,7 @@ class PathSummary:
     velocity_check_deg_s : greatest difference of joint velocities by the Jacobian and by differences of angles
     clearance : None where none could be measured
     no_way : why no motion was planned, of one that is to be
+    clear_until : how far it could be used; None where it does not collide, or keeps the margin nowhere
     fastest_s : of the exact path under the joint limits; None where no motion follows it
     avoidance : the strategies tried; none where the path is safe
     strategy : the one to take
@@ -281,6 +301,7 @@ class PathSummary:
     avoidance: tuple[TriedStrategy, ...]
     strategy: StrategyName | None
     sliding: tuple[int, ...] = ()
+    clear_until: ClearUntil | None = None
 
     @property
     def fastest_joint(self) -> int | None:

@@ -1,0 +1,41 @@
+"""What stages did not examine: what settings, inputs and limits leave out of their verdicts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from er3a.collision.bodies import Bodies
+from er3a.collision.matrix import PairState
+from er3a.collision.pairs import link_label
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import arm_shapes
+from er3a.numerics.arrays import Flags
+from er3a.pipeline.results import LeftOut, LeftOutSubject
+
+
+def left_out_of_collisions(bodies: Bodies, scene: Scene | None, tolerance_mm: float) -> tuple[LeftOut, ...]:
+    """What a check for collisions does not see.
+
+    Parameters
+    ----------
+    tolerance_mm : of overlaps that may go unnoticed between points of a motion
+    """
+
+    def pairs(state: PairState) -> tuple[str, ...]:
+        return tuple(f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state)
+
+    found: list[tuple[LeftOutSubject, tuple[str, ...]]] = [
+        ("bare_links", tuple(link_label(link) for link in arm_shapes(bodies.robot).bare)),
+        ("unexamined_pairs", tuple(pair.label for pair in bodies.unexamined)),
+        ("allowed_pairs", pairs("allowed")),
+        ("joined_pairs", pairs("joined")),
+    ]
+    listed = [LeftOut(subject, names) for subject, names in found if names]
+    obstacles = [LeftOut("obstacles")] if scene is None else []
+    return (*obstacles, *listed, LeftOut("shallow_overlaps", amount=tolerance_mm))
+
+
+def left_out_of_rates(speed_known: Flags, jerk: bool) -> tuple[LeftOut, ...]:
+    """What is not known of joints: speeds that no document gives (n,), and jerk without bound."""
+    assumed = tuple(f"J{joint}" for joint in (np.flatnonzero(~speed_known) + 1).tolist())
+    return (*((LeftOut("own_speeds", assumed),) if assumed else ()), *((LeftOut("jerk"),) if not jerk else ()))

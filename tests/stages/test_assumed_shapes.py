@@ -1,0 +1,96 @@
+"""Where no document gives an arm's shapes, what is said of collisions says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from er3a.collision.scene import Plane, Scene
+from er3a.collision.shapes import arm_shapes, shapes_assumed
+from er3a.files.robot_library import load_robot
+from er3a.pipeline.messages.collision import say
+from er3a.pipeline.results import Verdict, read_results
+from er3a.pipeline.stages.collision.compute import compute as collision
+from er3a.pipeline.stages.collision.model import FreeSpace
+from er3a.pipeline.stages.trajectory.model import RESULTS
+from er3a.pipeline.study import load_study
+from er3a.program_check.check_program import CheckOptions, check_program
+from er3a.programs.languages import read_program
+
+HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
+
+
+def documented():
+    """The ER3A-C60 as if a drawing gave its shapes."""
+    robot = load_robot("er3a_c60")
+    source = robot.sources["envelopes"]
+    return robot.replace(sources={**robot.sources, "envelopes": replace(source, grade="official")})
+
+
+def test_shapes_that_a_document_gives_need_no_word():
+    inferred, drawn = load_robot("er3a_c60"), documented()
+    assert arm_shapes(inferred).assumed
+    assert not arm_shapes(drawn).assumed
+    assert shapes_assumed(drawn, 0.02, {"a": 0.001}) is None
+    assert not shapes_assumed(inferred.replace(envelopes=()), 0.02, {}).given
+
+
+@pytest.mark.parametrize(("least", "near"), [(0.0, ("a",)), (0.019, ("a",)), (0.021, ()), (-0.001, ()), (None, ())])
+def test_what_comes_near_to_assumed_shapes_is_a_caution(least, near):
+    shapes = shapes_assumed(load_robot("er3a_c60"), 0.02, {"a": least})
+    assert shapes.near == near
+    verdict = Verdict("pass", FreeSpace(0.5, 10, 5, 5, 0)).resting_on(shapes)
+    assert verdict.status == ("caution" if near else "pass")
+    assert say(verdict.findings[-1]).startswith("No document gives the shapes of the arm's links")
+    assert ("not settled: a." in say(shapes)) == bool(near)
+
+
+def test_nothing_is_called_proven_of_assumed_shapes():
+    for assumed in (True, False):
+        assert ("proven" in say(FreeSpace(0.5, 10, 5, 5, 0, assumed))) == (not assumed)
+
+
+def test_the_stages_say_so(small_results):
+    study = load_study("config/small.yaml")
+    stored = read_results(small_results("trajectory", "er3a_c60", study), RESULTS)
+    shapes = stored.results.summary.verdict.shapes
+    assert (shapes.given, shapes.margin_mm) == (True, 20)
+    paths = stored.results.summary.paths
+    near = [each.name for each in paths if each.expect is None and 0 <= each.clearance.least_mm < 20]
+    assert list(shapes.near) == near
+
+
+def test_a_wider_margin_turns_a_pass_into_a_caution():
+    study = load_study("config/small.yaml")
+    quick = study.collision.model_copy(update={"samples": 1000, "cells_across": 4, "rounds": 0})
+    for margin, status in ((0, "pass"), (1000, "caution")):
+        paths = study.trajectory.model_copy(update={"assumed_margin_mm": margin})
+        wide = study.model_copy(update={"collision": quick, "trajectory": paths})
+        verdict = collision(wide, "er3a_c60").summary.verdict
+        assert verdict.finding.assumed
+        assert verdict.status == status
+
+
+@pytest.mark.parametrize(("nearer", "level"), [(-0.05, "pass"), (-0.01, "caution"), (0.01, "fail")])
+def test_a_motion_that_passes_near_assumed_shapes_is_a_caution(tmp_path, nearer, level):
+    (tmp_path / "a.script").write_text("movej([0.3, -0.3, -0.2, 0.0, -1.2, 0.0])\n")
+    program = read_program(tmp_path / "a.script")
+    robot = load_robot("er3a_c60")
+    free = check_program(program, robot, CheckOptions(start=HOME, scene=Scene("far", (plane(-5.0),))))
+    on_floor = check_program(program, robot, CheckOptions(start=HOME, scene=Scene("floor", (plane(0.2),))))
+    (motion,) = on_floor.motions.values()
+    options = CheckOptions(start=HOME, scene=Scene("floor", (plane(0.2 + motion.clearance + nearer),)))
+    found = check_program(program, robot, options)
+    assert free.level == "pass"
+    assert found.level == level
+    assert found.shapes is not None
+    drawn = check_program(program, documented(), options)
+    assert drawn.level == ("fail" if level == "fail" else "pass")
+    assert drawn.shapes is None
+
+
+def plane(height: float) -> Plane:
+    """A floor."""
+    return Plane("floor", np.array([0.0, 0.0, 1.0]), height)
