@@ -21,6 +21,7 @@ from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.proven import ProofMethod
+from er3a.workspace.single_changes import SingleChange
 from er3a.workspace.surface import Surface
 from er3a.workspace.tool_inverse import MapsMissing
 from er3a.workspace.voids import VoidKind
@@ -58,6 +59,7 @@ class VoidUnexpected:
     y_mm: float
     z_mm: float
     cause: VoidCause
+    single_changes: tuple[SingleChange, ...] = ()
     code: Literal["workspace.void_unexpected"] = "workspace.void_unexpected"
 
 
