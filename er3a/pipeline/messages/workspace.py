@@ -158,12 +158,17 @@ def _(found: VoidUnexpected) -> str:
     return joined([where, _advice(found.cause), _changes(found)], " ")
 
 
+CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
+NAMED_CHANGES = 4
+
+
 def _changes(found: VoidUnexpected) -> str:
     """The single changes of the table that take the void away; empty where none was tried or none does."""
     least = [change for change in found.single_changes if change.left_litres[1] < 0.1 * found.litres]
     if not least:
         return ""
-    named = joined(map(change_text, least), ", ")
+    shown = sorted(least, key=lambda change: CHANGED_FIRST.index(change.entry.rstrip("123456")))
+    named = joined([*map(change_text, shown[:NAMED_CHANGES]), *(["…"] if len(shown) > NAMED_CHANGES else [])], ", ")
     return sentence("void_changes", count=len(least), tried=len(found.single_changes), named=named)
 
 
