@@ -363,7 +363,7 @@ class CellCounts:
 
 @dataclass(frozen=True)
 class VoidSummary:
-    """A void inside the hull; see :class:`er3a.workspace.voids.Void`."""
+    """A void inside the hull; see :class:`er3a.workspace.voids.Void`. ``mesh_m3``: volume within its closed mesh."""
 
     kind: VoidKind
     status: Literal["proven_empty", "undersampled"]
@@ -373,6 +373,7 @@ class VoidSummary:
     cause: VoidCause
     relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
+    mesh_m3: float | None
 
 
 @dataclass(frozen=True)
