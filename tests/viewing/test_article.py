@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.study import load_study
 from tests.conftest import ROOT
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("ignore:Glyph")]  # of a machine without Chinese letters
 STAGES = ("validation", "workspace", "trajectory")
 SMALL = {"round_trips": 200, "reach_starts": 4, "map_cells": 20, "samples": 100_000, "blocks": 4, "cells_across": 16}
 SMALL |= {"cloud_points": 1000, "proof_cells": 2000, "volume_points": 2000, "directions": 40, "rolls": 2}
@@ -34,6 +35,11 @@ def folder(tmp_path_factory) -> Path:
     """The article's study at small budgets, with what its page rests on."""
     place = tmp_path_factory.mktemp("article")
     shutil.copytree(ROOT / "data", place / "data")
+    for name in ("er3a_c60_article", "er3a_c60_article_offset2"):  # the real arm's set takes diagnosis a minute
+        robot = place / f"data/robots/{name}.yaml"
+        text = robot.read_text(encoding="utf-8")
+        assert "references: [er3a_c60_article, er3a_c60]" in text
+        robot.write_text(text.replace("[er3a_c60_article, er3a_c60]", "[er3a_c60_article]"), encoding="utf-8")
     study = yaml.safe_load((ROOT / "config/article.yaml").read_text(encoding="utf-8"))
     for section in study.values():
         if isinstance(section, dict):
@@ -103,8 +109,6 @@ def test_joint_5_near_0_needs_speed_as_one_over_its_sine(numbers):
 
 def test_agreement_follows_the_numbers(numbers):
     assert agreements(numbers)["zero_pose"] == "differs"
-    from dataclasses import replace
-
     assert agreements(replace(numbers, printed=numbers.corrected))["zero_pose"] == "agrees"
     assert agreements(replace(numbers, printed=numbers.corrected))["unreachable"] == "agrees"
 
