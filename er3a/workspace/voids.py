@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -136,32 +137,82 @@ def _wraps(labels: Integers) -> list[tuple[int, int]]:
     return [tuple(pair) for pair in np.unique(pairs, axis=0)[::-1].tolist()]
 
 
+def without_bare_contacts(mask: Flags, wraps: bool) -> Flags:
+    """A set of blocks with more added until no two of it meet along an edge alone, where its surface were no manifold.
+
+    Parameters
+    ----------
+    wraps : whether the last block along the third axis is beside the first
+    """
+    filled = mask.copy()
+    while True:
+        ends = [filled[:, :, -1:], filled, filled[:, :, :1]] if wraps else [filled]
+        around = np.pad(np.concatenate(ends, axis=2), ((1, 1), (1, 1), (0, 0) if wraps else (1, 1)))
+        added = np.zeros_like(around)
+        for first, second in combinations(range(3), 2):
+            near = [_beside(around.shape, first, second, i, j) for i, j in ((0, 0), (1, 1), (1, 0), (0, 1))]
+            one, other, third, fourth = (around[part] for part in near)
+            added[near[2]] |= one & other & ~third & ~fourth
+            added[near[0]] |= third & fourth & ~one & ~other
+        more = added[1:-1, 1:-1, 1:-1]
+        if wraps:
+            more[:, :, -1] |= added[1:-1, 1:-1, 0]
+            more[:, :, 0] |= added[1:-1, 1:-1, -1]
+        if not (more & ~filled).any():
+            return filled
+        filled |= more
+
+
+def _beside(shape: tuple[int, ...], first: int, second: int, i: int, j: int) -> tuple[slice, ...]:
+    """All blocks but the last along two axes, moved by i and j along them."""
+    part = [slice(None)] * 3
+    part[first], part[second] = slice(i, shape[first] - 1 + i), slice(j, shape[second] - 1 + j)
+    return tuple(part)
+
+
 def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
-    """Surface of a set of blocks.
+    """Closed surface of a set of blocks, triangles counter-clockwise as seen from outside.
 
     Returns
     -------
     vertices : (V, 3), m, in the frame about axis 1; triangles : (F, 3)
     """
-    faces = []
+    rings, faces = blocks.bar == 0, []
     for axis in range(3):
         width = [(1, 1) if k == axis else (0, 0) for k in range(3)]
-        padded = np.concatenate([np.take(mask, [-1], axis), mask], axis) if axis == 2 else np.pad(mask, width)
+        wraps = axis == 2 and rings
+        padded = np.concatenate([np.take(mask, [-1], axis), mask], axis) if wraps else np.pad(mask, width)
         step = np.diff(padded.astype(np.int8), axis=axis)
         index = np.argwhere(step != 0)
-        others = [k for k in range(3) if k != axis]
+        others = [(axis + 1) % 3, (axis + 2) % 3]
         corners = np.repeat(index[:, None], 4, axis=1)
         for corner, (i, j) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
             corners[:, corner, others[0]] += i
             corners[:, corner, others[1]] += j
+        leaving = step[tuple(index.T)] < 0  # radius, height and azimuth are a left-handed set
+        corners[leaving] = corners[leaving][:, ::-1]
         faces.append(corners.reshape(-1, 3))
     corners = np.concatenate(faces)
-    corners[:, 2] %= mask.shape[2]
+    if rings:
+        corners[:, 2] %= mask.shape[2]
+        corners[blocks.rho[corners[:, 0]] == 0, 2] = 0  # on the axis all azimuths are one point
     used, number = np.unique(corners, axis=0, return_inverse=True)
     quads = number.reshape(-1, 4)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    rho, z, azimuth = blocks.rho[used[:, 0]], blocks.z[used[:, 1]], blocks.azimuth[used[:, 2]]
-    return in_space(rho, azimuth, z, blocks.bar), triangles
+    triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+    kept, triangles = np.unique(triangles, return_inverse=True)
+    rho, z, azimuth = (edge[used[kept, k]] for k, edge in enumerate((blocks.rho, blocks.z, blocks.azimuth)))
+    return in_space(rho, azimuth, z, blocks.bar), triangles.reshape(-1, 3)
+
+
+def closed_volume(vertices: Reals, triangles: Integers) -> float | None:
+    """Volume (m^3) within a surface by Open3D; None if it is not watertight: an edge without two faces, a face through
+    another one."""
+    geometry, utility = (getattr(load_open3d(), module) for module in ("geometry", "utility"))
+    surface = geometry.TriangleMesh(
+        utility.Vector3dVector(vertices), utility.Vector3iVector(triangles.astype(np.int32))
+    )
+    return float(surface.get_volume()) if surface.is_watertight() else None
 
 
 VoidKind = Literal["enclosed", "open"]
@@ -380,7 +431,8 @@ class Void:
     centroid, extent : (3,), m
     relaxed : what of it is reached with each limit widened; none if only samples tell of it
     holds_shoulder : whether it holds the point of axis 1 at the height of joint 2
-    vertices, triangles : (V, 3), m, and (F, 3), its surface; none if only samples tell of it
+    vertices, triangles : (V, 3), m, and (F, 3), its surface on blocks; none if only samples tell of it
+    mesh_m3 : volume within that surface; None if it is not watertight
     """
 
     kind: VoidKind
@@ -394,6 +446,7 @@ class Void:
     holds_shoulder: bool
     vertices: Reals
     triangles: Integers
+    mesh_m3: float | None = None
 
 
 def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> list[Void]:
@@ -434,6 +487,7 @@ def sampled_only(voids: list[SampledVoid], grid: Grid, shoulder: Reals, proven: 
                 holds_shoulder=bool(np.any(near)),
                 vertices=np.empty((0, 3)),
                 triangles=np.empty((0, 3), np.int64),
+                mesh_m3=None,
             )
         )
     return found
@@ -451,7 +505,9 @@ def _void(
     size, (rho, _, z) = proven.section.size, (float(part[0]) for part in proven.in_section(shoulder[None]))
     near = (cavity.cells[:, [0, 2]] <= [rho + size, z + size]).all(axis=1)
     near &= (cavity.cells[:, [1, 3]] >= [rho - size, z - size]).all(axis=1)
-    vertices, triangles = mesh(*surface)
+    blocks, mask = surface
+    vertices, triangles = mesh(blocks, without_bare_contacts(mask, blocks.bar == 0))
+    vertices = proven.in_base(vertices)
     return Void(
         kind=kind,
         status="proven_empty",
@@ -462,8 +518,9 @@ def _void(
         cause=cause_of(single, unlimited),
         relaxed=(*single, unlimited),
         holds_shoulder=bool(near.any()),
-        vertices=proven.in_base(vertices),
+        vertices=vertices,
         triangles=triangles,
+        mesh_m3=closed_volume(vertices, triangles),
     )
 
 

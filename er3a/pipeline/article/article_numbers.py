@@ -23,10 +23,11 @@ from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectorySummary
 from er3a.pipeline.stages.validation.model import ValidationSummary
-from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceSummary
+from er3a.pipeline.stages.workspace.model import VoidSummary, VoidUnexpected, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
+from er3a.workspace.single_changes import SingleChange
 
 EXAMPLE = np.array([0, np.pi / 4, -np.pi / 6, 0, np.pi / 3, 0])  # section 4.1
 TARGET_MM, TARGET_RPY_DEG = (500.0, 200.0, 700.0), (0.0, 90.0, 0.0)  # section 4.2
@@ -116,6 +117,9 @@ class ArticleNumbers:
     ranked_apart_percent: float
     round_trip_deg: float
     round_trips: int
+    changes_tried: int
+    changes_gone: tuple[SingleChange, ...]
+    changes_meeting: tuple[SingleChange, ...]
 
 
 Agreement = Literal["agrees", "differs", "in_part", "not_examined", "done"]
@@ -153,14 +157,8 @@ def agreements(numbers: ArticleNumbers) -> dict[str, Agreement]:
         "key_poses": agrees(printed.checks_met == printed.checks),
         "boundary": "not_examined",
         "round_trip": agrees(numbers.round_trip_deg < EXACT_DEG),
-        "hole": agrees(not _shrinks(printed, corrected)),
+        "hole": "in_part" if any(each.entry.startswith("offset") for each in numbers.changes_meeting) else "agrees",
     }
-
-
-def _shrinks(printed: TableNumbers, corrected: TableNumbers) -> bool:
-    """Whether the corrected entry takes away most of the printed table's void."""
-    after = corrected.void_litres[1] if corrected.void_litres else 0.0
-    return printed.void_litres is not None and after < 0.5 * printed.void_litres[0]
 
 
 def article_numbers(study: Study, results: Path) -> ArticleNumbers:
@@ -170,6 +168,7 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     robot = study.robot(tables.printed)
     validation: ValidationSummary = _summary(results, tables.printed, "validation")
     trajectory: TrajectorySummary = _summary(results, tables.printed, "trajectory")
+    workspace: WorkspaceSummary = _summary(results, tables.printed, "workspace")
     printed, corrected, real = (_table(study, results, name) for name in tables.names)
     hypothesis = next(found for found in validation.diagnoses if found.reference_set == STATEMENTS).hypotheses[0]
     fault = hypothesis.faults[0]
@@ -185,6 +184,10 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     void = np.array(printed.void_mm if printed.void_mm else (np.nan,) * 3)
     move, line = (_path(trajectory, name) for name in (MOVE, LINE))
     repair = next((tried.motion for tried in line.avoidance if tried.name == line.strategy), None)
+    finding = workspace.verdict.finding
+    changes = finding.single_changes if isinstance(finding, VoidUnexpected) else ()
+    least = 0.1 * printed.void_litres[0] if printed.void_litres else 0.0
+    gone = tuple(change for change in changes if change.left_litres[1] < least)
     rpy = (0.0, 90.0, 0.0), (30.0, 90.0, 30.0)
     same = [transform(np.zeros(3), np.radians(angles)) for angles in rpy]
     rounds = validation.round_trips
@@ -224,6 +227,9 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
         ranked_apart_percent=_ranked_apart_percent(robot, study.seed),
         round_trip_deg=rounds.joint_error_deg,
         round_trips=rounds.poses,
+        changes_tried=len(changes),
+        changes_gone=gone,
+        changes_meeting=tuple(change for change in gone if _meets_zero_pose(_changed(robot, change))),
     )
 
 
@@ -238,9 +244,7 @@ def _table(study: Study, results: Path, name: str) -> TableNumbers:
     trajectory: TrajectorySummary = _summary(results, name, "trajectory")
     claims = next((found.counts.claims for found in validation.sets if found.name == STATEMENTS), None)
     checks = validation.counts.independent
-    shoulder, elbow, wrist = (frames(robot, np.zeros(6))[k, :3, 3] for k in (1, 2, 4))
-    forearm = frames(robot, np.zeros(6))[3, :3, 2]
-    forearm = forearm * (1.0 if forearm @ (wrist - elbow) >= 0 else -1.0)
+    upper_arm_deg, forearm_deg = _zero_pose_deg(robot)
     example = forward(robot, EXAMPLE)
     found = inverse(robot, _target())
     kept = found.q[found.within_limits]
@@ -252,8 +256,8 @@ def _table(study: Study, results: Path, name: str) -> TableNumbers:
         statements_met=claims.passed if claims else None,
         checks=checks.passed + checks.failed,
         checks_met=checks.passed,
-        upper_arm_deg=_from_vertical_deg(elbow - shoulder),
-        forearm_deg=_from_vertical_deg(forearm),
+        upper_arm_deg=upper_arm_deg,
+        forearm_deg=forearm_deg,
         tool_mm=_mm(forward(robot, np.zeros(6))[:3, 3]),
         example_mm=_mm(example[:3, 3]),
         example_rpy_deg=tuple(np.degrees(rpy_of(example)).round(9).tolist()),
@@ -268,6 +272,28 @@ def _table(study: Study, results: Path, name: str) -> TableNumbers:
         line_crossings_s=tuple(each.t_s for each in line.singularities if each.crossing) if line else (),
         line_speed_deg_s=max(line.max_joint_speed_deg_s) if line and line.max_joint_speed_deg_s else None,
     )
+
+
+def _zero_pose_deg(robot: Robot) -> tuple[float, float]:
+    """Angles of upper arm and forearm from the vertical, all joints at 0."""
+    T = frames(robot, np.zeros(6))
+    shoulder, elbow, wrist = (T[k, :3, 3] for k in (1, 2, 4))
+    forearm = T[3, :3, 2] * (1.0 if T[3, :3, 2] @ (wrist - elbow) >= 0 else -1.0)
+    return _from_vertical_deg(elbow - shoulder), _from_vertical_deg(forearm)
+
+
+def _meets_zero_pose(robot: Robot) -> bool:
+    """Whether the upper arm is vertical and the forearm horizontal, as section 2.2 says."""
+    upper_arm, forearm = _zero_pose_deg(robot)
+    return upper_arm < STATED_DEG and abs(forearm - 90) < STATED_DEG
+
+
+def _changed(robot: Robot, change: SingleChange) -> Robot:
+    """The robot with a single entry changed."""
+    column, joint = change.entry[:-1], int(change.entry[-1]) - 1
+    values = np.array(getattr(robot, column))
+    values[joint] = change.tried * {"deg": np.pi / 180, "mm": 1e-3, "": 1.0}[change.unit]
+    return robot.replace(**{column: values})
 
 
 def _litres(void: VoidSummary) -> tuple[float, float]:

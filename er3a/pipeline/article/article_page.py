@@ -20,7 +20,9 @@ from er3a.pipeline.messages import language
 from er3a.pipeline.messages.article import AGREEMENT, ITEMS, SECTIONS, Item
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import event_word
+from er3a.pipeline.messages.workspace import change_text
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, player, player_style
 from er3a.pipeline.results import Provenance, input_records, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES, all_messages
@@ -32,6 +34,7 @@ from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
+from er3a.workspace.single_changes import SingleChange
 
 APART_M = 1.8  # between two arms that stand side by side
 LANGUAGE_NAMES = {"en": "English", "zh": "中文"}
@@ -181,12 +184,18 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
     parts |= {key: number(float(parts[key]), 2) for key in ERRORS}
     for letter, table in (("p", numbers.printed), ("c", numbers.corrected), ("r", numbers.real)):
         parts |= {f"{letter}_{key}": value for key, value in _flat(table).items()}
+    gone, meeting = numbers.changes_gone, numbers.changes_meeting
+    parts |= {"changes_gone": len(gone), "changes_named": _named(gone), "changes_meeting": _named(meeting)}
     parts |= {f"gain_{k}": value for k, value in enumerate(numbers.wrist_gain)}
     parts |= {f"figure_{name}": place for name, place in places.items()}
     for stage in STATUS_OF_STAGES:
         head = _head(study, results, stage)
         parts[f"stage_{stage}"] = tr("This study does not examine it.") if head is None else head.text
     return parts
+
+
+def _named(changes: tuple[SingleChange, ...]) -> str:
+    return joined(map(change_text, changes), ", ") or "–"
 
 
 def _flat(table: TableNumbers) -> dict[str, Any]:

@@ -316,8 +316,8 @@ ITEMS = (
             "{c_void_z:.0f} mm (figure {figure_reach})."
         ),
         N_(
-            "The printed table's void lies above the base, not below it. It comes from the missing offset, and "
-            "the shell is then almost filled."
+            "The printed table's void lies above the base, not below it. With the offset that the article's text "
+            "asks for it is all but gone."
         ),
     ),
     Item(
@@ -432,10 +432,14 @@ ITEMS = (
         N_("A hole in the cloud"),
         N_("A hole in the middle means wrong limits, or a direction turned round, of joints 2 and 3."),
         N_(
-            "The hole is there as printed ({p_void_low:.0f} L). Neither a limit nor a direction is its cause: one"
-            " offset takes it to {c_void_low:.2f} L."
+            "The hole is there as printed ({p_void_low:.0f} L). {changes_gone} of {changes_tried} single changes "
+            "of offsets, directions, lengths and limits would take it away: {changes_named}. Of these the "
+            "article's zero pose is met by: {changes_meeting}."
         ),
-        N_("Offsets belong on the list of causes."),
+        N_(
+            "Offsets belong on the list, and the hole alone does not tell which entry is wrong: a wider limit "
+            "hides the fault as well."
+        ),
     ),
     Item(
         "poor_solver",

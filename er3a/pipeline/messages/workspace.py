@@ -22,6 +22,7 @@ from er3a.workspace.causes import (
     SeveralLimits,
     VoidCause,
 )
+from er3a.workspace.single_changes import SingleChange
 
 FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
@@ -80,6 +81,13 @@ TEXTS = texts(
             "It has this cause: {cause}: check the limits, the zero and the direction of joints 2 and 3."
         ),
         "void_advice#predicate": "It {cause}: check the limits, the zero and the direction of joints 2 and 3.",
+        "void_changes": (
+            "{count} of {tried} single changes of the table leave less than a tenth of it: {named}. References must "
+            "tell which is right."
+        ),
+        "single_change#deg": "{entry} = {tried} deg",
+        "single_change#mm": "{entry} = {tried} mm",
+        "single_change#sign": "{entry} = {tried}",
         "void_only_sampled": "unknown: known from samples only",
         "spherical_wrist": "spherical wrist",
         "general_method": "general method, because {lacks}",
@@ -147,7 +155,27 @@ def _(found: OnSurface) -> str:
 @say.register
 def _(found: VoidUnexpected) -> str:
     where = say_as(found, **_place(found))
-    return joined([where, _advice(found.cause)], " ")
+    return joined([where, _advice(found.cause), _changes(found)], " ")
+
+
+CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
+NAMED_CHANGES = 4
+
+
+def _changes(found: VoidUnexpected) -> str:
+    """The single changes of the table that take the void away; empty where none was tried or none does."""
+    least = [change for change in found.single_changes if change.left_litres[1] < 0.1 * found.litres]
+    if not least:
+        return ""
+    shown = sorted(least, key=lambda change: CHANGED_FIRST.index(change.entry.rstrip("123456")))
+    named = joined([*map(change_text, shown[:NAMED_CHANGES]), *(["…"] if len(shown) > NAMED_CHANGES else [])], ", ")
+    return sentence("void_changes", count=len(least), tried=len(found.single_changes), named=named)
+
+
+def change_text(change: SingleChange) -> str:
+    """An entry and the value that was tried."""
+    variant = change.unit or "sign"
+    return sentence(f"single_change#{variant}", entry=change.entry, tried=as_text(change.tried, "+.6g"))
 
 
 @say.register

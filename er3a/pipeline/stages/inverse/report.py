@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 
+from er3a.geometry.transforms import transform
+from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import ClosedForm, Iteration
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
@@ -27,9 +30,9 @@ from er3a.pipeline.messages.inverse import (
     limits_in_short,
 )
 from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined, listed, say, word
-from er3a.pipeline.results import Stored
+from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.inverse.model import (
     SINGULAR_PARTS,
     InverseResults,
@@ -43,6 +46,7 @@ from er3a.pipeline.stages.inverse.model import (
     VisitOrder,
     shown_targets,
 )
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
@@ -375,6 +379,7 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot, trips, chosen = study.robot(name), summary.round_trips, shown_targets(summary.targets)
     rules = list(dict.fromkeys(results.rankings.rule))
+    correction = _correction(robot, stored)
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
@@ -385,7 +390,7 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         robot_pages=study.pages(name),
         nearest_rule=tr(NEAREST_RULE),
         overview=[_overview_row(target) for target in chosen],
-        sections=[_section(robot, target, results, rules) for target in chosen],
+        sections=[_section(robot, target, results, rules, correction) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
@@ -403,7 +408,46 @@ def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     )
 
 
-def _section(robot: Robot, target: TargetResult, results: InverseResults, rules: list[str]) -> TargetSection:
+@dataclass(frozen=True)
+class Correction:
+    """A single fault that validation's diagnosis names, in words, and the robot without it."""
+
+    fault: str
+    robot: Robot
+
+
+def _correction(robot: Robot, stored: Stored[InverseResults]) -> Correction | None:
+    """What validation's diagnosis says of the table; None if it was not computed, or names no single fault."""
+    folder = stored.folder.parent / "validation" if stored.folder else None
+    if folder is None or not is_computed(folder):
+        return None
+    stage = STAGES["validation"]
+    import_module(stage.messages)
+    for found in getattr(read_stage(folder, stage).results.summary, "diagnoses", ()):
+        if found.corrected and len(faults := found.hypotheses[0].faults) == 1:
+            return Correction(say(faults[0]), robot.replace(**vars(found.corrected)))
+    return None
+
+
+def _after_correction(target: TargetResult, correction: Correction | None) -> list[str]:
+    """What a correction of the table would do for a target none of whose solutions keeps the limits."""
+    if correction is None or not target.solutions or target.within_limits:
+        return []
+    T = transform(np.array(target.xyz_mm) / 1000, np.radians(target.rpy_deg))
+    found = inverse(correction.robot, T)
+    kept, branches = np.unique(found.branch[found.within_limits]), np.unique(found.branch)
+    if not len(kept):
+        return []
+    text = N_(
+        "Validation's diagnosis of the table: {fault}. So corrected, {count} of {total} branches are within the "
+        "limits: check the table before you move or turn the target."
+    )
+    return [tr(text, fault=correction.fault, count=len(kept), total=len(branches))]
+
+
+def _section(
+    robot: Robot, target: TargetResult, results: InverseResults, rules: list[str], correction: Correction | None
+) -> TargetSection:
     rows = results.solutions.take(results.solutions.target == target.name)
     branches = best_of_branches(rows)
     return TargetSection(
@@ -413,7 +457,7 @@ def _section(robot: Robot, target: TargetResult, results: InverseResults, rules:
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
         reason=say(target.reason),
-        advice=listed(target.advice),
+        advice=[*_after_correction(target, correction), *listed(target.advice)],
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if isinstance(target.method, ClosedForm) else say(target.method),
         families=_self_motions(robot, target.families),

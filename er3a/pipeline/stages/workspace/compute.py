@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +52,7 @@ from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import ReachExtremes, Tally, search_reach, section_cells, touched_growth
 from er3a.workspace.proven import Proven, prove_robot
 from er3a.workspace.side_view import border_lines, corner_side, side_views
+from er3a.workspace.single_changes import single_changes
 from er3a.workspace.surface import Surface, surface_of
 from er3a.workspace.voids import (
     UNSEEN_RATIO,
@@ -231,6 +232,9 @@ def _summary(
     surface = surface_of(robot, 2 * settings.proof_cells, study.seed) if lower == 0 else None
     left = 100 * proven.proof.width if proven.arm is None and proven.settles else None
     judged = judge(hull.volume, voids, counts.touched, unseen, proven.settles, left)
+    if isinstance(judged.finding, VoidUnexpected) and proven.arm is not None:
+        tried = single_changes(robot, judged.finding.cause, study.seed)
+        judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
     if surface:
         judged = Verdict("caution", OnSurface(surface))
     guess = proven.estimate

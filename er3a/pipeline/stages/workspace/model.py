@@ -21,6 +21,7 @@ from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.proven import ProofMethod
+from er3a.workspace.single_changes import SingleChange
 from er3a.workspace.surface import Surface
 from er3a.workspace.tool_inverse import MapsMissing
 from er3a.workspace.voids import VoidKind
@@ -58,6 +59,7 @@ class VoidUnexpected:
     y_mm: float
     z_mm: float
     cause: VoidCause
+    single_changes: tuple[SingleChange, ...] = ()
     code: Literal["workspace.void_unexpected"] = "workspace.void_unexpected"
 
 
@@ -361,7 +363,7 @@ class CellCounts:
 
 @dataclass(frozen=True)
 class VoidSummary:
-    """A void inside the hull; see :class:`er3a.workspace.voids.Void`."""
+    """A void inside the hull; see :class:`er3a.workspace.voids.Void`. ``mesh_m3``: volume within its closed mesh."""
 
     kind: VoidKind
     status: Literal["proven_empty", "undersampled"]
@@ -371,6 +373,7 @@ class VoidSummary:
     cause: VoidCause
     relaxed: tuple[Relaxed | Unlimited, ...]
     holds_shoulder: bool
+    mesh_m3: float | None
 
 
 @dataclass(frozen=True)

@@ -178,10 +178,11 @@ def _note(robot: Robot, summary: WorkspaceSummary) -> str:
         "likewise; the best places for the box by number, magenta if proven",
     ]
     if summary.voids:
-        lines += ["", "| void | volume (L) | centre x, y, z (mm) |", "|---|---|---|"]
+        lines += ["", "| void | volume (L) | of its mesh (L) | centre x, y, z (mm) |", "|---|---|---|---|"]
     for number, void in enumerate(summary.voids[:5], start=1):
         centre = ", ".join(fixed(1000 * value, 0) for value in void.centroid_m)
         low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
         status = word("workspace.void_status", VOID_STATUS, void.status)
-        lines.append(f"| {void.kind}_{number}, {status} | {low:.3g} to {high:.3g} | {centre} |")
+        mesh = "not closed" if void.mesh_m3 is None else f"{1000 * void.mesh_m3:.4g}"
+        lines.append(f"| {void.kind}_{number}, {status} | {low:.3g} to {high:.3g} | {mesh} | {centre} |")
     return "\n".join(lines)

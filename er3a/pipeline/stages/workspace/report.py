@@ -58,6 +58,7 @@ def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         turning=turning_figure(robot, results),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
         voids_more=max(0, len(summary.voids) - LISTED),
+        change_rows=_change_rows(summary),
         unexpected=isinstance(summary.verdict.finding, VoidUnexpected),
         wide=100 * summary.proof.width,
         has_drawing=len(results.drawing) > 0,
@@ -129,10 +130,24 @@ def _void_row(row: int, void: VoidSummary) -> list[str]:
         word("workspace.void_kind", VOID_KINDS, void.kind),
         word("workspace.void_status", VOID_STATUS, void.status),
         tr("{low} to {high}", low=number(low, 3), high=number(high, 3)),
+        tr("not closed") if void.mesh_m3 is None else number(1000 * void.mesh_m3, 4),
         ", ".join(fixed(1000 * value, 0) for value in void.centroid_m),
         " × ".join(fixed(1000 * value, 0) for value in void.extent_m),
         say(void.cause),
         tr("yes") if void.holds_shoulder else tr("no"),
+    ]
+
+
+def _change_rows(summary: WorkspaceSummary) -> list[list[str]]:
+    finding = summary.verdict.finding
+    return [
+        [
+            f"{change.entry} ({change.unit})" if change.unit else change.entry,
+            f"{change.given:g}".replace("-", "−"),
+            f"{change.tried:g}".replace("-", "−"),
+            tr("{low} to {high}", low=number(change.left_litres[0], 3), high=number(change.left_litres[1], 3)),
+        ]
+        for change in (finding.single_changes if isinstance(finding, VoidUnexpected) else ())
     ]
 
 

@@ -1,0 +1,70 @@
+"""Surfaces of voids: closed, of the volume that they are of, and without bare contacts; single changes of a table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.files.robot_library import load_robot
+from er3a.workspace.causes import Disappears, Relaxed
+from er3a.workspace.section_arm import TURN
+from er3a.workspace.single_changes import single_changes
+from er3a.workspace.voids import Blocks, closed_volume, mesh, without_bare_contacts
+
+AROUND = 36
+
+
+def blocks(shape: tuple[int, int], bar: float = 0.0) -> Blocks:
+    """Blocks of 10 mm from axis 1 on."""
+    rho, z = (0.01 * np.arange(count + 1) for count in shape)
+    none = np.zeros((*shape, AROUND))
+    return Blocks(rho, z, np.linspace(0, TURN, AROUND + 1), none, none, bar)
+
+
+@pytest.mark.parametrize("inner", [0, 2])
+def test_a_ring_s_mesh_is_closed_and_has_the_volume_of_its_prism(inner):
+    mask = np.zeros((5, 4, AROUND), dtype=bool)
+    mask[inner:4, 1:3] = True
+    vertices, triangles = mesh(blocks((5, 4)), mask)
+    area = AROUND / 2 * np.sin(TURN / AROUND) * (0.04**2 - (0.01 * inner) ** 2)  # of a regular polygon less another
+    assert closed_volume(vertices, triangles) == pytest.approx(0.02 * area, rel=1e-9)
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(0.02 * area, rel=1e-9)  # turned outwards
+
+
+def test_a_sector_s_mesh_and_a_bar_s_are_closed():
+    mask = np.zeros((5, 4, AROUND), dtype=bool)
+    mask[0:3, 1:3, 5:14] = True
+    sector = AROUND / 2 * np.sin(TURN / AROUND) * 0.03**2 * 9 / AROUND
+    assert closed_volume(*mesh(blocks((5, 4)), mask)) == pytest.approx(0.02 * sector, rel=1e-9)
+    assert closed_volume(*mesh(blocks((5, 4), bar=0.36), mask)) == pytest.approx(0.02 * 0.03 * 0.09, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_blocks_at_random_become_closed(seed):
+    drawn = np.random.default_rng(seed).random((6, 5, AROUND)) < 0.15
+    whole = without_bare_contacts(drawn, wraps=True)
+    assert whole[drawn].all()
+    around = np.pad(np.concatenate([whole, whole[:, :, :1]], axis=2), ((1, 1), (1, 1), (0, 0))).astype(int)
+    for first, second in ((0, 1), (0, 2), (1, 2)):
+        square = np.moveaxis(around, (first, second), (0, 1))
+        corners = square[:-1, :-1] + 2 * square[1:, :-1] + 4 * square[:-1, 1:] + 8 * square[1:, 1:]
+        assert not np.isin(corners, (9, 6)).any()
+
+
+def test_a_surface_with_a_hole_has_no_volume():
+    mask = np.zeros((5, 4, AROUND), dtype=bool)
+    mask[1:3, 1:3] = True
+    vertices, triangles = mesh(blocks((5, 4)), mask)
+    assert closed_volume(vertices, triangles[1:]) is None
+
+
+@pytest.mark.long
+def test_single_changes_of_the_article_s_table():
+    upper_2 = Relaxed((2,), (1.0,), "upper", "deg", 155.0, 60.0, 1.0)
+    found = single_changes(load_robot("er3a_c60_article"), Disappears((upper_2,)), 1)
+    left = {(change.entry, change.tried): change.left_litres for change in found}
+    assert left["offset2", -90.0][1] < 1 < 150 < left["offset2", 180.0][0]
+    assert left["upper2", 215.0][1] < 1
+    assert not {entry for entry, _ in left} & {"offset1", "offset4", "offset6"}  # they turn the reach into itself
+    assert [change.left_litres[1] for change in found] == sorted(change.left_litres[1] for change in found)
