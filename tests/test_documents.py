@@ -41,6 +41,7 @@ PLACEHOLDERS = {"NAME", "FILE", "ROBOT", "OLD", "NEW", "..."}
 STANDS_FOR = {
     "export-urdf": {"my_arm": "er3_600"},
     "import-urdf": {},
+    "teach": {"ROBOT": "data/robots/er3_600.yaml", "FILE": "data/robots/er3_600.yaml"},
     "mesh": {},
     "check": {"FILE": "data/paths/er3a_c60.yaml", "文件": "data/paths/er3a_c60.yaml"},
     "check-program": {"FILE": "data/programs/pick_place.src", "R": "er3a_c60"},
