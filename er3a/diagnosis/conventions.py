@@ -1,9 +1,9 @@
 """Whether a table is the arm that references describe, with zeros, directions, base or flange defined otherwise.
 
 Where references state the line of every joint axis, these lines are an arm, and the table is matched with it
-(:mod:`er3a.comparison.mechanism`): geometry first. Only if that agrees are zeros, directions, base and flange taken
-from the match, any number of them at once, and fitted to all references that the arm's shape and place answer. The
-table is the same arm if all of these are met.
+(:mod:`er3a.comparison.mechanism`): geometry first. Zeros, directions, base and flange are taken from the match, any
+number of them at once, and fitted to all references that the arm's shape and place answer. If all of these are met the
+table is the same arm; with up to ``MOST_WRONG`` entries of geometry that are wrong besides, a faulty table of it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.comparison.mechanism import Match, Tolerances, match, mechanism_from_axes, mechanism_of, turn_of, wrapped
-from er3a.diagnosis.faults import BaseElsewhere, Fault, Faults, FlangeElsewhere, ReversedDirection, WrongOffset
+from er3a.diagnosis.faults import (
+    BaseElsewhere,
+    Fault,
+    Faults,
+    FlangeElsewhere,
+    ReversedDirection,
+    WrongAlpha,
+    WrongLength,
+    WrongOffset,
+)
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Reals
@@ -25,7 +34,9 @@ from er3a.references.quantities import MM, ZERO_POSE, AxisAngle, AxisCoordinate,
 from er3a.references.reference import Reference, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
-LEAST_LENGTH, LEAST_ANGLE = 0.5e-3, math.radians(0.1)
+MOST_WRONG = 3
+LEAST_LENGTH, LEAST_ANGLE = 1e-5, math.radians(1e-3)
+LEVER = 0.3  # m, over which an axis' direction says where it is
 SPREAD = 3.0  # times its uncertainty, that what is derived from two lines may be off
 ROUNDS = 8
 STEP = 1e-6
@@ -34,8 +45,8 @@ ROUND_DEG, ROUND_MM = 1e-6, 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Conventions:
-    """A table's geometry is the references'; ``faults`` is what is defined otherwise, and ``corrected`` the table with
-    it as they have it; ``left`` : what stays, in half-widths of the references, at most."""
+    """A table's geometry is the references', but for few entries; ``faults`` is what is wrong or defined otherwise,
+    ``corrected`` the table with it as they have it; ``left`` : what stays at most, in half-widths of the references."""
 
     faults: Faults
     corrected: Robot
@@ -62,8 +73,12 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
     other = mechanism_from_axes(directions, points, T, tolerances.angle)
     own = mechanism_of(robot.without_tool())
     found = match(own, other, tolerances)
-    if found.differences or found.unexplained:
+    if any(each.column not in ("a", "d", "alpha") for each in found.differences):
         return None
+    if found.unexplained or len(found.differences) > MOST_WRONG:
+        return None
+    later = int(robot.convention == "modified")  # rows of a and alpha are those of the joint behind
+    wrong = [(each.column, each.link + later * (each.column != "d")) for each in found.differences]
     expected, uncertainty = expected_of(stated)
     quantities = quantities_of(stated)
 
@@ -72,6 +87,8 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
         return np.asarray(difference / uncertainty)
 
     start = _moved(robot, found)
+    for (column, row), each in zip(wrong, found.differences):
+        start = _with_entry(start, column, row, each.other)
     flips = [[1.0] if sure else [1.0, -1.0] for sure in signed]
     tried = []
     for flip in itertools.product(*flips):
@@ -80,12 +97,15 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
         tried.append((round(float(np.abs(off(arm)).max()), 3), reversed_count, arm))
     least = min(worst for worst, _, _ in tried)
     best = min((each for each in tried if each[0] <= least + 0.5), key=lambda each: each[1])[2]
-    best = _fitted(best, off, meets)
+    best = _fitted(best, wrong, off, meets)
     best = _plain(robot, best, off, meets, tolerances)
     left = float(np.abs(off(best)).max())
     if left > meets:
         return None
-    faults = _differences(robot, best, tolerances)
+    faults = (
+        *(_wrong_entry(robot, best, column, row) for column, row in wrong),
+        *_differences(robot, best, tolerances),
+    )
     return Conventions(faults, best, left) if faults else None
 
 
@@ -107,7 +127,7 @@ def _lines(stated: Sequence[Reference], joints: int) -> tuple[Reals, Reals, list
         return None
     directions = np.array([toward[joint].toward for joint in every], float)
     places = np.array([points[joint] for joint in every], float) / MM
-    return directions, places, [toward[joint].signed for joint in every], Tolerances(length, angle)
+    return directions, places, [toward[joint].signed for joint in every], Tolerances(length + LEVER * angle, angle)
 
 
 def _zero_flange(robot: Robot, stated: Sequence[Reference]) -> tuple[float, float, float]:
@@ -145,23 +165,31 @@ def _with_flange(robot: Robot, stated: Sequence[Reference]) -> Robot:
     return robot.replace(flange=robot.flange @ translation(*shift))
 
 
-def _changed(robot: Robot, x: Reals) -> Robot:
-    """The arm with base (6), flange (3) and inner zeros moved by x, m and rad."""
+def _with_entry(robot: Robot, column: str, row: int, value: float) -> Robot:
+    values = np.array(getattr(robot, column))
+    values[row] = value
+    return robot.replace(**{column: values})
+
+
+def _changed(robot: Robot, wrong: Sequence[tuple[str, int]], x: Reals) -> Robot:
+    """The arm with base (6), flange (3), inner zeros and wrong entries moved by x, m and rad."""
+    for (column, row), amount in zip(wrong, x[len(x) - len(wrong) :]):
+        robot = _with_entry(robot, column, row, getattr(robot, column)[row] + amount)
     base = robot.base @ translation(*x[:3]) @ rot_z(x[3]) @ rot_y(x[4]) @ rot_x(x[5])
     offset = robot.offset.copy()
-    offset[1:-1] += x[9:]
+    offset[1:-1] += x[9 : 9 + len(offset[1:-1])]
     return robot.replace(base=base, flange=robot.flange @ translation(*x[6:9]), offset=offset)
 
 
-def _fitted(robot: Robot, off, meets: float) -> Robot:  # type: ignore[no-untyped-def]
+def _fitted(robot: Robot, wrong, off, meets: float) -> Robot:  # type: ignore[no-untyped-def]
     """Gauss and Newton's steps from an arm that nearly meets the references."""
-    count = 9 + max(robot.joints - 2, 0)
+    count = 9 + max(robot.joints - 2, 0) + len(wrong)
     for _ in range(ROUNDS):
         here = off(robot)
         if np.abs(here).max() < 0.1 * meets:
             break
-        slopes = np.stack([(off(_changed(robot, STEP * row)) - here) / STEP for row in np.eye(count)], axis=1)
-        ahead = _changed(robot, -np.linalg.lstsq(slopes, here, rcond=1e-9)[0])
+        slopes = np.stack([(off(_changed(robot, wrong, STEP * row)) - here) / STEP for row in np.eye(count)], axis=1)
+        ahead = _changed(robot, wrong, -np.linalg.lstsq(slopes, here, rcond=1e-9)[0])
         if np.linalg.norm(off(ahead)) > 0.999 * np.linalg.norm(here):
             break
         robot = ahead
@@ -184,6 +212,13 @@ def _plain(given: Robot, fitted: Robot, off, meets: float, tolerances: Tolerance
     if np.linalg.norm(shift[:3, 3]) < 2 * tolerances.length and turn_of(shift) < 2 * tolerances.angle:
         arm = kept(arm, arm.replace(base=given.base))
     return arm
+
+
+def _wrong_entry(given: Robot, found: Robot, column: str, row: int) -> Fault:
+    own, fits = (float(getattr(each, column)[row]) for each in (given, found))
+    if column == "alpha":
+        return WrongAlpha(row + 1, math.degrees(own), round(math.degrees(fits), 6))
+    return WrongLength(row + 1, "a" if column == "a" else "d", MM * own, round(MM * fits, 4))
 
 
 def _differences(given: Robot, found: Robot, tolerances: Tolerances) -> Faults:

@@ -28,7 +28,7 @@ from er3a.diagnosis.conclusions import (
 from er3a.diagnosis.conventions import Conventions, conventions_of
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, least_greatest, moved
-from er3a.diagnosis.ranking import UNITS, Case, Ranking, case_of, rank_case, usable
+from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
 from er3a.kinematics.table_batch import Tables, frames_of, robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import predict_tables, search
@@ -388,7 +388,7 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
         if first.explains or not (hypotheses and hypotheses[0].explains):
             conclusion = _concluded(first, ())
             if conclusion is not None:
-                return Diagnosis(conclusion, len(stated), tried, ranking, (first, *hypotheses), left)
+                return Diagnosis(conclusion, len(stated), tried, ranking, (first, *hypotheses[: SHOWN - 1]), left)
     conclusion = _conclusion(case, ranking, hypotheses)
     left = ranking.pool.difference[ranking.groups[0][0]] if ranking.groups else None
     return Diagnosis(conclusion, len(stated), tried, ranking, hypotheses, left)
