@@ -121,7 +121,8 @@ def uncompiled(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
     Long tests run them compiled. A chain's readings are tried at two poses only.
     """
-    for module in [module for name, module in sys.modules.items() if name.startswith("er3a.")]:
+    rooms = ("er3a.", "testing.", "tests.")
+    for module in [module for name, module in sys.modules.items() if name.startswith(rooms)]:
         for name, value in list(vars(module).items()):
             if isinstance(value, CPUDispatcher):
                 monkeypatch.setattr(module, name, value.py_func)

@@ -15,7 +15,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.joint_limits import nearest_equivalent, within
-from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, margin, pose_errors
+from testing.arms import DEG, OTHERS_LONG, arms, joints_at_random, joints_within, make_arm, margin, pose_errors
 from testing.singular_poses import CLASSES, branch_of, joints_near, turned
 
 
@@ -50,6 +50,7 @@ def test_random_arms_are_solved(data, robot):
             assert np.nanmin(np.abs(solved.q[n] - q[n]).max(axis=1)) < 1e-8
 
 
+@OTHERS_LONG
 @pytest.mark.parametrize("kind", CLASSES)
 def test_singular_poses_keep_all_their_slots(robot, random, kind):
     q = joints_near(robot, kind, random, 500)

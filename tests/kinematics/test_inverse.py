@@ -114,6 +114,7 @@ def test_arm_with_sideways_offsets_has_eight_solutions(convention, random):
     assert_rows_reproduce(arm, forward(arm, q), solution.q)
 
 
+@OTHERS_LONG
 def test_all_turns_within_the_limits_are_rows(robot, random):
     for q in joints_at_random(robot, random, 200):
         solution = inverse(robot, forward(robot, q))
@@ -190,6 +191,7 @@ def test_turns_lead_back_to_the_half_open_circle(robot, random):
         assert (np.abs(solution.q - TURN * solution.turn) <= np.pi + 1e-12).all()
 
 
+@OTHERS_LONG
 def test_aligned_wrist_keeps_the_reference_for_joint_four(robot, random):
     q = joints_at_random(robot, random, 200)
     q[:, 4] = 0
@@ -214,6 +216,7 @@ def test_wrist_centre_on_the_first_axis_keeps_the_reference_for_joint_one(q_1):
     assert_rows_reproduce(arm, forward(arm, q), solution.q)
 
 
+@OTHERS_LONG
 @pytest.mark.parametrize("bend", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0])
 def test_near_straight_elbow_is_solved_as_exactly(robot, random, bend):
     q = joints_at_random(robot, random, 50)
@@ -226,6 +229,7 @@ def test_near_straight_elbow_is_solved_as_exactly(robot, random, bend):
         assert_rows_reproduce(robot, T, rows)
 
 
+@OTHERS_LONG
 @pytest.mark.parametrize("bend", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
 def test_near_aligned_wrist_is_solved_as_exactly(robot, random, bend):
     """Joints 4 and 6 each lose accuracy as 1 / bend, the others and the pose do not."""

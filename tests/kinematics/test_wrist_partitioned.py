@@ -25,7 +25,7 @@ from er3a.kinematics.wrist_partitioned import (
     wrist_partitioned_arm,
 )
 from er3a.pipeline.messages.kinematics import say
-from testing.arms import DEG, joints_at_random, make_arm, number, placement, pose_errors
+from testing.arms import DEG, OTHERS_LONG, joints_at_random, make_arm, number, placement, pose_errors
 
 SIDEWAYS = {"a": [0, 0.4318, 0.0203, 0, 0, 0], "d": [0.66, 0, 0.15, 0.4318, 0, 0.05]}
 
@@ -229,6 +229,7 @@ def test_branch_labels_are_distinct_and_in_slot_order(robot):
         assert label.split("_")[2] == labels[2 * (slot // 2)].split("_")[2]
 
 
+@OTHERS_LONG
 def test_branch_labels_mean_what_they_say(robot, random):
     """Front and back, up and down, judged on the points of the arm (zero pose facing +x, axis 1 vertical)."""
     checked = {"front": 0, "back": 0, "up": 0, "down": 0}

@@ -20,6 +20,7 @@ from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import nearest_equivalent, within
 from er3a.robots.robot import CombinedLimit
+from testing.arms import OTHERS_LONG
 
 NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 GRID = np.linspace(0, 1, 301)
@@ -204,6 +205,7 @@ def test_branch_is_chosen_for_the_whole_path_not_for_its_first_point():
     assert any(ok and not within(robot, other.q).all() for ok, other in zip(at_start, others))
 
 
+@OTHERS_LONG
 def test_turns_keep_the_limits_of_sums_where_some_turns_do(robot, random):
     """Joints 4 and 6 of five turns each: of all turns, tried by hand, the least time outside a limit of a sum."""
     wide = robot.replace(lower=np.full(6, -5 * np.pi), upper=np.full(6, 5 * np.pi))

@@ -8,10 +8,12 @@ import pytest
 from er3a.kinematics.singularity import determinant_factors
 from er3a.planning.moves import JointMove
 from er3a.planning.singular_events import singular_events
+from testing.arms import OTHERS_LONG
 from testing.exact_paths import REAL, quintic_time, worst_location
 from testing.random_paths import KINDS, NEAR, Found
 
 
+@OTHERS_LONG
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_is_missed_that_a_hundred_times_finer_sampling_finds(robot, random, kind):
     found = Found()
@@ -31,6 +33,7 @@ def test_the_comparison_can_fail(robot, random):
     assert found.missed_crossings > 0
 
 
+@OTHERS_LONG
 def test_passes_of_lines_are_located_to_1e_9_of_the_way(robot, random):
     """Against plane trigonometry in extended precision, without inverse kinematics."""
     found = worst_location(robot, random, 50)

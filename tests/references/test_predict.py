@@ -29,6 +29,7 @@ from er3a.references.reference import Reference, conflicts, expected_of, quantit
 from er3a.references.rows import PositionRow
 from er3a.references.subjects import AxisDirection, JointLimit
 from er3a.robots.robot import Robot
+from testing.arms import OTHERS_LONG
 
 # Joint origins (m, rad) of the URDF in hanliumaozhi/efort_description: xyz, then fixed-axis roll, pitch, yaw.
 URDF = (
@@ -145,6 +146,7 @@ def test_a_batch_of_candidates_is_read_at_once():
         np.testing.assert_array_equal(row, predict(candidate, references))
 
 
+@OTHERS_LONG
 @pytest.mark.parametrize("point", ["wrist_centre", "flange"])
 @pytest.mark.parametrize(
     ("kind", "where"), [(AxisDistance, 1), (AxisDistance, 2), (SectionExtent, "x"), (SectionExtent, "z")]
