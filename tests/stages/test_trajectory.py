@@ -135,7 +135,7 @@ def test_collisions_are_told_with_what_is_met_and_where(results, name):
     met = "wall" if name == "er3a_c60_article" else "post"
     assert met in {pair.solid for pair in meeting.cause.pairs if isinstance(pair, LinkAndSolid)}
     assert meeting.cause.depth_mm == -path.clearance.least_mm
-    assert f"{met} overlap, up to" in path_text(path)
+    assert f"{met} overlap from t = {meeting.t0_s:.4g} s, up to" in path_text(path)
     rows = results[name].clearance.take(results[name].clearance.path == "line_collides")
     assert path.clearance.least_mm == rows.clearance_mm.min() < 0
     assert path.clearance.between.label == rows.between[np.argmin(rows.clearance_mm)]

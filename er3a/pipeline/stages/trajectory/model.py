@@ -162,6 +162,11 @@ class BodiesOverlap:
     code: Literal["bodies_overlap"] = "bodies_overlap"
 
     @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """What overlaps, the first to touch first."""
+        return tuple(each.pair for each in self.touches)
+
+    @property
     def depth_mm(self) -> float:
         """The greatest overlap of all."""
         return max(each.depth_mm for each in self.touches)
