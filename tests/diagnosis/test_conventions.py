@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere
+from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere, entry_of
 from er3a.geometry.transforms import rot_z, translation
 from er3a.references.quantities import MM
 
@@ -42,8 +42,11 @@ def test_another_geometry_is_no_convention(column, rows, amount):
     right = er3a.load_robot("er3_600")
     values = getattr(right, column).copy()
     values[rows] += amount
-    found = er3a.diagnose(other_conventions(right, 0).replace(**{column: values}), "er3_600")
-    assert not any(isinstance(fault, BaseElsewhere) for each in found for fault in each.faults)
+    best = er3a.diagnose(other_conventions(right, 0).replace(**{column: values}), "er3_600")[0]
+    assert best.explains
+    assert {entry_of(fault) for fault in best.faults if not isinstance(fault, CONVENTIONS)} == {
+        f"{column}{row + 1}" for row in rows
+    }
 
 
 def test_an_empty_list_says_what_it_says_nothing_about():
