@@ -49,7 +49,8 @@ def table() -> str:
         "",
         "Taken if both errors at poses left out fall and noise can't have done it; change of the squared error at",
         f"poses left out when the term was tried, and in how many of the {2 * TRIED_PARTS} calibrations above it was",
-        "taken. ",
+        "taken.",
+        "",
         "| arm | term | at random | far away | p | verdict | taken above |",
         "|---|---|---|---|---|---|---|",
     ]

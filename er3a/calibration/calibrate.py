@@ -17,8 +17,8 @@ import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.calibration import outcomes
-from er3a.calibration.fit import SCALE, Fit, Subspace, covariance_by_poses, fit, jacobian, subspace
-from er3a.calibration.left_out import Choice, LeftOut, TriedTerm, can_leave_out, choose_terms, left_out
+from er3a.calibration.fit import NO_EFFECT, SCALE, Fit, Subspace, covariance_by_poses, fit, jacobian, subspace
+from er3a.calibration.left_out import ChosenTerms, LeftOut, TriedTerm, can_leave_out, choose_terms, left_out
 from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
 from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions, PlacementName
 from er3a.calibration.parameters import LEVELS, Parameter, corrected, parameters_of, placements_of
@@ -33,6 +33,8 @@ from er3a.references.reference import ReferenceSet
 from er3a.robots.robot import Robot
 
 SHOWN_POSES = 3
+TURNS_ALL = Parameter("offset", 1)
+"""Turns all points alike, which is nothing to points that are seen against each other alone."""
 INTERVAL_95 = 1.959963984540054
 CLOSE = 0.9
 MOST_SCATTER = 3.0
@@ -54,12 +56,21 @@ class Level:
     name : one of ``LEVELS``
     parameters : its entries, behind those of base and tool; subspace : which of them the observations determine
     more : what a fuller level would take; None if all entries are estimated
+    scale : the length that is taken as it is because nothing else sets the scale; None where coordinates were measured
     """
 
     name: LevelName
     parameters: tuple[Parameter, ...]
     subspace: Subspace
     more: MorePositions | None
+    scale: Parameter | None = None
+
+    @property
+    def held(self) -> tuple[outcomes.Held, ...]:
+        """Why the others keep their values."""
+        if self.scale is None:
+            return self.subspace.held
+        return (*self.subspace.held, outcomes.MovesNothing(TURNS_ALL.name), outcomes.SetsScale(self.scale.name))
 
     @property
     def kept(self) -> list[Parameter]:
@@ -80,16 +91,29 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
         raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
     rich = observations.rich(robot)
     placed = placements_of(observations.free)
+    scale = _scale(robot, observations) if isinstance(observations, PointObservations) else None
     more: list[MorePositions] = []
     for name in LEVELS[::-1]:
         for first in (placed, ()) if placed else ((),):
-            parameters = (*first, *parameters_of(robot, name))
+            without = (scale, TURNS_ALL) if scale else ()
+            parameters = (*first, *(entry for entry in parameters_of(robot, name) if entry not in without))
             here, best = subspace(robot, parameters, observations), subspace(robot, parameters, rich)
-            if len(best.kept) == len(here.kept) and len(observations) > len(here.kept):
-                return Level(name, parameters, here, more[-1] if more else None)
+            spare = len(observations) - len(here.kept) - getattr(observations, "dropped", 0)
+            if len(best.kept) == len(here.kept) and spare > 0:
+                return Level(name, parameters, here, more[-1] if more else None, scale)
             more.append(_what_more(robot, name, parameters, (here, best), observations))
     problem = f"{len(observations)} coordinates determine too little; positions to be added: {more[-1].least} at least"
     raise CalibrationError(more[-1], problem)
+
+
+def _scale(robot: Robot, observations: PointObservations) -> Parameter | None:
+    """The longest length of the table that moves the points; None where coordinates were measured."""
+    if observations.has_scale:
+        return None
+    lengths = parameters_of(robot, "lengths")
+    effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
+    moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
+    return max(moving, key=lambda entry: abs(entry.nominal(robot)), default=None)
 
 
 def _what_more(
@@ -368,7 +392,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
         level=level.name,
         estimates=_estimates(robot, found, error, _quantile(observations, found)),
         correlation=correlation,
-        held=level.subspace.held,
+        held=level.held,
         close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
         singular_values=level.subspace.singular_values,
         coordinates=len(observations),
@@ -390,7 +414,7 @@ def _covariance(observations: Observations, found: Fit) -> Reals:
 def _quantile(observations: Observations, found: Fit) -> float:
     if observations.deviation_known:
         return INTERVAL_95
-    return float(scipy.special.stdtrit(len(found.after) - found.J.shape[1], 0.975))
+    return float(scipy.special.stdtrit(found.freedom, 0.975))
 
 
 def _estimates(robot: Robot, found: Fit, error: Reals, quantile: float) -> tuple[Estimate, ...]:
@@ -414,7 +438,7 @@ class _Model:
     observations: PointObservations
     level: Level
     table: Fit
-    choice: Choice
+    choice: ChosenTerms
     whole: Fit
 
     @property

@@ -30,7 +30,7 @@ NO_EFFECT = 1e-6
 DEPENDENT = 1e-3
 STEPS = 30
 SMALL_STEP = 1e-12  # m and rad
-SMALL_CHANGE = 1e-9  # of the weighted differences, of measured points
+SMALL_CHANGE = 1e-6  # of the weighted differences, of measured points
 HALVINGS = 12
 LEAST_OWN = 1e-9
 
@@ -103,6 +103,7 @@ class Fit:
     amounts : (k,), added to what the robot has, in m and rad; coefficients : (c,), of the terms
     before, after : (n,), differences to the measurements in standard deviations
     J : (n, k + c), weighted derivatives
+    dropped : numbers of places and planes that have dropped out
     """
 
     kept: tuple[Parameter, ...]
@@ -112,6 +113,12 @@ class Fit:
     before: Reals
     after: Reals
     J: Reals
+    dropped: int = 0
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of what remains."""
+        return max(int(len(self.after) - self.J.shape[1] - self.dropped), 1)
 
     @property
     def covariance(self) -> Reals:
@@ -124,7 +131,7 @@ class Fit:
     @property
     def scatter(self) -> float:
         """Root mean square of what remains, in standard deviations, per degree of freedom."""
-        return float(np.sqrt((self.after @ self.after) / max(len(self.after) - self.J.shape[1], 1)))
+        return float(np.sqrt((self.after @ self.after) / self.freedom))
 
 
 def covariance_by_poses(found: Fit, pose_of: Integers) -> Reals:
@@ -193,7 +200,8 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
         unknowns, rest = trial, new
         still = isinstance(observations, PointObservations) and gain < SMALL_CHANGE * np.linalg.norm(rest)
         if still or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
-            return Fit(kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], J[:n])
+            dropped = observations.dropped if isinstance(observations, PointObservations) else 0
+            return Fit(kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], J[:n], dropped)
     rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
     raise CalibrationError(
         NoCorrectionFits(STEPS, rest_mm),

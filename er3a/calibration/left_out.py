@@ -125,7 +125,7 @@ def parts_of(row_values: Reals, seed: int) -> tuple[Integers, Integers]:
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class ChosenTerms:
     """Terms that lower the error at poses left out, all that were tried, and that error without them."""
 
     terms: tuple[JointTerm, ...]
@@ -150,7 +150,7 @@ def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> Left
     return LeftOut(float(near.mean()), float(near.max()), float(far.mean()), float(far.max()))
 
 
-def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observations: PointObservations) -> Choice:
+def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observations: PointObservations) -> ChosenTerms:
     """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it.
 
     Parameters
@@ -160,7 +160,7 @@ def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observati
     every = candidates(robot)
     count, numbers = len(kept), len(kept) + sum(term.count for term in every)
     if not can_leave_out(observations, 0) or len(observations) < LEAST_SPARE * numbers:
-        return Choice((), ())
+        return ChosenTerms((), ())
     weights = observations.deviation_mm[:, None]
     J = np.hstack([jacobian(here, kept, observations), term_jacobian(here, robot, every, observations)]) / weights
     rest = (observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0]) / weights[:, 0]
@@ -179,7 +179,7 @@ def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observati
         taken.append(best)
         tried.append(outcomes[best])
         open_terms.remove(best)
-    return Choice(tuple(taken), (*tried, *outcomes.values()))
+    return ChosenTerms(tuple(taken), (*tried, *outcomes.values()))
 
 
 def _outcome(linear: _Linear, columns: list[int], own: list[int], term: JointTerm) -> TriedTerm:

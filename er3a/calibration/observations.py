@@ -48,6 +48,8 @@ class Measurement:
     point : flange or tool (the origin of the robot's tool frame)
     xyz_mm : base frame; None for coordinates that weren't measured
     deviation_mm : standard deviation of each coordinate; None if it is unknown
+    place, plane : the name of a fixed point (a ball in a socket, a tip) or of a plane that was touched there, of which
+        nobody knows where it is; no coordinate is measured then
     """
 
     row: int
@@ -55,6 +57,8 @@ class Measurement:
     point: Literal["flange", "tool"]
     xyz_mm: tuple[float | None, float | None, float | None]
     deviation_mm: float | None = None
+    place: str | None = None
+    plane: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +123,10 @@ class PointObservations:
     deviation_known : whether the deviations were stated
     lines : (P,), of the file
     free : what is placed by the measurements, too
+    touched : (P,), number of the place or plane that was touched; -1 where coordinates were measured. What is observed
+        of a place's points is their offset from their mean, of a plane's their distance from the plane that fits them
+        best (in the first coordinate): place and plane drop out
+    planes : (P,) bool, where a plane was touched
     """
 
     row_values: Reals
@@ -129,9 +137,41 @@ class PointObservations:
     deviation_known: bool
     lines: Integers
     free: tuple[PlacementName, ...]
+    touched: Integers
+    planes: Flags
 
     def __len__(self) -> int:
         return len(self.values_mm)
+
+    @property
+    def dropped(self) -> int:
+        """How many numbers of places and planes have dropped out, three of each."""
+        return 3 * len(np.unique(self.touched[self.touched >= 0]))
+
+    @property
+    def has_scale(self) -> bool:
+        """Whether coordinates were measured, which set the scale of the arm."""
+        return bool((self.touched < 0).any())
+
+    def relative(self, xyz: Reals, around: Reals) -> Reals:
+        """What is observed of points (P, 3), or of small shifts of points ``around``: see ``touched``."""
+        if not (self.touched >= 0).any():
+            return xyz
+        found = xyz.copy()
+        for number in np.unique(self.touched[self.touched >= 0]):
+            rows = self.touched == number
+            own = xyz[rows] - xyz[rows].mean(axis=0)
+            if not self.planes[rows].any():
+                found[rows] = own
+                continue
+            here = around[rows] - around[rows].mean(axis=0)
+            axes = np.linalg.svd(here, full_matrices=False)[2]
+            normal = axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
+            across = own @ normal
+            inside = here @ axes[:2].T
+            found[rows] = 0.0
+            found[rows, 0] = across - inside @ np.linalg.lstsq(inside, across, rcond=None)[0]
+        return found
 
     @property
     def poses(self) -> int:
@@ -157,7 +197,8 @@ class PointObservations:
                 world = robot.base @ S @ base_inverse
                 points = self.points(robot) + self.on_tool[:, None] * shift
                 xyz = np.einsum("pij,pj->pi", T[k, :, :3, :3], points) + T[k, :, :3, 3]
-                values[start + k] = MM * (xyz @ world[:3, :3].T + world[:3, 3])[self.seen]
+                xyz = xyz @ world[:3, :3].T + world[:3, 3]
+                values[start + k] = MM * self.relative(xyz, xyz)[self.seen]
         return values
 
     def points(self, robot: Robot) -> Reals:
@@ -175,6 +216,8 @@ class PointObservations:
             values_mm=self.values_mm[own],
             deviation_mm=self.deviation_mm[own],
             lines=self.lines[used],
+            touched=self.touched[used],
+            planes=self.planes[used],
         )
 
     def shifted(self, amounts: Reals) -> PointObservations:
@@ -186,7 +229,9 @@ class PointObservations:
         return replace(self, deviation_mm=np.full(len(self), deviation_mm))
 
     def rich(self, robot: Robot) -> PointObservations:
-        """The same points at poses all over the joint range."""
+        """The same points at poses all over the joint range; those that touch something can't be elsewhere."""
+        if (self.touched >= 0).all():
+            return self
         points = np.unique(self.on_tool)
         return self._at(robot, np.repeat(np.array(spread(robot)), len(points), axis=0), np.tile(points, RICH_POSES))
 
@@ -204,6 +249,8 @@ class PointObservations:
             values_mm=np.zeros(3 * count),
             deviation_mm=np.full(3 * count, np.median(self.deviation_mm)),
             lines=np.zeros(count, dtype=np.int64),
+            touched=np.full(count, -1),
+            planes=np.zeros(count, dtype=bool),
         )
 
 
@@ -234,6 +281,12 @@ def observed(
         return QuantityObservations(quantities_of(stated), expected, HALF_WIDTH_TO_DEVIATION * uncertainty)
     check_poses(measurements, robot)
     xyz = np.array([each.xyz_mm for each in measurements], dtype=float).reshape(-1, 3)
+    names = [each.place or each.plane for each in measurements]
+    known_names = {name: k for k, name in enumerate(dict.fromkeys(name for name in names if name))}
+    touched = np.array([known_names[name] if name else -1 for name in names], dtype=np.int64)
+    planes = np.array([each.plane is not None for each in measurements], dtype=bool)
+    xyz[touched >= 0] = 0.0
+    xyz[planes, 1:] = np.nan
     seen = np.isfinite(xyz)
     on_tool = np.array([each.point == "tool" for each in measurements], dtype=bool)
     known = all(each.deviation_mm is not None for each in measurements)
@@ -247,7 +300,11 @@ def observed(
         deviation_mm=np.broadcast_to(deviation[:, None], seen.shape)[seen],
         deviation_known=known,
         lines=np.array([each.row for each in measurements], dtype=np.int64),
-        free=tuple(name for name in PLACEMENTS if name not in fixed and (name == "base" or on_tool.any())),
+        free=tuple(
+            name for name in PLACEMENTS if name not in fixed and (on_tool if name == "tool" else touched < 0).any()
+        ),
+        touched=touched,
+        planes=planes,
     )
 
 

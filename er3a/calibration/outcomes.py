@@ -36,7 +36,15 @@ class NotToldApart:
     code: Literal["not_told_apart"] = "not_told_apart"
 
 
-Held = MovesNothing | NotToldApart
+@dataclass(frozen=True)
+class SetsScale:
+    """No length was measured, so that the longest keeps its value, and all others are told beside it."""
+
+    entry: str
+    code: Literal["sets_scale"] = "sets_scale"
+
+
+Held = MovesNothing | NotToldApart | SetsScale
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,8 @@ def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:
         "point": CsvColumn(str, choices=("flange", "tool")),
         **{f"{c}_mm": CsvColumn(float, optional=True) for c in "xyz"},
         "standard_deviation_mm": CsvColumn(float, always=False),
+        "place": CsvColumn(str, optional=True, always=False),
+        "plane": CsvColumn(str, optional=True, always=False),
     }
 
 
@@ -51,7 +53,8 @@ APART_DEVIATIONS = 8.0
 
 def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Measurement, ...]:
     """Read measured positions: joint values ``q1_deg`` ... (``q3_mm`` of a joint that slides), ``point`` (flange or
-    tool), ``x_mm``, ``y_mm``, ``z_mm``, and, if it is known, ``standard_deviation_mm``.
+    tool), ``x_mm``, ``y_mm``, ``z_mm``, and, if it is known, ``standard_deviation_mm``. In place of coordinates
+    ``place`` or ``plane`` names a fixed point or a plane, of which nobody knows where it is, that was touched there.
 
     Parameters
     ----------
@@ -71,14 +74,19 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
     rows = []
     for fields in table:
         xyz, deviation = tuple(fields[f"{c}_mm"] for c in "xyz"), fields["standard_deviation_mm"]
-        if xyz == (None, None, None):
+        place, plane = fields["place"], fields["plane"]
+        given = [name for name, value in (("place", place), ("plane", plane)) if value]
+        if given and (len(given) > 1 or xyz != (None, None, None)):
+            problem = "a touched place or plane beside another, or beside coordinates"
+            raise InputError(path, f"row {fields['row']}, column {given[-1]}", problem, "Give one of the three")
+        if xyz == (None, None, None) and not given:
             raise InputError(path, f"row {fields['row']}, column x_mm", "no coordinate is given", "Give one at least")
         if deviation is not None and deviation <= 0:
             where, problem = f"row {fields['row']}, column standard_deviation_mm", f"{deviation:g} is not positive"
             remedy = "Write the measuring device's standard deviation, or leave the column out to have it estimated"
             raise InputError(path, where, problem, remedy)
         pose = tuple(fields[f"q{joint}_{unit}"] for joint, unit in enumerate(units, 1))
-        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation))
+        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, place, plane))
     _check_units(path, rows, units)
     _check_contradictions(path, rows)
     return tuple(rows)
@@ -95,7 +103,7 @@ def _units_in(path: Path) -> list[str]:
 
 def _check_units(path: Path, rows: list[Measurement], units: Sequence[str]) -> None:
     for row in rows:
-        span = max(abs(value) for value in row.xyz_mm if value is not None)
+        span = max((abs(value) for value in row.xyz_mm if value is not None), default=0.0)
         if None not in row.xyz_mm and span < LEAST_SPAN_MM:
             problem = f"the point is {span:g} mm from the base's origin at most, which can only be metres"
             raise InputError(path, f"row {row.row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
@@ -111,6 +119,8 @@ def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
     for row in rows:
         if row.deviation_mm is None:
             return
+        if row.place or row.plane:
+            continue
         by_pose.setdefault((row.pose, row.point), []).append(row)
     for same in (rows for rows in by_pose.values() if len(rows) > 1):
         xyz = np.array([row.xyz_mm for row in same], dtype=float)  # None becomes NaN, which is never far from anything

@@ -203,3 +203,64 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert f"held back: 20 positions, {told['held_back']['mean_mm']:.4g} mm off on average" in text
     assert "tried: J3 once a turn" in text
     assert load_robot(tmp_path / "mine.yaml").joints == 7
+
+
+def reached(bench: Bench, target: np.ndarray, normal: np.ndarray | None, count: int) -> np.ndarray:
+    """Joint values (count, 6) at which the real arm touches a point, m, or the plane through it."""
+    found: list[np.ndarray] = []
+    while len(found) < count:
+        q = bench.joints(1)[0]
+        for _ in range(60):
+            off = target - er3a.forward(bench.truth, q)[:3, 3]
+            off = off if normal is None else normal * (off @ normal)
+            if np.linalg.norm(off) < 1e-12:
+                break
+            q = q + np.linalg.pinv(er3a.jacobian(bench.truth, q)[:3]) @ off * min(1.0, 0.1 / np.linalg.norm(off))
+        else:
+            continue
+        if (q > bench.truth.lower).all() and (q < bench.truth.upper).all():
+            found.append(q)
+    return np.array(found)
+
+
+TOUCHED = {
+    "place": [([0.4, 0.1, 0.3], None), ([0.3, -0.25, 0.5], None)],
+    "plane": [([0.4, 0.1, 0.2], [0, 0, 1.0]), ([0.5, 0.1, 0.2], [1.0, 0, 0]), ([0.5, 0.3, 0.2], [0, 1.0, 0])],
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", TOUCHED)
+def test_what_is_touched_at_unknown_places_corrects_a_table(kind, random, tmp_path):
+    bench = Bench("six", random)
+    lines = ["q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,point,x_mm,y_mm,z_mm,place,plane"]
+    for number, (target, normal) in enumerate(TOUCHED[kind]):
+        q = reached(bench, np.array(target), None if normal is None else np.array(normal), 80)
+        q = np.degrees(q + random.normal(0, 2e-5, q.shape))
+        name = f"{kind}{number}," if kind == "place" else f",{kind}{number}"
+        lines += [",".join(map(repr, row)) + f",tool,,,,{name}" for row in q.tolist()]
+    path = tmp_path / "touched.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = er3a.calibrate(bench.robot, path)
+    held = {each.code for each in found.held}
+    assert "sets_scale" in held
+    assert not any(each.name.startswith("base") for each in found.estimates)
+    spread = []
+    for robot in (bench.robot, found.robot):
+        at = er3a.forward(robot, reached(bench, np.array([0.35, 0.2, 0.35]), None, 60))[:, :3, 3] * 1000
+        spread.append(np.linalg.norm(at - at.mean(axis=0), axis=1).mean())
+    assert spread[1] < 0.03 < 0.5 < spread[0]
+    truth = {"a": bench.truth.a, "d": bench.truth.d, "alpha": bench.truth.alpha, "offset": bench.truth.offset}
+    (scale,) = (each.entry for each in found.held if each.code == "sets_scale")
+    ratio = getattr(bench.robot, scale[0])[int(scale[1:]) - 1] / truth[scale[0]][int(scale[1:]) - 1]
+    for each in found.estimates:
+        if each.name in ("a2", "a3"):
+            true = truth["a"][each.parameter.joint - 1] * ratio * 1000
+            assert each.nominal + each.correction == pytest.approx(true, abs=3 * each.half_width)
+
+
+def test_a_touch_beside_coordinates_is_one_clear_error(tmp_path):
+    path = tmp_path / "touched.csv"
+    path.write_text("q1_deg,point,x_mm,y_mm,z_mm,place,plane\n10,tool,1,2,300,ball,\n", encoding="utf-8")
+    with pytest.raises(InputError, match="row 2, column place"):
+        load_measurements(path)

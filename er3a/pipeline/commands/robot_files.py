@@ -29,7 +29,7 @@ from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 
 
-class Placement(StrEnum):
+class FixedPlacement(StrEnum):
     """What a calibration takes from the robot's file."""
 
     BASE = "base"
@@ -135,7 +135,7 @@ def calibrate(
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
     *,
     output: Annotated[Path | None, typer.Option(help="the robot file to write; none by default")] = None,
-    fixed: Annotated[list[Placement] | None, typer.Option(help="what the robot's file places right")] = None,
+    fixed: Annotated[list[FixedPlacement] | None, typer.Option(help="what the robot's file places right")] = None,
     held_back: Annotated[Path | None, typer.Option(help="a CSV of positions that the fit is not to see")] = None,
     as_json: AsJson = False,
 ):

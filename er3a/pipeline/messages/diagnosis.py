@@ -158,6 +158,7 @@ TEXTS = texts(
         "place#joint": "joint {joint}",
         "fault_at": "{place}: {fault}",
         "moves_nothing": "{entry} has no effect on the measured points",
+        "sets_scale": "no length was measured: {entry} keeps its value and sets the scale of all others",
         "no_positions": "there are no positions of single points to calibrate from",
         "no_correction_fits": (
             "no corrections make the table fit: after {steps} steps the positions are still {rest_mm:.3g} mm off. The "
