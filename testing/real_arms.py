@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from er3a import load_measurements, load_robot
 from er3a.calibration.calibrate import Calibration, calibrate, choose_level
+from er3a.calibration.cross_validation import parts_of
 from er3a.calibration.fit import covariance_by_poses, fit
-from er3a.calibration.left_out import parts_of
 from er3a.calibration.observations import Measurement, PointObservations, observed
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot

@@ -3,7 +3,7 @@
 Base and tool are estimated with the table's entries where points were measured, because a tracker's frame is no arm's
 base and a reflector is not where the drawing has it. Only parameters that the measurements can tell apart are
 estimated; the others keep the table's values. Errors of joints that no table holds are estimated beside it where they
-lower the error at poses left out (:mod:`er3a.calibration.left_out`).
+lower the error at poses left out (:mod:`er3a.calibration.cross_validation`).
 """
 
 from __future__ import annotations
@@ -17,8 +17,15 @@ import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.calibration import outcomes
+from er3a.calibration.cross_validation import (
+    ChosenTerms,
+    HeldOutErrors,
+    TriedTerm,
+    can_leave_out,
+    choose_terms,
+    left_out,
+)
 from er3a.calibration.fit import NO_EFFECT, SCALE, Fit, Subspace, covariance_by_poses, fit, jacobian, subspace
-from er3a.calibration.left_out import ChosenTerms, LeftOut, TriedTerm, can_leave_out, choose_terms, left_out
 from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
 from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions, PlacementName
 from er3a.calibration.parameters import LEVELS, Parameter, corrected, parameters_of, placements_of
@@ -237,7 +244,7 @@ class Beyond(ByValue):
     terms: tuple[TermEstimate, ...]
     estimates: tuple[Estimate, ...]
     rms_mm: float
-    left_out: LeftOut | None
+    left_out: HeldOutErrors | None
     residuals: ResidualStructure | None
 
 
@@ -280,7 +287,7 @@ class Calibration(ByValue, Displayed):
     more: outcomes.MorePositions | None
     deviation_mm: float | None = None
     outliers: tuple[Outlier, ...] = ()
-    left_out: LeftOut | None = None
+    left_out: HeldOutErrors | None = None
     residuals: ResidualStructure | None = None
     tried: tuple[TriedTerm, ...] = ()
     beyond: Beyond | None = None
@@ -524,7 +531,7 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model) -> Reals:
     return off
 
 
-def _left_out(observations: PointObservations, found: Fit) -> LeftOut | None:
+def _left_out(observations: PointObservations, found: Fit) -> HeldOutErrors | None:
     return left_out(observations, found) if can_leave_out(observations, found.J.shape[1]) else None
 
 

@@ -25,7 +25,7 @@ from er3a.diagnosis.conclusions import (
     Resolution,
     TooSmallToTell,
 )
-from er3a.diagnosis.conventions import Conventions, conventions_of
+from er3a.diagnosis.defined_otherwise import Conventions, conventions_of
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, least_greatest, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable

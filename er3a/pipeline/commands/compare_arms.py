@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from er3a.errors import Er3aError
+from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Xacro, app, print_json, print_note
+from er3a.robots.robot import Convention
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
@@ -22,11 +24,11 @@ def compare(
     a: Annotated[str, typer.Argument(metavar="A", help=f"the table in question: {_ARM}")],
     b: Annotated[str, typer.Argument(metavar="B", help="what it is compared with: as A, or a folder of such files")],
     *,
-    convention: Annotated[str, typer.Option(help="of D-H tables: standard | modified")] = "standard",
+    convention: Annotated[Convention, typer.Option(help="of D-H tables")] = "standard",
     length_unit: Annotated[
-        str | None, typer.Option(help="of D-H tables: mm | m | in; else mm, unless the lengths can't be")
+        LengthUnit | None, typer.Option(help="of D-H tables; mm unless the lengths can't be")
     ] = None,
-    angle_unit: Annotated[str, typer.Option(help="of D-H tables: deg | rad")] = "deg",
+    angle_unit: Annotated[AngleUnit, typer.Option(help="of D-H tables")] = "deg",
     base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
     xacro: Xacro = None,
@@ -39,17 +41,8 @@ def compare(
     """Is this table that arm? Geometry, zero, directions, base, flange; which entries differ. Exit code 1 if any do."""
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm, read_arms
-    from er3a.pipeline.messages.comparison import headline, layer_rows
     from er3a.robots.conventions import to_modified, to_standard
 
-    known = {
-        "--convention": ("standard", "modified"),
-        "--length-unit": ("mm", "m", "in"),
-        "--angle-unit": ("deg", "rad"),
-    }
-    for (option, choices), given in zip(known.items(), (convention, length_unit, angle_unit)):
-        if given is not None and given not in choices:
-            raise Er3aError(f"{option} is '{given}'; known: {', '.join(choices)}")
     for option, value in (("--tolerance-mm", tolerance_mm), ("--tolerance-deg", tolerance_deg)):
         if not 0 < value < 1000:
             raise Er3aError(f"{option} is {value:g}; give a number above 0")
@@ -90,19 +83,25 @@ def compare(
     if as_json:
         print_json(_record(ranked, folder.is_dir()))
     else:
-        if folder.is_dir():
-            for other, each in ranked[:5]:
-                print(f"{other}: {headline(each)}")
-            print()
-        print(headline(found))
-        for layer, state, detail in layer_rows(found):
-            print(f"  {layer:<11} {state:<8} {detail}".rstrip())
-        if output is not None and found.corrected is not None:
-            print(f"{output}: written")
-        if html is not None:
-            print(f"{html}: written")
+        _print(ranked, folder.is_dir())
+        for written in (output if found.corrected is not None else None, html):
+            if written is not None:
+                print(f"{written}: written")
     if found.verdict != "equal":
         raise typer.Exit(1)
+
+
+def _print(ranked: list[tuple[str, Comparison]], folder: bool) -> None:
+    """The best comparison layer by layer; of a folder the best five before it."""
+    from er3a.pipeline.messages.comparison import headline, layer_rows
+
+    if folder:
+        for other, each in ranked[:5]:
+            print(f"{other}: {headline(each)}")
+        print()
+    print(headline(ranked[0][1]))
+    for layer, state, detail in layer_rows(ranked[0][1]):
+        print(f"  {layer:<11} {state:<8} {detail}".rstrip())
 
 
 def _record(ranked: list[tuple[str, Comparison]], folder: bool) -> dict[str, Any]:

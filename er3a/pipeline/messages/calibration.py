@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
-from er3a.calibration.left_out import LeftOut, TriedTerm
+from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.residuals import ResidualStructure
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.diagnosis import level
@@ -72,7 +72,7 @@ def _entry_lines(estimates: Sequence[Estimate]) -> list[str]:
     return lines
 
 
-def _left_out_line(found: LeftOut) -> str:
+def _left_out_line(found: HeldOutErrors) -> str:
     return (
         f"at poses left out: {found.mean_mm:.4g} mm on average, {found.worst_mm:.4g} mm at worst; far from all others "
         f"{found.far_mean_mm:.4g} mm, {found.far_worst_mm:.4g} mm"

@@ -38,7 +38,7 @@ RIDGE = 1e-12
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class HeldOutErrors:
     """Distances between model and measurement at poses that were left out, mm.
 
     Attributes
@@ -137,7 +137,7 @@ def can_leave_out(observations: PointObservations, numbers: int) -> bool:
     return len(observations.row_values) >= LEAST_POSES and len(observations) >= 2 * numbers
 
 
-def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> LeftOut:
+def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
     """What the model of a fit errs by at poses left out; other parts than those that terms are chosen by."""
     parts = parts_of(observations.row_values, seed)
     prior = np.r_[np.zeros(len(found.amounts)), np.full(len(found.coefficients), 1 / TYPICAL)]
@@ -147,7 +147,7 @@ def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> Left
         np.sqrt(np.bincount(observations.pose_of, weights=(errors * observations.deviation_mm) ** 2))
         for errors in linear.errors(list(range(len(unknowns))))
     )
-    return LeftOut(float(near.mean()), float(near.max()), float(far.mean()), float(far.max()))
+    return HeldOutErrors(float(near.mean()), float(near.max()), float(far.mean()), float(far.max()))
 
 
 def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observations: PointObservations) -> ChosenTerms:
