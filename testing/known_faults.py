@@ -20,7 +20,7 @@ from er3a.diagnosis.faults import (
     entry_of,
     repairs_of,
 )
-from er3a.diagnosis.fitting import MEETS, FreeNumber, least_greatest, moved
+from er3a.diagnosis.fitting import MEETS, FreeNumber, minimise_max, moved
 from er3a.diagnosis.ranking import Case, Ranking, rank, usable
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
 from er3a.numerics.arrays import Reals
@@ -287,7 +287,7 @@ def is_identifiable(robot: Robot, pair: Pair, case: Case) -> bool:
     ]
     column = np.array(slopes)[:, :, None]
     left = np.tile(moved_by_both, (len(slopes), 1))
-    taken_up = np.einsum("bnk,bk->bn", column, least_greatest(column, left, enough=0.0))
+    taken_up = np.einsum("bnk,bk->bn", column, minimise_max(column, left, enough=0.0))
     return bool((np.abs(left + taken_up).max(axis=1) > 1).all())
 
 

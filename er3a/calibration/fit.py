@@ -76,12 +76,12 @@ def subspace(robot: Robot, parameters: Sequence[Parameter], observations: Observ
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
         still = norm <= NO_EFFECT * norms.max()
-        held.append(MovesNothing(parameters[k].name) if still else _told_apart_from(robot, parameters, k, kept, J))
+        held.append(MovesNothing(parameters[k].name) if still else _confounded_with(robot, parameters, k, kept, J))
     singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
     return Subspace(tuple(kept), tuple(held), singular_values)
 
 
-def _told_apart_from(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: Reals) -> NotToldApart:
+def _confounded_with(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: Reals) -> NotToldApart:
     """Which entries act on the measured points as entry ``k`` does."""
     share = np.linalg.lstsq(J[:, kept], J[:, k], rcond=None)[0] * np.linalg.norm(J[:, kept], axis=0)
     partners = [parameters[i] for i, part in zip(kept, share) if abs(part) > DEPENDENT * np.linalg.norm(J[:, k])]

@@ -333,7 +333,7 @@ def _known(robot: Robot, group: str) -> bool:
 def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, tolerances: Tolerances) -> RangeLayer:
     if not (_known(robot_a, "limits") and _known(robot_b, "limits")):
         return RangeLayer(None)
-    lower, upper = _limits_there(robot_b, signs, zeros)
+    lower, upper = _limits_of_b(robot_b, signs, zeros)
     found = []
     for j in range(robot_a.joints):
         slides = bool(robot_a.slides[j])
@@ -347,7 +347,7 @@ def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, toleranc
     return RangeLayer(not found, tuple(found))
 
 
-def _limits_there(robot: Robot, signs: Reals, zeros: Reals) -> tuple[Reals, Reals]:
+def _limits_of_b(robot: Robot, signs: Reals, zeros: Reals) -> tuple[Reals, Reals]:
     """B's limits as A's joints show them."""
     ends = np.sort(np.stack([signs * robot.lower + zeros, signs * robot.upper + zeros]), axis=0)
     return ends[0], ends[1]

@@ -27,7 +27,7 @@ from er3a.diagnosis.conclusions import (
 )
 from er3a.diagnosis.defined_otherwise import Conventions, conventions_of
 from er3a.diagnosis.faults import Faults, entry_of
-from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, least_greatest, moved
+from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, minimise_max, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
 from er3a.kinematics.table_batch import Tables, frames_of, robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
@@ -54,7 +54,7 @@ TRIED_RAD = tuple(np.radians([1.0, 10.0, 37.0, 90.0, 150.0, 180.0]).tolist())
 TRIED_M = 0.001, 0.01, 0.1, 0.5
 
 
-def what_decides(tables: Tables, robot: Robot) -> NextMeasurement | None:
+def deciding_measurement(tables: Tables, robot: Robot) -> NextMeasurement | None:
     """The pose, out of single joints turned and all turned together, at which the flange positions that the tables
     predict are farthest apart; else the limits in which they differ.
 
@@ -189,7 +189,7 @@ def told_from(case: Case, ranking: Ranking) -> float | None:
         apart = difference[row] - difference[group[0]]
         slopes = _slopes(case, ranking, row)
         if slopes.shape[1]:
-            apart = apart + slopes @ least_greatest(slopes[None], apart[None], enough=0.0)[0]
+            apart = apart + slopes @ minimise_max(slopes[None], apart[None], enough=0.0)[0]
         stays = float(np.abs(apart).max())
         if stays > ALIKE:
             factors.append(max(1 / stays, 1.0))
@@ -489,7 +489,7 @@ def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypoth
         explains=bool(ranking.explains[best]),
         half_widths=float(np.abs(after / uncertainty).max()),
         indistinguishable_from=tuple(pool.faults[i] for i in group[1:]),
-        to_decide=what_decides(pool.tables[np.array(group)], robot),
+        to_decide=deciding_measurement(pool.tables[np.array(group)], robot),
         score=float(ranking.score[best]),
         corrected=robot_of(pool.tables, best, robot),
     )

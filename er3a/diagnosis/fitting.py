@@ -209,7 +209,7 @@ def meet(search: Search, fits: Fits) -> Fits:
         if not len(open_rows):
             break
         part = fits[open_rows]
-        step = least_greatest(search.slopes(part), part.left)
+        step = minimise_max(search.slopes(part), part.left)
         trial = search.at(part.start, part.which, part.amounts + step)
         better = trial.greatest < part.greatest
         if not better.any():
@@ -218,7 +218,7 @@ def meet(search: Search, fits: Fits) -> Fits:
     return fits
 
 
-def least_greatest(slopes: Reals, left: Reals, enough: float = 1.0) -> Reals:
+def minimise_max(slopes: Reals, left: Reals, enough: float = 1.0) -> Reals:
     """Steps (B, k) that make the greatest of ``|left + slopes @ step|`` least, or at most ``enough``.
 
     Parameters

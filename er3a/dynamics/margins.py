@@ -61,7 +61,7 @@ class Margin:
     sample: int | None = None
 
 
-def greatest_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimits) -> Margin | None:
+def max_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimits) -> Margin | None:
     """The greatest payload in kg that keeps peak and effective torques within limits; None where no limit is known.
 
     Parameters
@@ -80,9 +80,7 @@ def greatest_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimit
     return _least({"peak": by_peak, "rms": _by_rms(squares, limits.rated)[None]})
 
 
-def greatest_speed_scale(
-    t: Reals, parts: tuple[Reals, Reals, Reals], velocity: Reals, limits: DriveLimits
-) -> Margin | None:
+def max_speed_scale(t: Reals, parts: tuple[Reals, Reals, Reals], velocity: Reals, limits: DriveLimits) -> Margin | None:
     """The greatest s such that the motion run s times as fast, and any slower, keeps torques and speeds within limits.
 
     Parameters

@@ -381,7 +381,7 @@ class Greatest:
     q: Reals
 
 
-def greatest_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Greatest:
+def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Greatest:
     """The greatest of each objective.
 
     Parameters

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
-from er3a.dynamics.pose_bound import Bounded, Size, bounded_torque, greatest_over_poses
+from er3a.dynamics.pose_bound import Bounded, Size, bounded_torque, max_over_poses
 from er3a.errors import RobotError, ShapeError
 from er3a.kinematics.forward import checked_joints
 from er3a.numerics.arrays import Reals
@@ -265,7 +265,7 @@ def worst_holding(model: ArmModel) -> WorstHolding:
 
         return bounded_torque(model, joint, own, _polished(model.robot, own, climbed.q[joint]))
 
-    climbed = greatest_over_poses(model.robot, size)
+    climbed = max_over_poses(model.robot, size)
     found = [bounded(joint) for joint in range(model.robot.joints)]
     q = np.array([each.q for each in found])
     return WorstHolding(np.diagonal(holding_torques(model, q)).copy(), q, np.array([each.bound for each in found]))

@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.dynamics.pose_bound import bounded_lever, greatest_over_poses
+from er3a.dynamics.pose_bound import bounded_lever, max_over_poses
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
@@ -58,7 +58,7 @@ def levers(robot: Robot, q: Reals, point: Reals) -> Reals:
 
 def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals, Reals]:
     """Greatest distances (r,) in m of a point (3,) of the flange from some rows' axes (from 0): found, and bounds."""
-    climbed = greatest_over_poses(robot, lambda q: levers(robot, q, point)[:, list(rows)])
+    climbed = max_over_poses(robot, lambda q: levers(robot, q, point)[:, list(rows)])
     found = [bounded_lever(robot, point, row, q) for row, q in zip(rows, climbed.q)]
     return np.array([each.found for each in found]), np.array([each.bound for each in found])
 

@@ -394,7 +394,7 @@ class RobotFile(StrictModel):
         return found
 
     @model_validator(mode="after")
-    def _links_there_are(self):
+    def _check_links(self):
         count = len(self.dh.rows)
         for key in ("capsules", "meshes", "hulls"):
             for i, shape in enumerate(getattr(self.envelopes, key) if self.envelopes else []):

@@ -91,7 +91,7 @@ def bases_of(robot: Robot, references: Sequence[Reference], documents: Documents
     return found
 
 
-def bases_untold(references: Sequence[Reference]) -> list[CheckBasis]:
+def undeclared_bases(references: Sequence[Reference]) -> list[CheckBasis]:
     """Likewise for arms whose entries are not varied: nothing is called independent."""
     return [CheckBasis("consistency" if each.authoritative else "claim", (), (), ()) for each in references]
 

@@ -14,7 +14,7 @@ from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import REACHED, SLOTS
 from er3a.kinematics.configuration import slot_labels
 from er3a.kinematics.forward import checked_joints, forward
-from er3a.kinematics.inverse import SAME_MEMBER, SOLVES, all_told, lacking_class, missed_row, starts_of
+from er3a.kinematics.inverse import SAME_MEMBER, SOLVES, is_complete, missed_row, missing_class, starts_of
 from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions
@@ -121,7 +121,7 @@ def _by_class(
         own = np.broadcast_to(reference, (count, robot.joints))
         q = _found_by_starts(robot, T, own)
         inside = within(robot, q)
-        method = Iteration(starts_of(robot), lacking_class(robot))
+        method = Iteration(starts_of(robot), missing_class(robot))
     else:
         values = checked_parameters(robot, redundancy, reference, count)
         found = slots_of_class(robot, T, reference, values, threads)
@@ -131,7 +131,7 @@ def _by_class(
             near = missed_row(robot, T[n], reference[0 if len(reference) == 1 else n])
             if near.solved:
                 q[n, 0], inside[n, 0] = near.q, within(robot, near.q)
-        certain = all_told(robot, found.certainty)
+        certain = is_complete(robot, found.certainty)
         method = ByClass(solver.code, bool(certain.all()), bool(slot_labels(robot)))
     valid = np.isfinite(q[..., 0])
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)

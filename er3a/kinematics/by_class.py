@@ -183,7 +183,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     curves: list[TracedCurve] = []
     alone: list[Reals] = []
     for x in candidates:
-        if any(chain.holds(curve, x) for curve in curves) or _stands(robot, x, alone, chain):
+        if any(chain.holds(curve, x) for curve in curves) or _is_same_root(robot, x, alone, chain):
             continue
         surface = sum(curve.dimension > 1 for curve in curves)
         if len(curves) >= MOST_CURVES or surface >= MOST_ON_SURFACE:
@@ -264,7 +264,7 @@ def _apart(robot: Robot, rows: Reals) -> Reals:
     return np.array(kept).reshape(-1, robot.joints)
 
 
-def _stands(robot: Robot, x: Reals, others: list[Reals], chain: PoseChain) -> bool:
+def _is_same_root(robot: Robot, x: Reals, others: list[Reals], chain: PoseChain) -> bool:
     """Whether row values (n,) are the same root as some others.
 
     Newton's method leaves a root of higher order spread: those that are nearer than what an error of ``SPREAD`` makes

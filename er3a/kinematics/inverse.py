@@ -161,7 +161,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
             if motion.within_limits and greatest_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
                 branches.append(slot_of(robot, T, member))
                 rows.append(member[None])
-    certain = bool(all_told(robot, found.certainty)[0])
+    certain = bool(is_complete(robot, found.certainty)[0])
     if not certain and isinstance(solver, LinkedRows):  # the rows found may be members that the linkage can't make
         for row in all_found(robot, T, STARTS):
             if greatest_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
@@ -192,7 +192,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
     return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, traced)
 
 
-def all_told(robot: Robot, certainty: Integers) -> Flags:
+def is_complete(robot: Robot, certainty: Integers) -> Flags:
     """Whether the class has told all solutions of poses (N,) in so far as it is certain of them (N,)."""
     solver = arm_solver(robot).chain
     closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
@@ -227,7 +227,7 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
     q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     inside = within(robot, q)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
-    method = Iteration(starts_of(robot), lacking_class(robot))
+    method = Iteration(starts_of(robot), missing_class(robot))
     return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
 
 
@@ -236,7 +236,7 @@ def starts_of(robot: Robot) -> int:
     return STARTS_OF_DEPENDENT if arm_solver(robot).chain.code == "dependent" else STARTS
 
 
-def lacking_class(robot: Robot) -> ClosedFormMissing | DependentJoints | None:
+def missing_class(robot: Robot) -> ClosedFormMissing | DependentJoints | None:
     """Why the arm is solved by iteration."""
     return DependentJoints() if arm_solver(robot).chain.code == "dependent" else closed_form_missing(robot)
 

@@ -33,7 +33,7 @@ import numpy as np
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.geometry.transforms import as_floats, check_poses
 from er3a.kinematics.chain import arm_length, constant_links, joint_starts
-from er3a.kinematics.classes.links import multiply_rigid, turn_behind
+from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.solutions import (
     BadGuess,
@@ -458,7 +458,7 @@ def _evaluate_any(
             for i in range(3):
                 frame[i, 3] += frame[i, 2] * along
         else:
-            turn_behind(frame, np.cos(along), np.sin(along))
+            post_rotate_z(frame, np.cos(along), np.sin(along))
         multiply_rigid(frame, links[k + 1], other)
         frame, other = other, frame
     for k in range(m):

@@ -51,7 +51,7 @@ class RobotEntry(StrictModel):
     stages: list[Text] | None = None
 
     @model_validator(mode="after")
-    def _goes_through_stages_that_there_are(self):
+    def _check_stage_names(self):
         if self.stages is not None:
             for place, stage in enumerate(self.stages):
                 if stage not in REGISTRY:
@@ -61,7 +61,7 @@ class RobotEntry(StrictModel):
         return self
 
     @model_validator(mode="after")
-    def _expects_of_stages_that_there_are(self):
+    def _check_expected_stages(self):
         for stage in self.expect:
             if stage not in REGISTRY:
                 raise ValueError(f"expect.{stage}: there is no such stage | Known: {', '.join(REGISTRY)}")
@@ -114,7 +114,7 @@ class StudyBase(StrictModel):
         return self._file
 
     @model_validator(mode="after")
-    def _variants_have_names_of_their_own(self):
+    def _check_variant_names(self):
         taken = set(self.robots)
         for name, sweep in self.sweeps.items():
             if sweep.robot not in self.robots:
@@ -140,7 +140,7 @@ class StudyBase(StrictModel):
         return self
 
     @model_validator(mode="after")
-    def _sweeps_go_through_stages_that_there_are(self):
+    def _check_swept_stages(self):
         for name, sweep in self.sweeps.items():
             for place, stage in enumerate(sweep.stages):
                 if stage not in REGISTRY:

@@ -75,7 +75,7 @@ class ArmAngleLaw:
         return _quadratic(self.values, share)[:, None]
 
 
-def roomiest_laws(
+def laws_with_most_margin(
     robot: Robot, T: Reals, share: Reals, start: tuple[float, Reals] | None, slots: Integers
 ) -> list[ArmAngleLaw]:
     """The best law of each slot, most margin first; slots that don't reach all poses are left out.
@@ -104,7 +104,8 @@ def roomiest_laws(
 def bent_laws(
     robot: Robot, T: Reals, share: Reals, start: tuple[float, Reals] | None, slots: Integers
 ) -> list[ArmAngleLaw]:
-    """Laws of higher degree that keep the limits at the poses, most margin first; the rest as :func:`roomiest_laws`."""
+    """Laws of higher degree that keep the limits at the poses, most margin first; the rest as
+    :func:`laws_with_most_margin`."""
     search = _LawSearch(robot, T, share, slots, None if start is None else start[1])
     first = -np.pi if start is None else start[0]
     q = search.rows(first + TURN * np.arange(ANGLES) / ANGLES)
@@ -339,7 +340,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
         slots = np.flatnonzero((np.abs(_turned_to(robot, own, q_start) - q_start) <= ON_PATH).all(axis=1))
     if not slots.size:
         raise PathEndsError(robot.name, "out_of_reach", 0.0)
-    laws = roomiest_laws(robot, poses, share, begin, slots) or bent_laws(robot, poses, share, begin, slots)
+    laws = laws_with_most_margin(robot, poses, share, begin, slots) or bent_laws(robot, poses, share, begin, slots)
     if not laws:
         raise PathEndsError(robot.name, "out_of_reach", _first_unreached(robot, path, times))
     near = np.zeros(robot.joints) if q_start is None else q_start

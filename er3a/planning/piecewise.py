@@ -316,7 +316,7 @@ def turning_points(series: Reals) -> Reals:
     return real[(real > -1) & (real < 1)]
 
 
-def greatest_between(values: Reals, first: Integers, last: Integers) -> Reals:
+def max_between(values: Reals, first: Integers, last: Integers) -> Reals:
     """Greatest of rows first..last (both included) of values (m, n), for ranges (k,); (k, n)."""
     found = np.maximum(values[first], values[last])
     for k in np.flatnonzero(last > first + 1):
@@ -327,7 +327,7 @@ def greatest_between(values: Reals, first: Integers, last: Integers) -> Reals:
 def _bounds_between(times: Reals, bounds: tuple[Reals, Reals], start: Reals, end: Reals) -> tuple[Reals, Reals]:
     first = np.clip(np.searchsorted(times, start, side="right") - 1, 0, len(times) - 2)
     last = np.clip(np.searchsorted(times, end, side="left") - 1, first, len(times) - 2)
-    velocity, acceleration = (greatest_between(most, first, last) for most in bounds)
+    velocity, acceleration = (max_between(most, first, last) for most in bounds)
     return velocity, acceleration
 
 

@@ -38,7 +38,7 @@ from er3a.numerics.runs import runs
 from er3a.planning.follow import Followed, follow
 from er3a.planning.intervals import Interval, RateCause, RateLimit, rate_interval
 from er3a.planning.moves import ToolPath
-from er3a.planning.piecewise import PiecewiseMotion, greatest_between, polynomial_motion
+from er3a.planning.piecewise import PiecewiseMotion, max_between, polynomial_motion
 from er3a.planning.polynomial_checks import ELBOW_JOINT, WRIST_JOINT, factor_forms
 from er3a.planning.profiles import TimeLaw, times_at
 from er3a.planning.singular_events import singular_events
@@ -107,7 +107,7 @@ class ToolProof(ByValue):
         last = len(self.proven) - 1
         first = np.clip(np.searchsorted(self.times, start, side="right") - 1, 0, last)
         behind = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, last)
-        return greatest_between(self.velocity, first, behind), greatest_between(self.acceleration, first, behind)
+        return max_between(self.velocity, first, behind), max_between(self.acceleration, first, behind)
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,9 +34,9 @@ from er3a.program_check.program_check_findings import (
     CheckFinding,
     Level,
     MayMove,
+    MotionNotReached,
     MovesBesideProgram,
     NeverReached,
-    NotComeTo,
     NotFollowedToEnd,
     RestNotChecked,
     WayNotKnown,
@@ -244,7 +244,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     """``end``: number of the first step that was not checked."""
     moves = (step.place for step in execution.steps[end:] if isinstance(step.instruction, ArmMotion))
     found = [NotExamined(place, "motion") for place in moves]
-    missed = (NotComeTo, NeverReached)
+    missed = (MotionNotReached, NeverReached)
     found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
     found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, WayNotKnown)]
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, NotFollowedToEnd)]
@@ -295,7 +295,7 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
             stopped = NotFollowedToEnd(ending.kind, ending.limit)
             found.append(LocatedFinding(level_of(stopped), stopped, ending.place))
     for place in _unreached(execution):
-        missed = NeverReached() if execution.complete else NotComeTo()
+        missed = NeverReached() if execution.complete else MotionNotReached()
         found.append(LocatedFinding(level_of(missed), missed, place))
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:

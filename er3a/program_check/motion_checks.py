@@ -180,9 +180,9 @@ def limit_moment(law: MotionLaw, side: LimitSide, start: Reals, end: Reals) -> f
     return 0.0 if before >= bound else time_of_share(law, (bound - before) / (behind - before))
 
 
-def speed_moment(law: MotionLaw, share_of_greatest: float) -> float:
+def speed_moment(law: MotionLaw, share_of_max: float) -> float:
     """When (s) the speed comes to a share (0 to 1) of its greatest, on the ramp up."""
-    return law.ramp * law.duration * share_of_greatest
+    return law.ramp * law.duration * share_of_max
 
 
 def change_moment(law: MotionLaw, kind: Callable[[float], int | None]) -> float:

@@ -351,7 +351,7 @@ class NeverReached:
 
 
 @dataclass(frozen=True)
-class NotComeTo:
+class MotionNotReached:
     """A motion that the program had not come to when it was followed no further."""
 
     code: Literal["not_come_to"] = "not_come_to"
@@ -437,7 +437,7 @@ CheckFinding = (
     | MayMove
     | MovesBesideProgram
     | NeverReached
-    | NotComeTo
+    | MotionNotReached
     | RestNotChecked
     | BothSidesChecked
     | NotFollowedToEnd

@@ -29,7 +29,7 @@ from er3a.programs.writing import (
     Writer,
     ascii_text,
     fixed,
-    share_of_greatest,
+    share_of_max,
     short,
     tool_speed,
 )
@@ -150,7 +150,7 @@ class KrlWriter(Writer):
 
     def _joint_speed(self, ready: ReadyMotion) -> None:
         speed = ready.motion.speed
-        share = share_of_greatest(ready, self.robot)
+        share = share_of_max(ready, self.robot)
         if speed is None or (share is None and speed.unit == "share"):
             return
         if speed.unit != "share":

@@ -497,7 +497,7 @@ class Machine:
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
         self.cut: set[Place] = set()
-        self.first_behind: dict[int, int] = {}  # step by the one before it
+        self.first_after: dict[int, int] = {}  # step by the one before it
 
     def run(self) -> Execution:
         """Follow all ways."""
@@ -589,7 +589,7 @@ class Machine:
                     memory.here = Position()
 
     def _note(self, way: RunWay, place: Place, instruction: Instruction) -> None:
-        self.first_behind.setdefault(way.step, len(self.steps))
+        self.first_after.setdefault(way.step, len(self.steps))
         self.steps.append(Step(instruction, place, way.frames[-1].calls, way.step))
         way.step = len(self.steps) - 1
 
@@ -600,7 +600,7 @@ class Machine:
 
     def _end(self, way: RunWay, kind: EndKind, place: Place, behind: int | None = None, limit: int = 0) -> None:
         """``behind``: the step in front of the one that follows."""
-        follows = None if behind is None else self.first_behind.get(behind)
+        follows = None if behind is None else self.first_after.get(behind)
         self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside))
 
     def _assign(self, memory: ProgramMemory, each: Assign) -> Output | Unknown | None:

@@ -80,12 +80,12 @@ class ReadyMotion:
     @property
     def joints(self) -> Reals | None:
         """Joints (n,) in rad at its end; None where unknown."""
-        return self.resolver.joints_behind(self.number)
+        return self.resolver.joints_after(self.number)
 
     @property
     def joints_before(self) -> Reals | None:
         """Joints (n,) in rad at its start; None where unknown."""
-        return self.resolver.joints_behind(self.number - 1)
+        return self.resolver.joints_after(self.number - 1)
 
     @property
     def length(self) -> float | None:
@@ -123,7 +123,7 @@ class Resolver:
         if isinstance(target, PoseTarget):
             self.pose = target.pose
         else:
-            joints = self.joints_behind(number) if isinstance(target, JointTarget) else None
+            joints = self.joints_after(number) if isinstance(target, JointTarget) else None
             self.pose = None if joints is None else self._forward(joints, frames)
         via = motion.via.pose if isinstance(motion.via, PoseTarget) else None
         if isinstance(motion.via, JointTarget):
@@ -133,7 +133,7 @@ class Resolver:
             self.pose = None
         return ready
 
-    def joints_behind(self, number: int) -> Reals | None:
+    def joints_after(self, number: int) -> Reals | None:
         """Joints (n,) in rad behind a motion; -1 for the start."""
         if number < 0:
             return self.start
@@ -171,7 +171,7 @@ class Resolver:
         """Solve the next motion, and with it those behind it that are lines and arcs to poses."""
         first = len(self._solved)
         motion, pose_before = self.motions[first]
-        near = self.joints_behind(first - 1)
+        near = self.joints_after(first - 1)
         if motion.angle is not None:
             self._solved.append(None)
         elif not _is_followed(motion) or near is None or pose_before is None:
@@ -210,7 +210,7 @@ class Resolver:
             return None if self.start is None else self._forward(self.start, frames)
         last, _ = self.motions[-1]
         if isinstance(last.target, JointTarget):
-            joints = self.joints_behind(len(self.motions) - 1)
+            joints = self.joints_after(len(self.motions) - 1)
             return None if joints is None else self._forward(joints, frames)
         old = _frames(last)
         return self.pose if self.pose is None or _same(old, frames) else _changed(self.pose, old, frames)
@@ -547,7 +547,7 @@ def joint_speeds(robot: Robot | None, joints: int) -> Reals:
     return np.where(np.isnan(robot.speed), ASSUMED_JOINT_SPEED, robot.speed)
 
 
-def share_of_greatest(ready: ReadyMotion, robot: Robot | None) -> float | None:
+def share_of_max(ready: ReadyMotion, robot: Robot | None) -> float | None:
     """The speed of a joint motion as a share of the greatest; None if the program gives none that can be told."""
     speed = ready.motion.speed
     if speed is None:

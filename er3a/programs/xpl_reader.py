@@ -308,8 +308,8 @@ def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
     elif element.tag == "wait":
         condition = element.text_of("condition")
         builder.add(Waiting(place, "condition", expression(condition), condition))
-        if (told_by := element.text_of("var")) and element.text_of("timeout"):  # whether it came in time
-            builder.add(Assign(place, expression(told_by), Opaque(told), told))
+        if (timeout_flag := element.text_of("var")) and element.text_of("timeout"):  # whether it came in time
+            builder.add(Assign(place, expression(timeout_flag), Opaque(told), told))
     elif element.tag == "end_pro":
         builder.add(Halt(place))
     elif element.tag == "dwell":

@@ -215,7 +215,7 @@ def cause_of(single: list[Relaxed], unlimited: Unlimited) -> VoidCause:
     return Geometry(1 - unlimited.filled, most)
 
 
-def joints_behind(cause: VoidCause) -> set[int]:
+def joints_after(cause: VoidCause) -> set[int]:
     """The joints whose limits a cause names."""
     if isinstance(cause, Disappears):
         return {joint for limit in cause.limits for joint in limit.joints}

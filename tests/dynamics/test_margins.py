@@ -12,7 +12,7 @@ import scipy
 import er3a
 from er3a.dynamics import pose_bound
 from er3a.dynamics.arm_model import arm_model
-from er3a.dynamics.margins import DriveLimits, greatest_payload, greatest_speed_scale
+from er3a.dynamics.margins import DriveLimits, max_payload, max_speed_scale
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import demand, known, torque_parts, worst_holding
 from er3a.dynamics.wrist import levers, load_diagram, worst_levers, wrist_to_flange, wrist_use
@@ -60,7 +60,7 @@ def test_the_greatest_payload_brings_one_drive_to_its_peak(arm):
     centre, moments = (0.02, 0.0, 0.08), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0)
     without = er3a.torques(arm, q, qd, qdd)
     per_kg = er3a.torques(arm, q, qd, qdd, Load(1.0, centre, moments)) - without
-    found = greatest_payload(TIMES, without, per_kg, limits())
+    found = max_payload(TIMES, without, per_kg, limits())
     assert found.by == "peak"
 
     def utilisation(mass: float) -> np.ndarray:
@@ -80,7 +80,7 @@ def test_the_greatest_speed_scale_brings_one_drive_to_its_peak(arm):
     viscous = drives.viscous * qd
     at_rest = parts.gravity + parts.friction - viscous
     args = TIMES, (at_rest, viscous, parts.inertia + parts.velocity), qd
-    found = greatest_speed_scale(*args, limits())
+    found = max_speed_scale(*args, limits())
 
     def utilisation(scale: float) -> float:
         return float((np.abs(er3a.torques(arm, q, scale * qd, scale**2 * qdd)) / PEAK).max())
@@ -88,7 +88,7 @@ def test_the_greatest_speed_scale_brings_one_drive_to_its_peak(arm):
     assert utilisation(found.value) == pytest.approx(1.0, rel=1e-9)
     assert all(utilisation(share * found.value) <= 1 + 1e-9 for share in np.linspace(0.01, 1, 50))
     # Joint speeds may bind first.
-    slow = greatest_speed_scale(*args, limits(speed=np.full(6, 0.8)))
+    slow = max_speed_scale(*args, limits(speed=np.full(6, 0.8)))
     assert slow.value == pytest.approx(1.0, rel=1e-4)
     assert slow.by == "speed"
 
@@ -99,13 +99,13 @@ def test_an_arm_that_cannot_stand_has_no_margin_and_unknown_limits_none(arm):
     weak = np.where(np.arange(6) == 1, 0.5, np.nan)
     zero = np.zeros_like(q)
     for by, weakest in (("peak", limits(weak)), ("rms", limits(UNKNOWN, weak))):
-        payload = greatest_payload(TIMES, parts.total, np.ones_like(q), weakest)
-        speed = greatest_speed_scale(TIMES, (parts.gravity, zero, parts.inertia), qd, weakest)
+        payload = max_payload(TIMES, parts.total, np.ones_like(q), weakest)
+        speed = max_speed_scale(TIMES, (parts.gravity, zero, parts.inertia), qd, weakest)
         assert (payload.value, payload.by, payload.joint) == (0.0, by, 1)
         assert (speed.value, speed.by, speed.joint) == (0.0, by, 1)
-    assert greatest_payload(TIMES, parts.total, np.ones_like(q), limits(UNKNOWN)) is None
-    assert greatest_speed_scale(TIMES, (parts.gravity, zero, parts.inertia), qd, limits(UNKNOWN)) is None
-    assert greatest_speed_scale(TIMES, (zero, zero, zero), zero, limits()).value == np.inf
+    assert max_payload(TIMES, parts.total, np.ones_like(q), limits(UNKNOWN)) is None
+    assert max_speed_scale(TIMES, (parts.gravity, zero, parts.inertia), qd, limits(UNKNOWN)) is None
+    assert max_speed_scale(TIMES, (zero, zero, zero), zero, limits()).value == np.inf
 
 
 def test_rated_torques_bound_payload_and_speed_by_the_effective_ones(arm):
@@ -121,16 +121,16 @@ def test_rated_torques_bound_payload_and_speed_by_the_effective_ones(arm):
 
     without = er3a.torques(arm, q, qd, qdd)
     per_kg = er3a.torques(arm, q, qd, qdd, Load(1.0, centre, moments)) - without
-    payload = greatest_payload(TIMES, without, per_kg, limits(PEAK, rated))
+    payload = max_payload(TIMES, without, per_kg, limits(PEAK, rated))
     assert (payload.by, payload.sample) == ("rms", None)
-    assert payload.value < greatest_payload(TIMES, without, per_kg, limits()).value
+    assert payload.value < max_payload(TIMES, without, per_kg, limits()).value
     ratios = effective(mass=payload.value) / rated
     assert ratios.max() == pytest.approx(1.0, rel=2e-3)  # friction jumps within an interval
     assert ratios.argmax() == payload.joint
     parts = torque_parts(arm_model(arm), q, qd, qdd)
     viscous = arm.masses.drives.viscous * qd
     at_rest = parts.gravity + parts.friction - viscous
-    scale = greatest_speed_scale(TIMES, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits(UNKNOWN, rated))
+    scale = max_speed_scale(TIMES, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits(UNKNOWN, rated))
     ratios = effective(scale=scale.value) / rated
     assert (scale.by, int(ratios.argmax())) == ("rms", scale.joint)
     assert ratios.max() == pytest.approx(1.0, rel=2e-3)

@@ -11,7 +11,7 @@ from er3a.workspace.causes import (
     Disappears,
     Geometry,
     cause_of,
-    joints_behind,
+    joints_after,
     relaxations,
 )
 from er3a.workspace.cell_frame import cell_frame
@@ -97,7 +97,7 @@ def test_a_tube_along_a_slide_is_of_the_elbow():
     assert isinstance(cause, Disappears | Geometry)
     limits = cause.limits if isinstance(cause, Disappears) else (cause.most,)
     assert {limit.unit for limit in limits} == {"deg"}
-    assert joints_behind(cause) == {3}
+    assert joints_after(cause) == {3}
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
     wide, aside = np.array([0, 0, 180 * DEG]), np.array([0.4, 0, 0])
     assert share_by_hand(robot, cavity, robot.lower, robot.upper + wide, 0.0) > 0.9
@@ -114,7 +114,7 @@ def test_a_hole_by_a_sum_of_joints_is_told_so(coupling):
     (limited,) = robot.combined
     factors = tuple(factor for factor in limited.factors if factor)
     assert all((limit.factors, limit.unit) == (factors, "deg") for limit in cause.limits)
-    assert joints_behind(cause) == ({3} if coupling is None else {2, 3})
+    assert joints_after(cause) == ({3} if coupling is None else {2, 3})
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, 0.0) == 0
     by = cause.limits[0].by * DEG
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, by) == 1

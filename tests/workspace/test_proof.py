@@ -13,7 +13,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.robots.robot import Robot
-from er3a.workspace.causes import Disappears, cause_of, joints_behind, relaxations
+from er3a.workspace.causes import Disappears, cause_of, joints_after, relaxations
 from er3a.workspace.proven import (
     EMPTY,
     FILLED,
@@ -189,7 +189,7 @@ def test_the_small_void_at_the_articles_shoulder_is_found():
     cause = cause_of(*relaxations(robot, large))
     limits = cause.limits if isinstance(cause, Disappears) else (cause.most,)
     assert ((3,), "lower") in [(limit.joints, limit.side) for limit in limits]
-    assert joints_behind(cause) & {2, 3}
+    assert joints_after(cause) & {2, 3}
 
 
 def test_the_border_is_where_filled_meets_empty(proven):

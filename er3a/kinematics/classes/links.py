@@ -101,7 +101,7 @@ def invert_rigid(A: Reals, out: Reals) -> None:
 
 
 @inner_kernel
-def turn_behind(A: Reals, c: float, s: float) -> None:
+def post_rotate_z(A: Reals, c: float, s: float) -> None:
     """A becomes A Rz for the angle with cosine c and sine s."""
     for i in range(3):
         x, y = A[i, 0], A[i, 1]

@@ -26,7 +26,7 @@ from er3a.kinematics.classes.hidden_joint import (
     zeros_between,
     zeros_on_circle,
 )
-from er3a.kinematics.classes.links import multiply_rigid, turn_behind
+from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 
@@ -355,7 +355,7 @@ def _second_and_last(e: Scratch, across: Reals, slides: Flags, x: Reals) -> None
             for i in range(3):
                 frame[i, 3] += frame[i, 2] * x[k]
         else:
-            turn_behind(frame, np.cos(x[k]), np.sin(x[k]))
+            post_rotate_z(frame, np.cos(x[k]), np.sin(x[k]))
         multiply_rigid(frame, e.links[k], other)
         frame, other = other, frame
     x[5] = -np.arctan2(frame[1, 0] - frame[0, 1], frame[0, 0] + frame[1, 1])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.classes.links import multiply_rigid, turn_behind
+from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
@@ -40,7 +40,7 @@ def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: R
             for i in range(3):
                 frame[i, 3] += frame[i, 2] * q[k]
         else:
-            turn_behind(frame, np.cos(q[k]), np.sin(q[k]))
+            post_rotate_z(frame, np.cos(q[k]), np.sin(q[k]))
         multiply_rigid(frame, links[k + 1], other)
         frame, other = other, frame
     p0, p1, p2 = frame[0, 3], frame[1, 3], frame[2, 3]

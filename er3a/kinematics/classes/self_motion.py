@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.geometry.vectors import TURN
-from er3a.kinematics.classes.links import multiply_rigid, turn_behind
+from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
@@ -54,7 +54,7 @@ def error_and_jacobian(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
             for i in range(3):
                 frame[i, 3] += frame[i, 2] * x[k]
         else:
-            turn_behind(frame, np.cos(x[k]), np.sin(x[k]))
+            post_rotate_z(frame, np.cos(x[k]), np.sin(x[k]))
         multiply_rigid(frame, links[k + 1], other)
         frame, other = other, frame
     for k in range(n):

@@ -265,7 +265,7 @@ NEAR = NearSingular(wrist_rad=np.radians(5.0), elbow_rad=np.radians(5.0), should
 def write_teach_page(study: Study, name: str, results: Path, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     validated = results / name / "validation"
-    told_first = caveat(read_status(validated) if (validated / SUMMARY).exists() else "not_computed")
+    first_caveat = caveat(read_status(validated) if (validated / SUMMARY).exists() else "not_computed")
     near = near_singular(study.section(TrajectorySettings))
     scene_file = study.scene(name, "trajectory")
     inputs = input_records(study.inputs(name, "teach"))
@@ -275,7 +275,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         near=near,
         scene=load_scene(scene_file) if scene_file else None,
         robot_pages=study.pages(name),
-        told_first=told_first,
+        first_caveat=first_caveat,
         command=run_command(study, f"{name}/teach.html"),
         provenance=Provenance(inputs, code_digest(__name__), config=study.settings(name, "trajectory")),
     )
@@ -290,7 +290,7 @@ def write_panel(
     near: NearSingular = NEAR,
     scene: Scene | None = None,
     robot_pages: Sequence[str] = (),
-    told_first: Caveat | None = None,
+    first_caveat: Caveat | None = None,
 ) -> None:
     """Write the teach panel of a robot.
 
@@ -298,7 +298,7 @@ def write_panel(
     ----------
     near : where the panel warns of a singularity
     robot_pages : those that stand beside it; none outside of a study
-    told_first : what to know of its table, if anything
+    first_caveat : what to know of its table, if anything
     """
     panel = panel_data(robot, near) | {
         "scene": scene_data(scene.solids if scene else ()),
@@ -315,7 +315,7 @@ def write_panel(
         joint_colours=JOINTS,
         degrees=float(np.degrees(1.0)),
         words=panel["words"],
-        told_first=told_first,
+        first_caveat=first_caveat,
         panel=panel,
         modules=import_map(sorted(_HERE.glob("*.js"))),
         command=command,

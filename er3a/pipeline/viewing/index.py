@@ -48,7 +48,7 @@ from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.numbers import number
-from er3a.pipeline.viewing.page import PAGES, Picture, status_word, table_instead
+from er3a.pipeline.viewing.page import PAGES, Picture, alternative_table, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import shown
@@ -519,7 +519,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         or (head.status in ("caution", "fail") and head.status == expected.get(head.stage))
     ]
     finding = heads["validation"].finding if "validation" in heads else None
-    same_arm, instead = isinstance(finding, DefinedOtherwise), table_instead(study, name, results.parent)
+    same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     measurement = say(finding.next_measurement) if isinstance(finding, LeftOpen) and finding.next_measurement else ""
     return {
         "robot": study.robot(name),

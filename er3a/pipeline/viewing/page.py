@@ -319,7 +319,7 @@ def _commit() -> str | None:
     return commit and commit + (" + changes" if git("status", "--porcelain", "--untracked-files=no") else "")
 
 
-def table_instead(study: Study, name: str, results: Path) -> str | None:
+def alternative_table(study: Study, name: str, results: Path) -> str | None:
     """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out; None
     where there is none, or none that was computed."""
     for other in study.other_tables(name):

@@ -13,9 +13,9 @@ from er3a.dynamics.margins import (
     ASSUMED,
     DriveLimits,
     Margin,
-    greatest_payload,
-    greatest_speed_scale,
     load_tolerance,
+    max_payload,
+    max_speed_scale,
     tolerances_of,
     torque_tolerance,
 )
@@ -283,8 +283,8 @@ def _margins(
     at_rest = parts.gravity + parts.tool + parts.friction - viscous
     limits = DriveLimits(drives.peak, drives.rated, arm.robot.speed)
     return (
-        greatest_payload(t, parts.total, more, limits),
-        greatest_speed_scale(t, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits),
+        max_payload(t, parts.total, more, limits),
+        max_speed_scale(t, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits),
     )
 
 

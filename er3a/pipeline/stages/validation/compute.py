@@ -16,7 +16,7 @@ from er3a.diagnosis.ranking import Ranking, usable
 from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.identifiability.evidence import evidence_of
 from er3a.identifiability.proposals import proposals_of
-from er3a.identifiability.reactions import bases_of, bases_untold
+from er3a.identifiability.reactions import bases_of, undeclared_bases
 from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import robot_of
@@ -305,7 +305,9 @@ def compute(study: Study, name: str) -> ValidationResults:
         quantities = quantities_of(references.checkable)
         state = state_of(robot, quantities, extremes=values, axes=circles.axes)
         bases = (
-            bases_of(robot, references.checkable, references.documents) if plain else bases_untold(references.checkable)
+            bases_of(robot, references.checkable, references.documents)
+            if plain
+            else undeclared_bases(references.checkable)
         )
         judged, contradictions = checks_of_set(references, read(quantities, state), bases, robot.joints)
         checks += judged

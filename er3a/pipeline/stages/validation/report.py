@@ -41,7 +41,7 @@ from er3a.pipeline.stages.validation.model import (
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Head, Picture, head_of, render, run_command, table_instead
+from er3a.pipeline.viewing.page import Head, Picture, alternative_table, head_of, render, run_command
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
@@ -323,7 +323,7 @@ def _head(study: Study, stored: Stored[ValidationResults]) -> Head:
     head = head_of(stored, FIGURES)
     if head.status != "fail":
         return head
-    instead = table_instead(study, stored.robot, stored.folder.parents[1]) if stored.folder else None
+    instead = alternative_table(study, stored.robot, stored.folder.parents[1]) if stored.folder else None
     same_arm = isinstance(head.finding, DefinedOtherwise)
     return replace(head, text=joined([decision(head.status, (), instead, same_arm=same_arm), head.text], " "))
 

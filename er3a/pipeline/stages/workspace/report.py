@@ -33,7 +33,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
 from er3a.robots.robot import Robot
-from er3a.workspace.causes import joints_behind
+from er3a.workspace.causes import joints_after
 
 LISTED = 12
 
@@ -119,7 +119,7 @@ def _rule(enclosed: list[VoidSummary]) -> str:
             "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: no "
             "enclosed void lies away from the shoulder, so no table entry is indicated."
         )
-    named = sum(bool(joints_behind(void.cause) & {2, 3}) for void in elsewhere)
+    named = sum(bool(joints_after(void.cause) & {2, 3}) for void in elsewhere)
     return sentence("workspace.rule", count=len(elsewhere), named=named)
 
 
