@@ -67,8 +67,7 @@ NOTES = """
 Who errs, where a third source tells:
 
 - UR10: Robotics Toolbox and the URDF agree (612 and 572.3 mm); the catalogue's 612.7 and 571.6 mm are the UR10e's by
-  its maker's table (612.7, 571.55),
-  rounded.
+  its maker's table (612.7, 571.55).
 - UR3: Robotics Toolbox and the URDF agree (d4 112.35, d5 85.35 mm); the catalogue's d4 and d5 are 1.95 mm short.
 - UR5: Robotics Toolbox prints d1 = 89.459 mm, the URDF has 89.159 mm and the catalogue 89.2 mm. d1 can't be told from
   where the base is: it shows as a base that is 0.3 mm off.
