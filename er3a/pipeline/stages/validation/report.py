@@ -11,11 +11,11 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.pages import decision
-from er3a.pipeline.messages.references import CHECK_KINDS
+from er3a.pipeline.messages.references import CHECK_KINDS, GRADE_NAMES
 from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS, counted_checks
+from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.arm_figures import axis_deviation, link_frames, side_view, workspace_drawing
 from er3a.pipeline.stages.validation.diagnosis_figures import (
@@ -105,7 +105,7 @@ def group_rows(checks: Iterable[Judged]) -> list[GroupRow]:
                     status=status,
                     counts=(counted["pass"], counted["fail"], counted["conflict"]),
                     worst=say(worst.subject),
-                    difference=f"{_value(worst.difference, worst)} {worst.unit}".strip(),
+                    difference=with_unit(_value(worst.difference, worst), worst.unit),
                 )
             )
     return rows
@@ -119,7 +119,7 @@ def check_row(check: Judged) -> list[str]:
         source = sentence("graded", own_source=check.source, grade=grade)
     else:
         source = tr("the model itself")
-    return [say(check.subject), *values, f"{check.tolerance:g}", check.unit, source]
+    return [say(check.subject), *values, f"{check.tolerance:g}", tr(check.unit), source]
 
 
 def _value(value: float, check: Check) -> str:
@@ -131,7 +131,7 @@ def _value(value: float, check: Check) -> str:
 
 def blank_row(check: Unjudged) -> list[str]:
     """What is not judged: its name, the model's value, the set, and why."""
-    measured = f"{_value(check.measured, check)} {check.unit}" if check.measured is not None else "–"
+    measured = with_unit(_value(check.measured, check), check.unit) if check.measured is not None else "–"
     return [say(check.subject), measured, check.reference_set or "–", say(check.note)]
 
 
