@@ -8,7 +8,7 @@ import er3a.pipeline.messages.diagnosis  # noqa: F401
 from er3a.diagnosis.conclusions import TooSmallToTell
 from er3a.diagnosis.faults import ReversedDirection, WrongOffset
 from er3a.identifiability.reactions import CheckCounts
-from er3a.pipeline.messages.language import N_, as_text, with_unit
+from er3a.pipeline.messages.language import N_, as_text, own_title, with_unit
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_WORDS, quoted
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
@@ -318,7 +318,7 @@ def _value(value: float, unit: str) -> str:
 
 @say.register
 def _(found: NamedPose) -> str:
-    return found.name
+    return own_title(found.name)
 
 
 @say.register

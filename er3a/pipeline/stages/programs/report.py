@@ -124,7 +124,7 @@ def _remark(name: str, each: FindingAt) -> Markup:
         return text
     at = tr("at {time} s", time=fixed(each.motion_s, 2))
     shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)
-    return Markup("<b>{}</b>: {}").format(shown, text)
+    return Markup("<b>{}</b>{}{}").format(shown, tr(": "), text)
 
 
 def _listing(

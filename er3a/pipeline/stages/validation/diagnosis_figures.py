@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
 from er3a.pipeline.messages.diagnosis import both, level
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.stages.validation.model import (
     Calibrated,
@@ -106,8 +106,8 @@ def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals, own_claims: 
 
 def _measured_against(diagnosis: SetDiagnosis) -> str:
     """What residuals are measured against, and what of that is no evidence."""
-    own = [title for title in diagnosis.against if title in diagnosis.from_table]
-    others = [title for title in diagnosis.against if title not in own]
+    own = [own_title(title) for title in diagnosis.against if title in diagnosis.from_table]
+    others = [own_title(title) for title in diagnosis.against if title not in diagnosis.from_table]
     told = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
     if own:
         template = (

@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
-from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import decision
 from er3a.pipeline.messages.references import CHECK_KINDS, GRADE_NAMES
 from er3a.pipeline.messages.say import joined, say, sentence, word
@@ -116,7 +116,7 @@ def check_row(check: Judged) -> list[str]:
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
     if isinstance(check, ReferenceCheck):
         grade = word("grade", GRADE_NAMES, check.grade)
-        source = sentence("graded", own_source=check.source, grade=grade)
+        source = sentence("graded", own_source=own_title(check.source), grade=grade)
     else:
         source = tr("the model itself")
     return [say(check.subject), *values, f"{check.tolerance:g}", tr(check.unit), source]
@@ -312,7 +312,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         deviation=_deviation_picture(drawn) if len(drawn) else None,
         drawing=_drawing_picture(results.section, labels, summary) if len(labels) else None,
         labels=_label_rows(labels, judged),
-        table_source=source and (source.source, word("grade", GRADES, source.grade)),
+        table_source=source and (own_title(source.source), word("grade", GRADES, source.grade)),
         convention=word("convention", CONVENTIONS, robot.convention),
         grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
     )

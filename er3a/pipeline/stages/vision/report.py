@@ -321,7 +321,7 @@ def _disagreement(found: CalibrationResult) -> str:
         "Outside the 95 % intervals: {names}. Closed-form methods weight all samples and coordinates equally, "
         "and most solve for the rotation first, so its error enters the position; the maximum-likelihood pose "
         "weights each coordinate by its standard deviation.",
-        names=", ".join(off),
+        names=joined(off, ", "),
     )
     return joined([weights, why], " ")
 
