@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from er3a.errors import InputError
 from er3a.files.csv_file import read_column
 from er3a.files.yaml_file import read_yaml
 
@@ -34,12 +35,41 @@ TITLES = ("title", "note")
 
 
 def translations_in(files: Iterable[Path], language: str) -> dict[str, str]:
-    """The translations into a language that YAML files hold, by the text that they translate."""
+    """The translations into a language of people's texts in files, by the text that they translate.
+
+    Those of titles and notes stand beside them in YAML files (``title_zh``), those of other texts, such as sources and
+    names of poses, in a gettext catalogue in the file's folder (``zh.po``).
+
+    Raises
+    ------
+    InputError
+        for a catalogue that can't be read
+    """
+    files = list(files)
     found: dict[str, str] = {}
+    for catalogue in sorted({file.parent / f"{language}.po" for file in files}):
+        if catalogue.is_file():
+            found |= _catalogue(catalogue)
     for file in files:
         if file.suffix in (".yaml", ".yml"):
             _collect(read_yaml(file), language, found)
     return found
+
+
+def _catalogue(file: Path) -> dict[str, str]:
+    from babel.messages.pofile import PoFileError, read_po
+
+    try:
+        with file.open("rb") as content:
+            entries = read_po(content, abort_invalid=True)
+    except (PoFileError, ValueError) as error:
+        raise InputError(file, None, f"not a gettext catalogue: {error}", "Write msgid and msgstr, in UTF-8") from None
+    texts = ((entry.id, entry.string) for entry in entries)
+    return {
+        text: translation
+        for text, translation in texts
+        if isinstance(text, str) and isinstance(translation, str) and text and translation
+    }
 
 
 def _collect(part: Any, language: str, found: dict[str, str]) -> None:

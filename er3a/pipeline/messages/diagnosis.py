@@ -35,7 +35,7 @@ from er3a.diagnosis.faults import (
     WrongScale,
     WrongUnit,
 )
-from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.language import N_, as_text, with_unit
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 
 ENTRIES = {
@@ -417,7 +417,7 @@ def _(found: MorePositions) -> str:
     needed = say_as(found, "needed")
     if found.entries:
         needed = say_as(found, "for_entries", needed=needed)
-    poses = ["(" + ", ".join(as_text(angle, "g") for angle in pose) + ") deg" for pose in found.examples_deg]
+    poses = [with_unit(f"({', '.join(as_text(angle, 'g') for angle in pose)})", "deg") for pose in found.examples_deg]
     return say_as(found, "request", known=known, needed=needed, examples=_with_and(poses))
 
 

@@ -18,7 +18,7 @@ from er3a.kinematics.solutions import (
 from er3a.kinematics.wrist_partitioned import (
     NotSixTurning,
 )
-from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts, word
 from er3a.robots.joint_limits import CombinationExceeded, LimitExceeded, LimitsExceeded, SlideExceeded
 from er3a.selection.nearest import (
@@ -193,7 +193,7 @@ def _(found: SlideExceeded) -> str:
 
 @say.register
 def _(found: CombinationExceeded) -> str:
-    at, by, bound, unit = found.value, found.excess, found.limit, "mm" if found.sliding else "deg"
+    at, by, bound, unit = found.value, found.excess, found.limit, "mm" if found.sliding else tr("deg")
     named = sum_of_joints(found.joints, found.factors)
     return say_as(found, found.side, sum=named, at=at, by=by, bound=bound, unit=unit)
 

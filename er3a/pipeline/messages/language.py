@@ -38,6 +38,9 @@ def N_(text: str) -> str:
     return text
 
 
+UNITS = (N_("deg"), N_("deg/s"), N_("µdeg/s"))  # those that are not the same in every language
+
+
 def use(language: str, own: Mapping[str, str] | None = None) -> None:
     """Set the language of texts for this process: one of ``LANGUAGES``; ``own``: people's titles in that language."""
     global _catalogue, _language, _own
@@ -89,6 +92,12 @@ def as_text(part: Any, spec: str = "") -> str:
     """A part of a text; a number's minus sign is no hyphen."""
     text = format(part, spec)
     return text.replace("-", "−") if isinstance(part, Real) else text
+
+
+def with_unit(value: str, unit: str, gap: str = " ") -> str:
+    """A value with its unit as the language in use writes it: Chinese has ° without a gap."""
+    shown = tr(unit)
+    return value + ("" if shown.startswith("°") else gap) + shown if shown else value
 
 
 def own_title(text: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import by, joined, listed, say, say_as, texts, word
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import (
@@ -79,7 +79,7 @@ TEXTS = texts(
 
 def unit_of(slides: bool) -> str:
     """Of values of a joint."""
-    return "mm" if slides else "deg"
+    return "mm" if slides else tr("deg")
 
 
 @say.register

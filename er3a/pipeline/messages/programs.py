@@ -307,9 +307,9 @@ def _(found: ProgramCounts) -> str:
     unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
     others = []
     for outcome, names in unsound.items():
-        parts = {"count": len(names), "word": outcome_word(outcome), "names": ", ".join(names)}
+        parts = {"count": len(names), "word": outcome_word(outcome), "names": joined(names, ", ")}
         others.append(sentence("programs.fault", **parts) if names else "")
-    missed = ", ".join(found.not_examined)
+    missed = joined(found.not_examined, ", ")
     open_parts = sentence("programs.not_examined", names=missed) if missed else ""
     sentences = [passed if found.programs else "", joined(others, ", "), open_parts, demonstrated(found.demonstrations)]
     return sentence("finding", finding=joined(sentences))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from er3a.identifiability.evidence import PartEvidence
 from er3a.identifiability.proposals import LookAtMotion, MeasureAngle, MeasureLength
-from er3a.identifiability.statements import InconsistentWithOwnText
-from er3a.pipeline.messages.language import N_, as_text
+from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
+from er3a.pipeline.messages.language import N_, as_text, own_title, tr
 from er3a.pipeline.messages.say import by, joined, say, say_as, sentence, texts, word
 from er3a.references.rows import GROUPS, check_complete
 from er3a.references.subjects import (
@@ -43,6 +43,14 @@ SEGMENT_WORDS = {"upper_arm": N_("upper arm from the vertical"), "forearm": N_("
 LABELS = {"abs_x": "|x|"}
 check_complete("words for groups of references", GROUPS, GROUP_WORDS)
 check_complete("words for groups that a set lacks", GROUPS, MISSING_WORDS)
+GRADE_NAMES = {
+    "official": N_("official"),
+    "measured": N_("measured"),
+    "cad": N_("cad"),
+    "export": N_("export"),
+    "claim": N_("claim"),
+    "inferred": N_("inferred"),
+}
 STATUS_WORDS = {
     "settled": N_("settled"),
     "weak": N_("weak"),
@@ -151,7 +159,7 @@ TEXTS = texts(
 def quoted(subject: Subject) -> str:
     """A subject within a sentence: the pose behind what is seen there."""
     if isinstance(subject, PointAtPose | PoseExcess):
-        return sentence("at_pose#quoted", seen=_seen(subject), own_pose=subject.pose)
+        return sentence("at_pose#quoted", seen=_seen(subject), own_pose=own_title(subject.pose))
     return say(subject)
 
 
@@ -162,7 +170,7 @@ def _(found: AxisPosition) -> str:
 
 @say.register
 def _(found: PointAtPose | PoseExcess) -> str:
-    return sentence("at_pose#row", own_pose=found.pose, seen=_seen(found))
+    return sentence("at_pose#row", own_pose=own_title(found.pose), seen=_seen(found))
 
 
 @say.register
@@ -244,6 +252,12 @@ def _measurement(found: MeasureAngle | MeasureLength, half_width: float) -> str:
 
 @say.register
 def _(found: InconsistentWithOwnText) -> str:
+    against = tuple(map(own_title, found.against))
     if found.entry is None:
-        return sentence("inconsistent_unexplained", own_documents=joined(found.against))
-    return say_as(found)
+        return sentence("inconsistent_unexplained", own_documents=joined(against))
+    return say_as(found, against=against, unit=tr(found.unit))
+
+
+@say.register
+def _(found: NotTheRobotDescribed) -> str:
+    return say_as(found, against=tuple(map(own_title, found.against)))

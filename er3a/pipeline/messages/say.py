@@ -34,7 +34,7 @@ from er3a.findings import Finding
 from er3a.pipeline.messages import language
 
 KeyT = TypeVar("KeyT", bound=str)
-Separator = Literal["; ", ", ", " "]
+Separator = Literal["; ", ", ", ". ", " "]
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,8 @@ TEXTS = texts(
     {
         "joined#; ": "{first}; {rest}",
         "joined#, ": "{first}, {rest}",
+        "joined#. ": "{first}. {rest}",
+        "bracketed": "{text} ({more})",
         "joined# ": "{first} {rest}",
         "finding": "{finding}.",
         "more": "{count} more",
@@ -150,8 +152,13 @@ def say_all(findings: Iterable[Finding]) -> str:
     return joined(listed(findings), " ")
 
 
+def bracketed(text: str, more: str) -> str:
+    """A text and what stands behind it in brackets, such as a unit; the text alone where that is empty."""
+    return sentence("bracketed", text=text, more=more) if more else text
+
+
 def joined(parts: Iterable[str], separator: Separator | str = "; ") -> str:
-    """Texts as one: apart by ``"; "``, ``", "`` or ``" "`` (whole sentences); empty ones are left out."""
+    """Texts as one: apart by ``"; "``, ``", "``, ``". "`` or ``" "`` (whole sentences); empty ones are left out."""
     kept = [text for text in parts if text]
     whole = kept[-1] if kept else ""
     for text in reversed(kept[:-1]):

@@ -6,7 +6,7 @@ import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES
-from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.language import N_, with_unit
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import Plural, joined, listed, say, sentence, texts, word
 from er3a.pipeline.stages.trajectory.model import (
@@ -131,11 +131,11 @@ def _(found: PathCounts) -> str:
     }
     faults = []
     for verdict, names in unsafe.items():
-        parts = {"count": len(names), "word": outcome_word(verdict), "names": ", ".join(names)}
+        parts = {"count": len(names), "word": outcome_word(verdict), "names": joined(names, ", ")}
         faults.append(sentence("trajectory.fault", **parts) if names else "")
     safe = sentence("trajectory.paths", count=found.paths, safe=found.safe)
     if found.not_followed:
-        parts = {"count": len(found.not_followed), "names": ", ".join(found.not_followed)}
+        parts = {"count": len(found.not_followed), "names": joined(found.not_followed, ", ")}
         faults.append(sentence("trajectory.not_followed", **parts))
     sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations)]
     return sentence("finding", finding=joined(sentences))
@@ -161,7 +161,7 @@ def event_word(event: Singularity) -> str:
 def event_distance(event: Singularity) -> str:
     """How far from the singular set a pass is, with its unit."""
     if event.distance_deg is not None:
-        return f"{event.distance_deg:.3g} deg"
+        return with_unit(f"{event.distance_deg:.3g}", "deg")
     if event.distance_mm is not None:
         return f"{event.distance_mm:.3g} mm"
     return sentence("smallest_singular_value", value=event.smallest_singular_value)
@@ -284,7 +284,7 @@ def advice(path: PathSummary) -> str | None:
     if not path.avoidance:
         return None
     if path.chosen:
-        return _chosen(path.chosen, path.duration_s) + _slower_throughout(path)
+        return joined([_chosen(path.chosen, path.duration_s), _slower_throughout(path)], ". ")
     if path.unreachable:
         when = joined(map(_when, path.unreachable), ", ")
         why = sentence("advice.out_of_reach", when=when)
@@ -295,10 +295,10 @@ def advice(path: PathSummary) -> str | None:
         (only,) = path.avoidance
         if only.name == "planned":
             no_way = sentence("advice.no_way", reason=reasons(only))
-            return no_way + _clear(path)
+            return joined([no_way, _clear(path)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
-    return sentence("advice.none", why=why) + _clear(path)
+    return joined([sentence("advice.none", why=why), _clear(path)], ". ")
 
 
 def _slower_throughout(path: PathSummary) -> str:
@@ -307,7 +307,7 @@ def _slower_throughout(path: PathSummary) -> str:
     if speed is None or acceleration is None or not _only_too_fast(path):
         return ""
     longer = PACE_MARGIN * max(1.0, speed, acceleration**0.5)
-    return ". " + sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
+    return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
 
 
 def _clear(path: PathSummary) -> str:
@@ -322,8 +322,7 @@ def _clear(path: PathSummary) -> str:
         "contact": _numbers(last.contact_mm, 0),
     }
     pair = say(path.collisions[0].cause.touches[0].pair)
-    text = sentence("advice.clear_until", margin=last.margin_mm, t=last.t_s, far=last.s_m * 1000, pair=pair, **parts)
-    return ". " + text
+    return sentence("advice.clear_until", margin=last.margin_mm, t=last.t_s, far=last.s_m * 1000, pair=pair, **parts)
 
 
 def _numbers(values: tuple[float, ...], digits: int) -> str:

@@ -8,7 +8,7 @@ import er3a.pipeline.messages.diagnosis  # noqa: F401
 from er3a.diagnosis.conclusions import TooSmallToTell
 from er3a.diagnosis.faults import ReversedDirection, WrongOffset
 from er3a.identifiability.reactions import CheckCounts
-from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.language import N_, as_text, own_title, with_unit
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_WORDS, quoted
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
@@ -60,14 +60,6 @@ GRADES = {
     "export": N_("a URDF exported from CAD"),
     "claim": N_("an article's text"),
     "inferred": N_("inferred, not stated"),
-}
-GRADE_NAMES = {
-    "official": N_("official"),
-    "measured": N_("measured"),
-    "cad": N_("cad"),
-    "export": N_("export"),
-    "claim": N_("claim"),
-    "inferred": N_("inferred"),
 }
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
@@ -321,12 +313,12 @@ def _chained(link: str, words: Sequence[str]) -> str:
 
 
 def _value(value: float, unit: str) -> str:
-    return f"{as_text(value, '.1f')} {unit}" if unit else as_text(value, "g")
+    return with_unit(as_text(value, ".1f"), unit) if unit else as_text(value, "g")
 
 
 @say.register
 def _(found: NamedPose) -> str:
-    return found.name
+    return own_title(found.name)
 
 
 @say.register

@@ -141,7 +141,7 @@ function tellJoints() {
   data.joints.forEach(({ unit }, i) => {
     const past = rooms[i] <= -0.05; // what one decimal shows
     const text = rooms[i] === Infinity ? words.unlimited : past ? words.beyond : words.room;
-    show(cells[i].value, `${fixed(values[i], 1)} ${unit}`);
+    show(cells[i].value, fixed(values[i], 1) + (unit === "°" ? unit : ` ${unit}`));
     show(cells[i].room, text.replace("{room}", fixed(Math.abs(rooms[i]), 1)));
     cells[i].place.classList.toggle("least", least.get(unit) === i);
     cells[i].place.classList.toggle("past", past);

@@ -185,7 +185,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
     """Unit and limits of each joint in it, None where it has none."""
     ends = np.round(shown(robot, np.stack([robot.lower, robot.upper])), 6)
     return [
-        {"unit": "mm" if slides else "deg", "lower": None if free else low, "upper": None if free else high}
+        {"unit": "mm" if slides else tr("deg"), "lower": None if free else low, "upper": None if free else high}
         for slides, free, low, high in zip(robot.slides.tolist(), robot.continuous.tolist(), *ends.tolist())
     ]
 

@@ -16,6 +16,7 @@ from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
 from er3a.robots.joint_limits import joint_shown
@@ -57,7 +58,9 @@ def write_comparison(
 
 def _columns(robot: Robot) -> list[str]:
     units = {"a": "mm", "d": "mm", "direction": ""}
-    return [f"{column} ({unit})" if (unit := units.get(column, "deg")) else tr("direction") for column in COLUMNS]
+    return [
+        bracketed(column, tr(unit)) if (unit := units.get(column, "deg")) else tr("direction") for column in COLUMNS
+    ]
 
 
 def _rows(robot: Robot, corrected: Robot) -> list[list[tuple[str, str, bool]]]:

@@ -35,6 +35,7 @@ from plotly.offline import get_plotlyjs
 
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.tables import Table
 from er3a.pipeline.viewing.palette import GRID, INK, MUTED, SIX_JOINTS
 
@@ -244,7 +245,7 @@ def axis_label(table: Table, attribute: str) -> str:
     """What stands at an axis along which a column is drawn: its heading (else its meaning) and its unit."""
     spec = table.columns()[attribute]
     what, unit = tr(spec.heading or spec.meaning), spec.unit.replace("^2", "²").replace("^3", "³")
-    return f"{what} ({unit})" if unit else what
+    return bracketed(what, tr(unit))
 
 
 def svg_data_uri(figure: Figure) -> Markup:

@@ -27,7 +27,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.pages import caveat, decision, next_step
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
@@ -212,7 +212,7 @@ def _section(study: Study, name: str, results: Path) -> dict[str, Any]:
         "title": title,
         "count": len(points),
         "picture": Picture(
-            _figure(points, f"{what} ({unit})", own, sweep.stages),
+            _figure(points, bracketed(what, tr(unit)), own, sweep.stages),
             tr("Results of {count} variants against {what}", count=len(points), what=what),
             _caption(points, own, unit, "workspace" in sweep.stages),
         ),
@@ -318,7 +318,7 @@ def _in_order(points: list[Point]) -> list[Point]:
 
 
 def _table(points: list[Point], what: str, unit: str, stages: list[str]) -> tuple[list[str], list[list[Any]]]:
-    columns = [tr("variant"), f"{what} ({unit})>", *(tr(PAGES[stage]) for stage in stages)]
+    columns = [tr("variant"), bracketed(what, tr(unit)) + ">", *(tr(PAGES[stage]) for stage in stages)]
     rows = [[point.name, _plain(point.value), *(_verdict(point, stage) for stage in stages)] for point in points]
     if "workspace" in stages:
         numbers = (

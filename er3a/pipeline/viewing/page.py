@@ -10,6 +10,7 @@ import shlex
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.messages.pages import Caveat, caveat, glossary
-from er3a.pipeline.messages.say import say_all
+from er3a.pipeline.messages.references import GRADE_NAMES
+from er3a.pipeline.messages.say import bracketed, joined, say_all, word
 from er3a.pipeline.results import Provenance, Stored, read_status
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -172,7 +174,7 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
             figure.name,
             language.translated(f"{stage}.figure", figure_words[figure.name]),
             figure.value,
-            tr("of {total}", total=figure.of) if figure.of is not None else figure.unit,
+            tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
             figure.uncertainty,
             figure.of is not None,
         )
@@ -181,7 +183,7 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     meant = len(getattr(verdict.finding, "demonstrations", ()))
     text = say_all(verdict.findings)
-    missed = tuple((left_out_text(each), ", ".join(each.names)) for each in stored.results.summary.not_examined)
+    missed = tuple((left_out_text(each), joined(each.names, ", ")) for each in stored.results.summary.not_examined)
     return Head(
         stored.robot, stage, verdict.status, text, shown, stored.provenance, caveats, meant, verdict.finding, missed
     )
@@ -218,7 +220,7 @@ def render(
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
-    environment.globals |= {"view_command": view_command, "numbered": Numbering()}
+    environment.globals |= {"view_command": view_command, "numbered": Numbering(), "bracketed": bracketed}
     environment.filters |= {
         "number": number,
         "fixed": fixed,
@@ -226,6 +228,7 @@ def render(
         "own": language.own_title,
         "sentence": whole_sentence,
         "led": led,
+        "grade": partial(word, "grade", GRADE_NAMES),
     }
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),

@@ -14,7 +14,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision.model import (
@@ -154,7 +154,7 @@ def clearance_over_time(results: CollisionResults) -> Picture | None:
         ax.set_xlabel(tr("time (s)"), fontsize=8)
     met = [found.name for found in results.summary.closest if found.kind == "path" and found.clearance_mm < 0]
     caption = (
-        tr("Below zero bodies overlap: {paths}.", paths=", ".join(met))
+        tr("Below zero bodies overlap: {paths}.", paths=joined(met, ", "))
         if met
         else tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
     )

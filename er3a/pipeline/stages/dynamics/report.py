@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from er3a.pipeline.messages.dynamics import BINDING, FIGURES, quantity_word
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import listed, say, word
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.model import (
@@ -232,7 +232,7 @@ def _use(use: Use) -> list[str]:
 def _units(summary: DynamicsSummary) -> dict[str, str]:
     """Units of torques, speeds and inertias in headings, by what the arm's joints do."""
     torque = {held.unit for held in summary.holding}
-    turning = {"torque": "N m", "speed": "deg/s", "inertia": "kg m²"}
+    turning = {"torque": "N m", "speed": tr("deg/s"), "inertia": "kg m²"}
     sliding = {"torque": "N", "speed": "mm/s", "inertia": "kg"}
     mixed = {"torque": tr("N m or N"), "speed": tr("deg/s or mm/s"), "inertia": tr("kg m² or kg")}
     return mixed if len(torque) > 1 else sliding if torque == {"N"} else turning
@@ -288,7 +288,7 @@ def _bound(bound: BindingLimit | None) -> str:
     value = tr("no bound") if bound.value is None else number(bound.value, 3)
     if bound.by is None:
         return value
-    return f"{value} (J{bound.joint}, {word('dynamics.binding', BINDING, bound.by)})"
+    return bracketed(value, joined([f"J{bound.joint}", word("dynamics.binding", BINDING, bound.by)], ", "))
 
 
 def _joints(path: PathLoad) -> list[list[str]]:

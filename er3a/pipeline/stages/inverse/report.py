@@ -30,8 +30,8 @@ from er3a.pipeline.messages.inverse import (
     limits_in_short,
 )
 from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
-from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import joined, listed, say, word
+from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.inverse.model import (
     SINGULAR_PARTS,
@@ -114,8 +114,10 @@ def symptoms(summary: InverseSummary) -> list[list[str]]:
 
 def _names(names: list[str]) -> str:
     if len(names) > NAMED:
-        return tr("{own_names} and {count} more", own_names=", ".join(names[:NAMED]), count=number(len(names) - NAMED))
-    return ", ".join(names) if names else tr("no target")
+        return tr(
+            "{own_names} and {count} more", own_names=joined(names[:NAMED], ", "), count=number(len(names) - NAMED)
+        )
+    return joined(names, ", ") if names else tr("no target")
 
 
 def _greed(sequence: VisitOrder | None) -> str:
@@ -125,7 +127,7 @@ def _greed(sequence: VisitOrder | None) -> str:
         "All targets in order: {cost:.3g} {unit} as a whole, greedily {more:.3g} {unit} more",
         cost=sequence.cost,
         more=sequence.greedy_cost - sequence.cost,
-        unit=RULES[sequence.rule].unit,
+        unit=tr(RULES[sequence.rule].unit),
     )
 
 
@@ -481,7 +483,7 @@ def _rule(rule: str) -> str:
 
 def _rule_heading(rule: str) -> str:
     unit = next((own.unit for name, own in RULES.items() if name == rule), "1")
-    return f"{_rule(rule)}{'' if unit == '1' else f' ({unit})'}>"
+    return bracketed(_rule(rule), "" if unit == "1" else tr(unit)) + ">"
 
 
 def _rule_rows(ranked: RankingRows, rules: list[str]) -> list[list[str]]:
@@ -532,8 +534,8 @@ def _curve(robot: Robot, family: SelfMotion) -> str:
     low, high = family.range_deg
     parts = {
         "where": word("self_motion", FREE_AT, family.kind),
-        "joints": f"({_listed(family.q0_deg)}){NO_BREAK_SPACE}{_units(robot)}",
-        "rates": ", ".join(moving),
+        "joints": with_unit(f"({_listed(family.q0_deg)})", _units(robot), NO_BREAK_SPACE),
+        "rates": joined(moving, ", "),
     }
     if not family.within_limits:
         return tr(
@@ -552,7 +554,7 @@ def _curve(robot: Robot, family: SelfMotion) -> str:
 
 def _move_rule(sequence: VisitOrder | None) -> tuple[str, str]:
     """Unit and title of the rule that moves in the sequence are ranked by."""
-    return (RULES[sequence.rule].unit, word("rule.title", RULE_TITLES, sequence.rule)) if sequence else ("", "")
+    return (tr(RULES[sequence.rule].unit), word("rule.title", RULE_TITLES, sequence.rule)) if sequence else ("", "")
 
 
 def _outcomes(targets: Iterable[TargetResult]) -> str:
@@ -637,7 +639,7 @@ def _on_one_line(label: str, branch: int) -> str:
 def _units(robot: Robot) -> str:
     """The unit of joint values, or of most of them and of those that slide."""
     sliding = [f"J{j + 1}" for j in np.flatnonzero(robot.slides)]
-    return tr("deg, {joints} in mm", joints=", ".join(sliding)) if sliding else "deg"
+    return tr("deg, {joints} in mm", joints=", ".join(sliding)) if sliding else tr("deg")
 
 
 def _joints(q_deg: Iterable[float]) -> str:

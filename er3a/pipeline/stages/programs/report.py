@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, remedies, remedy
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import (
@@ -119,12 +119,12 @@ def _worst(program: ProgramSummary) -> Markup:
 
 def _remark(name: str, each: FindingAt) -> Markup:
     """What was found, after the moment at which it begins: a link to it where the player shows it."""
-    text = escape(say(each.finding) + (f" ({each.times} ×)" if each.times > 1 else ""))
+    text = escape(bracketed(say(each.finding), f"{each.times} ×" if each.times > 1 else ""))
     if each.motion_s is None:
         return text
     at = tr("at {time} s", time=fixed(each.motion_s, 2))
     shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)
-    return Markup("<b>{}</b>: {}").format(shown, text)
+    return Markup("<b>{}</b>{}{}").format(shown, tr(": "), text)
 
 
 def _listing(

@@ -22,7 +22,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import event_word, type_word
 from er3a.pipeline.stages.trajectory.model import (
     FASTEST,
@@ -354,12 +354,12 @@ def clearance_section(results: TrajectoryResults) -> ClearanceSection:
         return ClearanceSection(None, [])
     colliding = [path.name for path, _ in paths if path.collisions]
     if colliding:
-        names = ", ".join(colliding)
+        names = joined(colliding, ", ")
         caption = tr("Below zero bodies overlap: {paths} can't be driven as planned.", paths=names)
     else:
         caption = tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
     if any(path.unreachable for path, _ in paths):
-        caption += " " + tr("Grey: not reachable.")
+        caption = joined([caption, tr("Grey: not reachable.")], " ")
     alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
     return ClearanceSection(Picture(_curves(paths, results), alt, caption), [_row(*measured) for measured in paths])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 
 from er3a.kinematics.forward import forward, frames
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.stages.validation.model import Axes, KeyPoses, Section
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
@@ -171,7 +172,7 @@ def _label(axes: PlotAxes, points: Iterable[tuple[int, np.ndarray]], colour: str
 
 def _short(source: str) -> str:
     """A source's title, which is what stands before a colon."""
-    return source.split(":")[0]
+    return re.split("[:：]", own_title(source))[0]
 
 
 AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(18.0)

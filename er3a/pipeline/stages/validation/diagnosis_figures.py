@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
 from er3a.pipeline.messages.diagnosis import both, level
-from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import joined, say, sentence
+from er3a.pipeline.messages.language import N_, own_title, tr
+from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.stages.validation.model import (
     Calibrated,
     Corrections,
@@ -106,8 +106,8 @@ def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals, own_claims: 
 
 def _measured_against(diagnosis: SetDiagnosis) -> str:
     """What residuals are measured against, and what of that is no evidence."""
-    own = [title for title in diagnosis.against if title in diagnosis.from_table]
-    others = [title for title in diagnosis.against if title not in own]
+    own = [own_title(title) for title in diagnosis.against if title in diagnosis.from_table]
+    others = [own_title(title) for title in diagnosis.against if title not in diagnosis.from_table]
     told = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
     if own:
         template = (
@@ -163,7 +163,7 @@ def residual_figure(rows: Residuals) -> Figure:
     axes.plot(after, at, "D", color=MODEL, markersize=5, label=tr("with the best hypothesis corrected"))
     axes.plot(rows.uncertainty, at, "|", color=INK, markersize=13, label=tr("uncertainty of the reference"))
     axes.set_xscale("log")
-    axes.set_yticks(at, [f"{say(subject)} ({unit})" for subject, unit in zip(rows.subject, rows.unit)])
+    axes.set_yticks(at, [bracketed(say(subject), tr(unit)) for subject, unit in zip(rows.subject, rows.unit)])
     axes.set_ylim(-0.7, len(rows) - 0.3)
     axes.set_xlim(LEAST_DRAWN / 1.5, 2 * max(before.max(), after.max()))
     axes.grid(axis="y", visible=False)

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import TableEvidence
@@ -195,10 +195,9 @@ def _plain(value: float) -> str:
 
 
 def _row(each: EntryEvidence) -> list[str]:
-    unit = f" {each.unit}" if each.unit else ""
     return [
         each.entry,
-        _value(each) + unit,
+        with_unit(_value(each), each.unit),
         f"{MARKS[each.status]} {_status(each.status)}",
         _interval(each) if each.interval and each.status != "gauge" else "–",
         _tool_off(each),
@@ -216,13 +215,13 @@ def _off_row(each: EntryEvidence) -> list[str]:
         return [link, _value(each), "–", "–", *told]
     if column_of(each.entry) == "direction":
         return [link, _signed(each.value, 0), _signed(each.interval[0], 0), tr("turns the other way"), *told]
-    stated = f"{_value(each)} {each.unit}"
+    stated = with_unit(_value(each), each.unit)
     if each.at_least:
         return [link, stated, _interval(each), "–", *told]
     low, high = each.interval
     middle, half = (low + high) / 2, (high - low) / 2
-    supported = f"{fixed(middle, 2)} ± {fixed(half, 2)} {each.unit}"
-    return [link, stated, supported, f"{_signed(each.value - middle, 2)} {each.unit}", *told]
+    supported = with_unit(f"{fixed(middle, 2)} ± {fixed(half, 2)}", each.unit)
+    return [link, stated, supported, with_unit(_signed(each.value - middle, 2), each.unit), *told]
 
 
 def _signed(value: float, decimals: int) -> str:
@@ -247,8 +246,8 @@ def _interval(each: EntryEvidence) -> str:
     if each.status in ("consistent", "open"):
         return tr("anything")
     if each.at_least:
-        return tr("at least {low} to {high} {unit}", low=low, high=high, unit=each.unit)
-    return tr("{low} to {high} {unit}", low=low, high=high, unit=each.unit)
+        return tr("at least {low} to {high}", low=low, high=with_unit(high, each.unit))
+    return tr("{low} to {high}", low=low, high=with_unit(high, each.unit))
 
 
 def _off(mm: float, deg: float) -> str:

@@ -11,11 +11,11 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import decision
-from er3a.pipeline.messages.references import CHECK_KINDS
+from er3a.pipeline.messages.references import CHECK_KINDS, GRADE_NAMES
 from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADE_NAMES, GRADES, GROUPS, counted_checks
+from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.arm_figures import axis_deviation, link_frames, side_view, workspace_drawing
 from er3a.pipeline.stages.validation.diagnosis_figures import (
@@ -105,7 +105,7 @@ def group_rows(checks: Iterable[Judged]) -> list[GroupRow]:
                     status=status,
                     counts=(counted["pass"], counted["fail"], counted["conflict"]),
                     worst=say(worst.subject),
-                    difference=f"{_value(worst.difference, worst)} {worst.unit}".strip(),
+                    difference=with_unit(_value(worst.difference, worst), worst.unit),
                 )
             )
     return rows
@@ -116,10 +116,10 @@ def check_row(check: Judged) -> list[str]:
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
     if isinstance(check, ReferenceCheck):
         grade = word("grade", GRADE_NAMES, check.grade)
-        source = sentence("graded", own_source=check.source, grade=grade)
+        source = sentence("graded", own_source=own_title(check.source), grade=grade)
     else:
         source = tr("the model itself")
-    return [say(check.subject), *values, f"{check.tolerance:g}", check.unit, source]
+    return [say(check.subject), *values, f"{check.tolerance:g}", tr(check.unit), source]
 
 
 def _value(value: float, check: Check) -> str:
@@ -131,7 +131,7 @@ def _value(value: float, check: Check) -> str:
 
 def blank_row(check: Unjudged) -> list[str]:
     """What is not judged: its name, the model's value, the set, and why."""
-    measured = f"{_value(check.measured, check)} {check.unit}" if check.measured is not None else "–"
+    measured = with_unit(_value(check.measured, check), check.unit) if check.measured is not None else "–"
     return [say(check.subject), measured, check.reference_set or "–", say(check.note)]
 
 
@@ -312,7 +312,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         deviation=_deviation_picture(drawn) if len(drawn) else None,
         drawing=_drawing_picture(results.section, labels, summary) if len(labels) else None,
         labels=_label_rows(labels, judged),
-        table_source=source and (source.source, word("grade", GRADES, source.grade)),
+        table_source=source and (own_title(source.source), word("grade", GRADES, source.grade)),
         convention=word("convention", CONVENTIONS, robot.convention),
         grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
     )

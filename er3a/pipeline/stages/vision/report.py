@@ -13,9 +13,16 @@ from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import joined, listed, say, word
-from er3a.pipeline.messages.vision import FIGURES, METHODS, correction_verdict, direction_word, pose_words
+from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
+from er3a.pipeline.messages.vision import (
+    DIRECTION_STATUS,
+    FIGURES,
+    METHODS,
+    correction_verdict,
+    direction_word,
+    pose_words,
+)
 from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, player, player_style
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -276,7 +283,7 @@ def _pose_rows(pose: PoseEstimate) -> list[list[str]]:
     ]
     names = (tr("roll"), tr("pitch"), tr("yaw"))
     turns = [
-        [f"{name} (°)", fixed(value, 4), tr("± {half} about {axis}", half=fixed(half, 4), axis=axis)]
+        [bracketed(name, "°"), fixed(value, 4), tr("± {half} about {axis}", half=fixed(half, 4), axis=axis)]
         for name, value, half, axis in zip(names, pose.rpy_deg, pose.half_width_deg, AXES)
     ]
     return [*shifts, *turns]
@@ -314,7 +321,7 @@ def _disagreement(found: CalibrationResult) -> str:
         "Outside the 95 % intervals: {names}. Closed-form methods weight all samples and coordinates equally, "
         "and most solve for the rotation first, so its error enters the position; the maximum-likelihood pose "
         "weights each coordinate by its standard deviation.",
-        names=", ".join(off),
+        names=joined(off, ", "),
     )
     return joined([weights, why], " ")
 
@@ -325,7 +332,7 @@ def _directions(found: CalibrationResult) -> list[list[str]]:
             direction_word(each),
             tr("fails") if each.rms_mm is None else number(each.rms_mm, 3),
             tr("fails") if each.rms_deg is None else number(each.rms_deg, 3),
-            say(each).partition(": ")[2],
+            word("vision.direction_status", DIRECTION_STATUS, each.status),
         ]
         for each in found.directions
     ]
@@ -335,7 +342,7 @@ def _corrections(found: TableResult) -> list[list[str]]:
     return [
         [
             each.entry,
-            f"{fixed(each.nominal, 3)} {each.unit}",
+            with_unit(fixed(each.nominal, 3), each.unit),
             fixed(each.correction, 4),
             f"± {fixed(each.half_width, 4)}",
             tr("differs") if abs(each.correction) > each.half_width else "",
@@ -382,7 +389,7 @@ def _grasp(each: ObjectResult) -> list[str]:
         _listed(grasp.tool_xyz_mm),
         panel_link(grasp.q_before_deg, _listed(grasp.q_before_deg)),
         panel_link(grasp.q_deg, _listed(grasp.q_deg)),
-        f"{near} ({say(grasp.nearest)})" if grasp.nearest else near,
+        bracketed(near, say(grasp.nearest)) if grasp.nearest else near,
         tr("straight") if not grasp.corners else tr("planned, {corners} corners", corners=grasp.corners),
         fixed(grasp.duration_s, 1),
         fixed(grasp.limit_margin_deg, 0),
