@@ -125,7 +125,8 @@ def summary_line(checked: Sequence[CheckedFile]) -> str:
     """How many motions there are by verdict, and how long the programs take."""
     verdicts = [verdict for each in checked if each.check for verdict in each.check.verdicts]
     count = {level: sum(verdict.level == level for verdict in verdicts) for level in WORDS}
-    parts = [f"{len(verdicts)} motion instructions: {count['pass'] + count['note']} pass"]
+    parts = [f"{len(verdicts)} motion instructions: {count['pass']} pass"]
+    parts += [f"{count['note']} checked in part (see the notes)"] if count["note"] else []
     parts += [f"{count['caution']} caution", f"{count['fail']} fail"]
     unread = sum(each.check is None for each in checked)
     return ", ".join(parts) + (f"; {unread} of {len(checked)} files could not be read" if unread else "")
