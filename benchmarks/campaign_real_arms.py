@@ -23,7 +23,7 @@ def table() -> str:
         "# Two real arms",
         "",
         "A Universal Robots UR5 (1000 positions) and a Barrett WAM (216, seven joints, cable drives), measured by a",
-        "laser tracker; [where the data come from](../../data/measurements/README.md). Written by `make campaigns",
+        "laser tracker; `data/measurements/README.md` says where the data come from. Written by `make campaigns",
         f"ARGS=real_arms`; seed {SEED}.",
         "",
         "## Errors at poses that a fit has not seen",

@@ -81,7 +81,7 @@ return [...document.querySelectorAll(".cells > li")].filter((cell) => {
 }).map((cell) => cell.innerText);
 """
 STATUSES = """
-const statuses = (cells) => [...cells.querySelectorAll(".badge")].map((badge) => badge.classList[1]);
+const statuses = (cells) => [...cells.children].map((cell) => cell.querySelector(".badge").classList[1]);
 return [...document.querySelectorAll(".cells")].map(statuses);
 """
 

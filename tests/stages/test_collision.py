@@ -14,7 +14,7 @@ from er3a.collision.along import clearance
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.say import say, say_all
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results, read_verdict
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
@@ -152,7 +152,7 @@ def test_shapes_in_error_end_no_other_stage_and_are_never_a_pass(stage, tmp_path
     verdict = read_verdict(tmp_path / stage, STAGES[stage])
     assert verdict.status == "caution"
     assert [pair.second for pair in verdict.unexamined] == [3, 4, 6]
-    assert say_all(verdict.findings[1:]) == (
+    assert say(verdict.findings[1]) == (
         "Collisions not examined, because the shapes overlap in every joint vector tried (1024): "
         "base and link 3, base and link 4, base and link 6."
     )

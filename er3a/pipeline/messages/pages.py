@@ -193,7 +193,7 @@ def next_step(
             tr("Next: see why {stage} fails, and what to do about it.", stage=title), f"{robot}/{stage}.html"
         )
     if table == "no_reference":
-        text = tr("Next: gather the manufacturer's data, or compare the table with a URDF: er3a compare TABLE URDF.")
+        text = tr("Next: gather the manufacturer's data, or compare the table with a URDF by er3a compare.")
         return NextStep(text, validation)
     return NextStep(tr("Next: {what}.", what=measurement), validation) if measurement else None
 
