@@ -56,7 +56,7 @@ kinematics beforehand. *Named*: exactly the wrong entries, or of those that no d
 PUBLISHED = """
 ## Published tables against URDFs
 
-Tables as their packages publish them, against URDFs that others publish. What differs is what `er3a compare TABLE URDF`
+Tables as their packages publish them, against URDFs that others publish. What differs is what `er3a compare`
 says. The last two columns are computed without er3a (`testing/published_tables.py`): how far the corrected table's
 flange is from the URDF's, and how far the published one stays off, whatever base, flange and zeros are chosen.
 
