@@ -18,6 +18,14 @@ FOUNDATIONS: Mapping[str, str] = {
     "no_reference": N_("This D-H table was compared with no data: these results are only as good as the table."),
     "not_computed": N_("This D-H table was not validated: these results are only as good as the table."),
 }
+GRADE_NAMES = {
+    "official": N_("official"),
+    "measured": N_("measured"),
+    "cad": N_("cad"),
+    "export": N_("export"),
+    "claim": N_("claim"),
+    "inferred": N_("inferred"),
+}
 GLOSSARY = {
     N_("branch"): N_("one choice of shoulder, elbow and wrist among the joint angles that bring the tool to a pose"),
     N_("self-motion"): N_("a continuum of solutions: joints that move while the tool stays on its target"),

@@ -43,14 +43,6 @@ SEGMENT_WORDS = {"upper_arm": N_("upper arm from the vertical"), "forearm": N_("
 LABELS = {"abs_x": "|x|"}
 check_complete("words for groups of references", GROUPS, GROUP_WORDS)
 check_complete("words for groups that a set lacks", GROUPS, MISSING_WORDS)
-GRADE_NAMES = {
-    "official": N_("official"),
-    "measured": N_("measured"),
-    "cad": N_("cad"),
-    "export": N_("export"),
-    "claim": N_("claim"),
-    "inferred": N_("inferred"),
-}
 STATUS_WORDS = {
     "settled": N_("settled"),
     "weak": N_("weak"),

@@ -26,8 +26,7 @@ from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_text
-from er3a.pipeline.messages.pages import Caveat, caveat, glossary
-from er3a.pipeline.messages.references import GRADE_NAMES
+from er3a.pipeline.messages.pages import GRADE_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, say_all, word
 from er3a.pipeline.results import Provenance, Stored, read_status
 from er3a.pipeline.stages.registry import STAGES

@@ -12,8 +12,8 @@ from markupsafe import Markup
 
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
-from er3a.pipeline.messages.pages import decision
-from er3a.pipeline.messages.references import CHECK_KINDS, GRADE_NAMES
+from er3a.pipeline.messages.pages import GRADE_NAMES, decision
+from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
