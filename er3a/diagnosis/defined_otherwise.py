@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +33,8 @@ from er3a.references.predict import predict_tables
 from er3a.references.quantities import MM, ZERO_POSE, AxisAngle, AxisCoordinate, Limit, PointCoordinate, PoseOutside
 from er3a.references.reference import Reference, expected_of, quantities_of
 from er3a.robots.robot import Robot
+
+Misfit = Callable[[Robot], Reals]
 
 MOST_WRONG = 3
 LEAST_LENGTH, LEAST_ANGLE = 1e-5, math.radians(1e-3)
@@ -181,7 +183,7 @@ def _changed(robot: Robot, wrong: Sequence[tuple[str, int]], x: Reals) -> Robot:
     return robot.replace(base=base, flange=robot.flange @ translation(*x[6:9]), offset=offset)
 
 
-def _fitted(robot: Robot, wrong, off, meets: float) -> Robot:  # type: ignore[no-untyped-def]
+def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit, meets: float) -> Robot:
     """Gauss and Newton's steps from an arm that nearly meets the references."""
     count = 9 + max(robot.joints - 2, 0) + len(wrong)
     for _ in range(ROUNDS):
@@ -189,14 +191,15 @@ def _fitted(robot: Robot, wrong, off, meets: float) -> Robot:  # type: ignore[no
         if np.abs(here).max() < 0.1 * meets:
             break
         slopes = np.stack([(off(_changed(robot, wrong, STEP * row)) - here) / STEP for row in np.eye(count)], axis=1)
-        ahead = _changed(robot, wrong, -np.linalg.lstsq(slopes, here, rcond=1e-9)[0])
+        step = -np.asarray(np.linalg.lstsq(slopes, here, rcond=1e-9)[0], dtype=np.float64)
+        ahead = _changed(robot, wrong, step)
         if np.linalg.norm(off(ahead)) > 0.999 * np.linalg.norm(here):
             break
         robot = ahead
     return robot
 
 
-def _plain(given: Robot, fitted: Robot, off, meets: float, tolerances: Tolerances) -> Robot:  # type: ignore[no-untyped-def]
+def _plain(given: Robot, fitted: Robot, off: Misfit, meets: float, tolerances: Tolerances) -> Robot:
     """The fitted arm with as much as can be left as the table has it, and zeros that are whole degrees written so."""
 
     def kept(arm: Robot, simpler: Robot) -> Robot:

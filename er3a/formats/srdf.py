@@ -34,3 +34,8 @@ def export_srdf(robot: Robot) -> str:
         ElementTree.SubElement(root, "disable_collisions", link1=row.first, link2=row.second, reason=REASONS[row.state])
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
+    """Pairs of links that the SRDF disables because their shapes can't be right."""
+    return tuple(f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if row.state == "overlaps")

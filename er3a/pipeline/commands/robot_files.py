@@ -77,13 +77,15 @@ def export_urdf(
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
-    from er3a.formats.srdf import export_srdf
+    from er3a.formats.srdf import export_srdf, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
 
     arm = load_robot(robot)
     texts = {output: urdf_text(arm, output.with_name(f"{output.stem}_meshes"))}
     if srdf is not None:
         texts[srdf] = export_srdf(arm)
+        for pair in pairs_not_checked(arm):
+            print_note(f"{srdf}: {pair} overlap in every joint vector tried; their shapes are in error, not checked")
     for file, text in texts.items():
         write_atomically(file, partial(Path.write_text, data=text, encoding="utf-8"))
         print(f"{file}: written")

@@ -404,7 +404,7 @@ def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
 
     A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
     to the robot or has not been computed yet, are skipped; a caution passes and tells what it found. What fails as it
-    is meant to is no failure, and is told as a demonstration; what the study expects otherwise is a failure.
+    is meant to is no failure, and counts as a demonstration; what the study expects otherwise is a failure.
     """
     root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
     for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
@@ -423,17 +423,17 @@ def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
     text = _NO_XML.sub("?", verdict.text)
     if outcome := _outcome(verdict):
         ElementTree.SubElement(case, outcome, message=text, type=verdict.code)
-    told = []
+    lines = []
     if verdict.is_demonstration:
-        told.append(f"demonstration, {verdict.status} as expected: {text}")
+        lines.append(f"demonstration, {verdict.status} as expected: {text}")
     elif verdict.status == "caution":
-        told.append(f"caution: {text}")
+        lines.append(f"caution: {text}")
     if verdict.demonstrations:
-        told.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
+        lines.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
     if verdict.is_otherwise:
-        told.append(f"expected: {verdict.expected}")
-    if told:
-        ElementTree.SubElement(case, "system-out").text = "\n".join(told)
+        lines.append(f"expected: {verdict.expected}")
+    if lines:
+        ElementTree.SubElement(case, "system-out").text = "\n".join(lines)
 
 
 def _outcome(verdict: StageVerdict) -> str | None:
