@@ -501,10 +501,10 @@ rows.write(Path("rows.parquet"))
 assert DiagramRows.read(Path("rows.parquet").read_bytes()) == rows
 assert pq.read_schema("rows.parquet").field("weight_n").metadata[b"unit"] == b"N"
 assert "weight of the load at rest" in data_dictionary()
-for code in ("en", "zh"):
+for code, label in (("en", "weight (N)"), ("zh", "weight（N）")):
     language.use(code)
     (axes,) = weight_figure(rows).axes
-    assert axes.get_ylabel() == "weight (N)"
-assert axes.get_xlabel().endswith("(mm)")
+    assert axes.get_ylabel() == label
+assert axes.get_xlabel().endswith("（mm）")
 """
     carry_out("A column, and its plot.", edits, script)
