@@ -18,9 +18,14 @@ class LinkPair:
     code: Literal["link_pair"] = "link_pair"
 
     @property
+    def names(self) -> tuple[str, str]:
+        """Of both bodies."""
+        return link_label(self.first), link_label(self.second)
+
+    @property
     def label(self) -> str:
         """For columns of text."""
-        return f"{link_label(self.first)}/{link_label(self.second)}"
+        return "/".join(self.names)
 
 
 @dataclass(frozen=True)
@@ -32,9 +37,14 @@ class LinkAndSolid:
     code: Literal["link_and_solid"] = "link_and_solid"
 
     @property
+    def names(self) -> tuple[str, str]:
+        """Of both bodies."""
+        return link_label(self.link), self.solid
+
+    @property
     def label(self) -> str:
         """For columns of text."""
-        return f"{link_label(self.link)}/{self.solid}"
+        return "/".join(self.names)
 
 
 @dataclass(frozen=True)
@@ -46,9 +56,14 @@ class CarriedAndLink:
     code: Literal["carried_and_link"] = "carried_and_link"
 
     @property
+    def names(self) -> tuple[str, str]:
+        """Of both bodies."""
+        return link_label(self.link), self.carried
+
+    @property
     def label(self) -> str:
         """For columns of text."""
-        return f"{link_label(self.link)}/{self.carried}"
+        return "/".join(self.names)
 
 
 @dataclass(frozen=True)
@@ -60,9 +75,14 @@ class CarriedAndSolid:
     code: Literal["carried_and_solid"] = "carried_and_solid"
 
     @property
+    def names(self) -> tuple[str, str]:
+        """Of both bodies."""
+        return self.carried, self.solid
+
+    @property
     def label(self) -> str:
         """For columns of text."""
-        return f"{self.carried}/{self.solid}"
+        return "/".join(self.names)
 
 
 Pair = LinkPair | LinkAndSolid | CarriedAndLink | CarriedAndSolid

@@ -8,7 +8,6 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
-from er3a.pipeline.viewing.figures import WORDS
 from testing import chromium
 from tests.browser.pages import PAGES_WITH_EACH_CONTROL, STAGE_PAGES, STAGE_PAGES_OF_EACH_KIND
 
@@ -247,11 +246,18 @@ def shown_number(text: str) -> float | None:
         return None
 
 
+PAINTED = """const canvas = document.querySelector("#turning canvas");
+const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+return data.filter((value, i) => i % 4 === 3 && value > 0).length;"""
+
+
 @pytest.mark.parametrize("page", ["er3_600/workspace.html", "er3_600/trajectory.html"])
-def test_the_3d_figure_offers_nothing_that_needs_the_network(browser, small_study, page):
+def test_the_figure_in_space_is_drawn_and_leaves_out_what_it_is_asked_to(browser, small_study, page):
     browser.get((small_study.folder / "reports" / page).as_uri())
     figure = browser.find_element(By.ID, "turning")
-    browser.execute_script("arguments[0].scrollIntoView()", figure)
-    WebDriverWait(browser, PAUSE).until(lambda _: figure.find_elements(By.CSS_SELECTOR, ".modebar-btn"))
-    buttons = figure.find_elements(By.CSS_SELECTOR, ".modebar-btn")
-    assert {button.get_attribute("data-title") for button in buttons} == set(WORDS)
+    WebDriverWait(browser, PAUSE).until(lambda _: figure.get_attribute("data-drawn") is not None)
+    painted = browser.execute_script(PAINTED)
+    checks = figure.find_elements(By.CSS_SELECTOR, ".key input")
+    assert len(checks) > 1
+    browser.execute_script("arguments[0].click()", checks[0])
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.execute_script(PAINTED) < painted)

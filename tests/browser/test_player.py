@@ -11,7 +11,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import frames
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style, stretch
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player, stretch
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.page import render
 from testing.small_study import ROOT
@@ -19,7 +19,7 @@ from testing.small_study import ROOT
 pytestmark = pytest.mark.long
 
 TEMPLATE = """{% extends "base.html.j2" %}
-{% block head %}{{ player_style }}{% endblock %}
+{% block head %}{{ drawing_head }}{% endblock %}
 {% block title %}Test{% endblock %}
 {% block header %}<h1>Test page</h1>{% endblock %}
 {% block content %}{{ player }}<p>{{ link }}</p>
@@ -28,10 +28,10 @@ xmlns='http://www.w3.org/2000/svg' width='400' height='200'/%3E"></figure>
 <p class="stretch" {{ stretch }}>bent</p><p style="height: 300vh"></p>{% endblock %}"""
 T = np.linspace(0.0, 2.0, 50)
 READ = """const [i, done] = arguments;
-import("er3a/poses").then(({ decodePoses, poseBetween }) => {
-  const { motions, table } = JSON.parse(document.getElementById("player-data").textContent);
-  const [motion] = motions;
-  done(poseBetween(motion.times, decodePoses(motion.poses, motion.times.length, table.a.length + 1), motion.times[i]));
+Promise.all([import("er3a/kinematics"), import("er3a/values")]).then(([kinematics, shown]) => {
+  const { motions: [{ times, values }], table } = JSON.parse(document.getElementById("player-data").textContent);
+  const q = shown.valuesAt(times, shown.decodeValues(values[0], times.length), times[i]);
+  done(shown.posesOf({ table, links: kinematics.constantLinks(table) }, q).slice(1));
 });"""
 
 
@@ -53,7 +53,7 @@ def page(browser, tmp_path):
         command=None,
         provenance=Provenance(inputs=(), code="0" * 64),
         player=player(robot, [bow(robot), still, way], scene),
-        player_style=player_style(),
+        drawing_head=drawing_head(),
         link=moment("bow", 1.25, "the event"),
         stretch=stretch("way", 2.0, 4.0),
     )
@@ -155,7 +155,7 @@ def test_a_joint_beyond_its_limit_is_marked(browser, tmp_path):
     q[1, 2] = robot.upper[2] + np.radians(35)
     far = PlayedMotion("far", "It leaves a limit.", np.array([0.0, 1.0]), q)
     (tmp_path / "page.html.j2").write_text(TEMPLATE, encoding="utf-8")
-    given = {"player": player(robot, [far]), "player_style": player_style(), "stretch": stretch("far", 0.0, 1.0)}
+    given = {"player": player(robot, [far]), "drawing_head": drawing_head(), "stretch": stretch("far", 0.0, 1.0)}
     link, origin = moment("far", 1.0, "there"), Provenance(inputs=(), code="0" * 64)
     output = tmp_path / "page.html"
     render(tmp_path / "page.html.j2", output, command=None, provenance=origin, link=link, **given)

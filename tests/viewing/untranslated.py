@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib.text
-import plotly.graph_objects as go
 import pytest
 import yaml
 from babel.messages.pofile import read_po
@@ -37,7 +36,6 @@ NAMES = re.compile(
     rf"|\b[\w-]+\.(?:{'|'.join(PROGRAM_SUFFIXES)})\b|\b[A-Z_]{{4,}}\[\d+\]"  # files and frames of programs
 )
 SPOKEN = {"alt", "aria-label", "title", "placeholder", "data-differs"}
-FIGURE_TEXTS = {"text", "name", "title", "label", "hovertemplate", "ticktext", "hovertext"}
 
 
 class Wide(gettext.NullTranslations):
@@ -84,20 +82,14 @@ def catalogue_texts() -> set[str]:
 def wide_letters() -> Iterator[list[str]]:
     """Views written in here are in wide letters; the list collects the texts of their figures, which are not drawn."""
     shown: list[str] = []
-    to_json = go.Figure.to_json
 
     def saved(canvas, *_, **__):
         shown.extend(text.get_text() for text in canvas.figure.findobj(matplotlib.text.Text) if text.get_visible())
-
-    def drawn(figure, *arguments, **named):
-        shown.extend(_texts_of_figure(figure.to_dict()))
-        return to_json(figure, *arguments, **named)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(language, "_catalogue", Wide(catalogue_texts()))
         patch.setattr(language, "_language", "zh")
         patch.setattr(FigureCanvasSVG, "print_svg", saved)
-        patch.setattr(go.Figure, "to_json", drawn)
         yield shown
 
 
@@ -157,8 +149,10 @@ class PageTexts(HTMLParser):
 
 
 def _words_of(data: Any) -> list[str]:
-    """Texts that a page hands to its scripts: all below a key ``words`` (fields left out), or all if there are no
-    further levels."""
+    """Texts that a page hands to its scripts: names of what a figure in space shows, all below a key ``words`` (fields
+    left out), or all if there are no further levels."""
+    if "groups" in data:
+        return [layer["name"] for group in data["groups"] for layer in group["layers"]]
     if "words" in data:
         return [re.sub(r"\{\w+\}", " ", text) for text in _leaves(data["words"], keys=False)]
     return list(data.values()) if all(isinstance(value, str) for value in data.values()) else []
@@ -175,14 +169,3 @@ def _leaves(data: Any, keys: bool) -> Iterator[str]:
     elif isinstance(data, list):
         for value in data:
             yield from _leaves(value, keys)
-
-
-def _texts_of_figure(data: Any, key: str = "") -> Iterator[str]:
-    if isinstance(data, dict):
-        for name, value in data.items():
-            yield from _texts_of_figure(value, key if name in ("text", "label") and key else name)
-    elif isinstance(data, (list, tuple)):
-        for value in data:
-            yield from _texts_of_figure(value, key)
-    elif isinstance(data, str) and key in FIGURE_TEXTS:
-        yield re.sub(r"%\{[^}]*\}|<[^>]*>", " ", data)

@@ -23,7 +23,7 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import event_word
 from er3a.pipeline.messages.workspace import change_text
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, player, player_style
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, player
 from er3a.pipeline.results import Provenance, input_records, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathChecks
@@ -121,7 +121,7 @@ def _write(study: Study, results: Path, numbers: ArticleNumbers, output: Path, o
         drawn=drawn,
         of_section={"3.2": ["wrist"], "5.2": ["move", "line", "measures"]},
         player=_player(study, results, tables),
-        player_style=player_style(),
+        drawing_head=drawing_head(),
     )
 
 

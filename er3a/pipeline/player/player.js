@@ -1,17 +1,17 @@
 /**
  * Plays motions of an arm on a page: a time bar, play and step, events, and a cursor in every plot over time.
  *
- * Poses come with the page, so nothing is computed here but what lies between two of them. Any element of the page may
- * have `data-play="MOTION"` and `data-t="SECONDS"`: it then leads to that moment, and is marked as `now` from
+ * Joint values come with the page; what lies between two of them is on a line. Any element of the page may have `data-play="MOTION"` and `data-t="SECONDS"`: it then leads to that moment, and is marked as `now` from
  * `data-from` to it. A plot is a figure with `data-panels`, a list of `[left, bottom, right, top, t0, t1, MOTION]` in
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
 import { add, column, scaled, translation } from "er3a/algebra";
+import { constantLinks } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
-import { decodePoses, decodeValues, poseBetween, valuesBetween } from "er3a/poses";
 import { eyeOf, Picture } from "er3a/scene";
-import { armSolids, sceneSolids } from "er3a/solids";
+import { armSolids, recoloured, sceneSolids } from "er3a/solids";
+import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
 const WORLD = translation(0, 0, 0);
 const place = document.getElementById("player");
@@ -20,8 +20,10 @@ const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, told] = ["arm", "motion", "time", "clock", "told"].map(part);
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
-const solids = [...armSolids(table, data.size, data.colours, data.pieces), ...sceneSolids(data.carried, table.a.length + 1)];
-const beside = data.beside.map(({ table, pieces }) => ({ table, solids: armSolids(table, data.size, data.colours, pieces) }));
+const arms = [data, ...data.beside].map(({ table, pieces }) => {
+  return { table, links: constantLinks(table), solids: armSolids(table, data.size, data.colours, pieces) };
+});
+arms[0].solids.push(...sceneSolids(data.carried, table.a.length + 1));
 const surroundings = sceneSolids(data.scene);
 const picture = new Picture(canvas);
 const floor = data.floor ?? column(table.base, 3)[2];
@@ -33,7 +35,7 @@ let last = 0;
 let awaited = false;
 
 const orbit = new Orbit(canvas, data.target, 0.75 * data.width, refresh);
-if (beside.length) orbit.turn(0.7, 0); // arms that stand beside each other along y
+if (arms.length > 1) orbit.turn(0.7, 0); // arms that stand beside each other along y
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
 const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
   return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };
@@ -42,9 +44,7 @@ const stretches = [...document.querySelectorAll("[data-from]")];
 
 function prepared(motion) {
   const count = motion.times.length;
-  const poses = decodePoses(motion.poses, count, table.a.length + 1);
-  const others = motion.beside.map((text, k) => decodePoses(text, count, data.beside[k].table.a.length + 1));
-  return { ...motion, poses, others, values: decodeValues(motion.values, count, motion.step) };
+  return { ...motion, values: motion.values.map((text) => decodeValues(text, count)) };
 }
 
 const start = () => motion.times[0];
@@ -88,16 +88,20 @@ function frame(now) {
   if (playing) refresh();
 }
 
+const isNow = ({ t: from, until }) => t >= from - 1e-9 && t <= until + 1e-9;
+
 function draw() {
-  const poses = [table.base, ...poseBetween(motion.times, motion.poses, t)];
-  const others = beside.map((arm, k) => ({ ...arm, poses: [arm.table.base, ...poseBetween(motion.times, motion.others[k], t)] }));
+  const touching = new Set(motion.events.filter(isNow).flatMap((event) => event.bodies));
+  const seen = (solids) => recoloured(solids, touching, data.colours.touching);
+  const shown = arms.map((arm, k) => {
+    return { solids: seen(arm.solids), poses: posesOf(arm, valuesAt(motion.times, motion.values[k], t)), ghost: false };
+  });
   const { page } = orbit;
   picture.fit();
   picture.begin(eyeOf(orbit));
   picture.floor(column(table.base, 3), data.size / 10, floor, page.grid);
-  for (const arm of [{ solids, poses }, ...others]) picture.shadow(arm.solids, arm.poses, floor, page.grid);
-  const arms = [{ solids, poses }, ...others].map(({ solids, poses }) => ({ solids, poses, ghost: false }));
-  picture.solids([{ solids: surroundings, poses: [WORLD], ghost: false }, ...arms]);
+  for (const { solids, poses } of shown) picture.shadow(solids, poses, floor, page.grid);
+  picture.solids([{ solids: seen(surroundings), poses: [WORLD], ghost: false }, ...shown]);
   for (const trail of motion.trails) picture.line(trail, page.ink, 1.5);
   for (const { way, status } of motion.events) if (way.length) picture.line(way, data.colours[status], 3);
   for (const { from, to, text, t0, t1 } of motion.marks ?? []) {
@@ -105,7 +109,7 @@ function draw() {
     picture.line([from, to], data.colours.mark, 3);
     picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
   }
-  for (const arm of arms) toolFrame(arm.poses.at(-1));
+  for (const { poses } of shown) toolFrame(poses.at(-1));
   for (const { text, at } of data.signs) picture.word(text, at, page.ink, page.halo);
 }
 
@@ -121,8 +125,7 @@ function tell() {
   const [said, digits] = motion.rate ? [words.points, 0] : [words.clock, 3];
   clock.textContent = said.replace("{t}", fixed(t, digits)).replace("{end}", fixed(end(), digits));
   bar.setAttribute("aria-valuetext", clock.textContent);
-  const near = motion.events.filter((event) => t >= event.t - 1e-9 && t <= event.until + 1e-9);
-  const text = near.map((event) => event.text).join("; ") || motion.text;
+  const text = motion.events.filter(isNow).map((event) => event.text).join("; ") || motion.text;
   show(told, text);
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
@@ -134,7 +137,7 @@ function tell() {
 
 /** Joint values with their margins; the least of those in deg is marked, and of those in mm. */
 function tellJoints() {
-  const values = valuesBetween(motion.times, motion.values, t);
+  const values = valuesAt(motion.times, motion.values[0], t).map((value, j) => value * (table.slides[j] ? 1000 : 180 / Math.PI));
   const rooms = data.joints.map(({ lower, upper }, i) => (lower === null ? Infinity : Math.min(values[i] - lower, upper - values[i])));
   const least = new Map();
   data.joints.forEach(({ unit }, i) => (rooms[i] < (rooms[least.get(unit)] ?? Infinity) ? least.set(unit, i) : null));

@@ -1,4 +1,4 @@
-"""What a page's player is given: an arm, what stands around it, and its motions as poses that are only drawn."""
+"""What a page's player is given: an arm, what stands around it, and its motions as joint values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ _HERE = Path(__file__).parent
 MOST_FRAMES = 240
 UNTIMED_S = 8.0  # how long a motion without times is shown
 TRAIL_POINTS = 200
-MOST_STEPS = 32_000  # that the greatest joint value (deg or mm) of a motion is divided into
 MOST_FACES, FEWEST_CORNERS = 2000, 12  # of an arm, and of a convex piece
 SCENE_COLOUR = "#b9a78f"
 COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
@@ -66,17 +65,21 @@ WORDS = {
 
 @dataclass(frozen=True)
 class PlayedEvent:
-    """Something to be seen from ``t`` to ``until`` (s); ``status`` (``plain``, ``caution``, ``fail``) colours it."""
+    """Something to be seen from ``t`` to ``until`` (s); ``status`` (``plain``, ``caution``, ``fail``) colours it.
+
+    ``bodies`` (``base``, ``link_3``, names of solids) are red then.
+    """
 
     t: float
     until: float
     text: str
     status: str
+    bodies: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A line between two points (m), with a word, shown from ``t0`` to ``t1`` (s)."""
+    """A line between two points (m), a dot where they are one, with a word, shown from ``t0`` to ``t1`` (s)."""
 
     t0: float
     t1: float
@@ -114,7 +117,7 @@ def player(
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
 ) -> Markup:
-    """The player as HTML, one a page; empty where there is no motion.
+    """The player as HTML, one a page, whose head holds ``drawing_head``; empty where there is no motion.
 
     Parameters
     ----------
@@ -131,7 +134,6 @@ def player(
             words=words,
             motions=shown,
             data=_data(robot, shown, scene, words, beside, signs),
-            scripts=import_map([*(TEACH / f"{name}.js" for name in DRAWING), _HERE / "poses.js"]),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
@@ -147,9 +149,11 @@ def stretch(motion: str, t0: float, t1: float) -> Markup:
     return Markup('data-play="{}" data-from="{}" data-t="{}"').format(motion, t0, t1)
 
 
-def player_style() -> Markup:
-    """The player's style sheet, for a page's head."""
-    return Markup(f"<style>{(_HERE / 'player.css').read_text(encoding='utf-8')}</style>")
+def drawing_head() -> Markup:
+    """What the head of a page holds that has a player or a figure in space: their style sheet and their modules."""
+    style = (_HERE / "player.css").read_text(encoding="utf-8")
+    modules = import_map([*(TEACH / f"{name}.js" for name in DRAWING), _HERE / "values.js"])
+    return Markup("<style>{}</style>{}").format(Markup(style), modules)
 
 
 def _data(
@@ -170,7 +174,7 @@ def _data(
         "signs": [{"text": text, "at": at.tolist()} for text, at in zip(signs, bases)],
         "width": max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
         "target": (np.mean(bases, axis=0) + robot.base[:3, 2] * 0.35 * size).tolist(),
-        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, **COLOURS},
+        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, "touching": VERDICTS["fail"], **COLOURS},
         "axes": AXES,
         "floor": floor_of(scene),
         "scene": scene_data(scene.solids if scene else ()),
@@ -244,7 +248,7 @@ def scene_data(solids: Sequence[Solid]) -> list[dict[str, Any]]:
 
 def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:
     """An obstacle as the drawing code takes it."""
-    common = {"T": np.asarray(solid.T).tolist(), "colour": SCENE_COLOUR}
+    common = {"name": solid.name, "T": np.asarray(solid.T).tolist(), "colour": SCENE_COLOUR}
     if isinstance(solid, Box):
         return {"kind": "box", "size": np.asarray(solid.size).tolist(), **common}
     if isinstance(solid, Cylinder):
@@ -264,19 +268,14 @@ def _motion(robot: Robot, motion: PlayedMotion, beside: Sequence[Robot]) -> dict
     rows = _shown(motion)
     T = frames(robot, motion.q[rows])
     others = [frames(arm, q[rows]) for arm, q in zip(beside, motion.beside, strict=True)]
-    values = shown(robot, motion.q[rows])
-    step = float(np.abs(values).max()) / MOST_STEPS or 1.0
     apart = max(1, len(rows) // TRAIL_POINTS)
     return {
         "name": motion.name,
         "rate": None if motion.timed else max(1.0, float(motion.t[-1]) / UNTIMED_S),
         "text": motion.text,
         "times": np.round(motion.t[rows], 6).tolist(),
-        "poses": _packed(T),
-        "step": step,
-        "values": base64.b64encode(np.round(values / step).astype("<i2").tobytes()).decode("ascii"),
+        "values": [_packed(q[rows]) for q in (motion.q, *motion.beside)],
         "trails": [np.round(own[::apart, -1, :3, 3], 5).tolist() for own in (T, *others)],
-        "beside": [_packed(own) for own in others],
         "events": [
             asdict(event) | {"way": _way(event, motion.t[rows], T[:, -1, :3, 3])}
             for event in sorted(motion.events, key=lambda event: event.t)
@@ -288,11 +287,8 @@ def _motion(robot: Robot, motion: PlayedMotion, beside: Sequence[Robot]) -> dict
     }
 
 
-def _packed(T: Reals) -> str:
-    """Transforms (N, k, 4, 4) as positions and quaternions, for ``poses.js``."""
-    turns = scipy.spatial.transform.Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    poses = np.concatenate([T[..., :3, 3], turns.reshape(*T.shape[:2], 4)], axis=-1).astype("<f4")
-    return base64.b64encode(poses.tobytes()).decode("ascii")
+def _packed(q: Reals) -> str:
+    return base64.b64encode(q.astype("<f4").tobytes()).decode("ascii")
 
 
 def _way(event: PlayedEvent, t: Reals, points: Reals) -> list[list[float]]:

@@ -65,7 +65,6 @@ export class Clearance {
     const length = inMillimetres(Math.abs(distance));
     const told = touching ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
     write(element, fill(told, { distance: length, pair: pair.text }));
-    const links = touching ? pair.bodies.map((i) => this.clearance.bodies[i].link).filter((link) => link !== WORLD) : [];
-    return { from: found.from, to: found.to, text: deep ? "" : inMillimetres(distance), links };
+    return { from: found.from, to: found.to, text: deep ? "" : inMillimetres(distance), touching: touching ? pair.names : [] };
   }
 }

@@ -368,7 +368,7 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
             for b in range(len(layout.link))
         ],
         "pairs": [
-            {"bodies": [int(first), int(second)], "joined": bool(joined), "text": say(pair)}
+            {"bodies": [int(first), int(second)], "joined": bool(joined), "text": say(pair), "names": pair.names}
             for first, second, joined, pair in zip(layout.first, layout.second, layout.joined, found.pairs)
         ],
     }

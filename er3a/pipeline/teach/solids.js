@@ -58,6 +58,16 @@ function rail(table, before, k, radius, look) {
   return rod(k, ...rowRange(table, k).map((x) => moved(start, [0, 0, x])), radius, look);
 }
 
+/** The bodies of these names, `base`, `link_3` or those of solids, in another colour. */
+export const recoloured = (solids, names, colour) =>
+  names.size === 0
+    ? solids
+    : solids.map((solid) =>
+        names.has(solid.name ?? (solid.frame ? `link_${solid.frame}` : "base"))
+          ? { ...solid, faces: solid.faces.map((face) => ({ ...face, colour })) }
+          : solid,
+      );
+
 /** Middles (m, in the frame that the joint turns) of the joints' drums, and their half length. */
 export function drums(table, size) {
   const parts = linkParts(table);
@@ -112,7 +122,7 @@ export function sceneSolids(things, frame = 0) {
   const made = { box, cylinder, sphere, mesh };
   return things.map((thing) => {
     const solid = made[thing.kind](thing);
-    return { ...solid, frame, points: solid.points.map((point) => moved(thing.T, point)) };
+    return { ...solid, frame, name: thing.name, points: solid.points.map((point) => moved(thing.T, point)) };
   });
 }
 

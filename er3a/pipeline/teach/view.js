@@ -4,13 +4,11 @@ import { add, column, moved, norm, scaled, subtract, translation, turned } from 
 import { frames, tableFrames } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
 import { eyeOf, Picture } from "er3a/scene";
-import { armSolids, drums, sceneSolids } from "er3a/solids";
+import { armSolids, drums, recoloured, sceneSolids } from "er3a/solids";
 
 const WORLD = translation(0, 0, 0);
 const TOUCHING = "#d1242f";
 const FRAME_COLOURS = ["#d62728", "#2ca02c", "#1f77b4"]; // of x, y, z
-
-const coloured = (solid, colour) => ({ ...solid, faces: solid.faces.map((face) => ({ ...face, colour })) });
 
 /** Where to look, and about how long the arm is from there (m). */
 function lookedAt(table, links, size) {
@@ -38,7 +36,7 @@ export class ArmView extends Orbit {
 
   /**
    * Draws the arm at joint values `q`, a pale one at `ghost` (null for none), the table's frames with these numbers, and
-   * the nearest pair, `{from, to, text, links}`: a line, and links that touch in red.
+   * the nearest pair, `{from, to, text, touching}`: a line, and bodies of those names in red.
    */
   show(q, ghost, numbers = [], nearest = null) {
     const { picture, solids, page, size, base, floor } = this;
@@ -47,9 +45,9 @@ export class ArmView extends Orbit {
     const poses = this.#poses(q);
     picture.floor(base, size / 10, floor, page.grid);
     picture.shadow(solids, poses, floor, page.grid);
-    const touching = nearest?.links ?? [];
-    const shown = touching.length ? solids.map((solid) => (touching.includes(solid.frame) ? coloured(solid, TOUCHING) : solid)) : solids;
-    const groups = [{ solids: this.surroundings, poses: [WORLD], ghost: false }, { solids: shown, poses, ghost: false }];
+    const touching = new Set(nearest?.touching ?? []);
+    const [around, shown] = [this.surroundings, solids].map((things) => recoloured(things, touching, TOUCHING));
+    const groups = [{ solids: around, poses: [WORLD], ghost: false }, { solids: shown, poses, ghost: false }];
     if (ghost) groups.push({ solids, poses: this.#poses(ghost), ghost: true });
     picture.solids(groups);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
@@ -63,10 +61,10 @@ export class ArmView extends Orbit {
     return [this.table.base, ...frames(this.table, this.links, q)];
   }
 
-  #nearest({ from, to, text, links }) {
+  #nearest({ from, to, text, touching }) {
     const { picture, page } = this;
-    picture.line([from, to], links.length ? TOUCHING : page.ink, 3);
-    picture.word(text, scaled(add(from, to), 0.5), links.length ? TOUCHING : page.ink, page.halo);
+    picture.line([from, to], touching.length ? TOUCHING : page.ink, 3);
+    picture.word(text, scaled(add(from, to), 0.5), touching.length ? TOUCHING : page.ink, page.halo);
   }
 
   #tableFrames(found, numbers) {

@@ -7,19 +7,13 @@ Points of curves aren't repeated here: the script reads them from the drawing it
 
 from __future__ import annotations
 
-import base64
-import gzip
 import io
-import json
 import re
 from contextlib import AbstractContextManager
-from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
-import plotly.graph_objects as go
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis
@@ -31,10 +25,9 @@ from matplotlib.font_manager import fontManager
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FixedLocator
-from plotly.offline import get_plotlyjs
 
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.tables import Table
 from er3a.pipeline.viewing.palette import GRID, INK, MUTED, SIX_JOINTS
@@ -272,32 +265,3 @@ def _compact(svg: str) -> str:
 
 def _shorter(number: re.Match[str]) -> str:
     return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
-
-
-# As Plotly names its buttons.
-WORDS = (
-    N_("Download plot as a PNG"),
-    N_("Zoom"),
-    N_("Pan"),
-    N_("Orbital rotation"),
-    N_("Turntable rotation"),
-    N_("Reset camera to default"),
-)
-
-
-def turning_html(figure: go.Figure) -> Markup:
-    """The figure as HTML; one a page. The browser unpacks Plotly and draws when a reader comes near, or prints."""
-    shown = figure.to_json().replace("</", "<\\/")
-    script = Path(__file__).with_name("turning.js").read_text(encoding="utf-8")
-    return Markup(
-        '<div id="turning"></div>'
-        f'<script type="text/plain" id="plotly">{_packed_plotly()}</script>'
-        f'<script type="application/json" id="turning-figure">{shown}</script>'
-        f'<script type="application/json" id="turning-words">{json.dumps({word: tr(word) for word in WORDS})}</script>'
-        f"<script>{script}</script>"
-    )
-
-
-@cache
-def _packed_plotly() -> str:
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode("utf-8"), mtime=0)).decode("ascii")

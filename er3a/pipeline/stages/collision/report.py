@@ -15,7 +15,7 @@ from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, say
-from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, moment, player, player_style
+from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision.model import (
     STATES,
@@ -217,7 +217,7 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         targets=_targets(results.targets),
         clearance=clearance_over_time(results),
         player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
-        player_style=player_style(),
+        drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MOST_ROWS]],
         rows_left_out=max(len(closest), len(set(results.targets.target))) - MOST_ROWS,
         nearest=closest_pair(robot, nearest) if nearest else None,
@@ -232,8 +232,22 @@ def _motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
     for name in dict.fromkeys(results.paths.path.tolist()):
         rows = results.paths.take((results.paths.path == name) & np.isfinite(results.paths.q_deg).all(axis=1))
         events = [_least(closest[name])] if name in closest else []
+        events += _overlaps(rows)
         motions.append(PlayedMotion(name, "", rows.t_s, meant(robot, rows.q_deg), events, _distances(rows)))
     return motions
+
+
+def _overlaps(rows: PathClearances) -> list[PlayedEvent]:
+    """Where the nearest bodies overlap, each stretch with one pair."""
+    label = np.where(rows.clearance_mm < 0, rows.between, "")
+    starts = np.flatnonzero(label != np.roll(label, 1))
+    starts = np.union1d(starts, [0])
+    ends = np.append(starts[1:], len(rows) - 1)
+    return [
+        PlayedEvent(rows.t_s[i], rows.t_s[j], tr("collision"), "fail", tuple(label[i].split("/")))
+        for i, j in zip(starts, ends)
+        if label[i]
+    ]
 
 
 def _least(found: Closest) -> PlayedEvent:

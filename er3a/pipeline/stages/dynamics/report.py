@@ -10,7 +10,7 @@ from markupsafe import Markup
 from er3a.pipeline.messages.dynamics import BINDING, FIGURES, quantity_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.model import (
     BindingLimit,
@@ -179,7 +179,7 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         margins=any(path.payload or path.speed_scale or path.torque_timed_s for path in summary.paths),
         figures=figures,
         player=player(robot, _motions(robot, results)),
-        player_style=player_style(),
+        drawing_head=drawing_head(),
         joints=[(path.name, _joints(path)) for path in summary.paths if path.complete],
         wrist=_wrist(summary),
         wrist_uses=_wrist_uses(summary),

@@ -13,7 +13,7 @@ from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, remedies, remedy
 from er3a.pipeline.messages.say import bracketed, say
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style, stretch
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import (
     FindingAt,
@@ -83,7 +83,7 @@ def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
         robot_pages=study.pages(stored.robot),
         sections=sections,
         player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
-        player_style=player_style(),
+        drawing_head=drawing_head(),
     )
 
 

@@ -23,11 +23,12 @@ from er3a.pipeline.messages.trajectory import (
     reasons,
     strategy_word,
 )
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, moment, player, player_style
+from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,
+    BodiesOverlap,
     NearThresholds,
     PathChecks,
     PathSummary,
@@ -38,7 +39,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectoryResults,
     TriedStrategy,
 )
-from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, turning_figure
+from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
@@ -131,9 +132,9 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results),
         assumed=assumed,
-        turning=turning_figure(robot, results),
+        turning=in_space(robot, results),
         player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
-        player_style=player_style(),
+        drawing_head=drawing_head(),
     )
 
 
@@ -153,7 +154,14 @@ def _motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
 def _events(path: PathSummary) -> list[PlayedEvent]:
     passes = [PlayedEvent(e.t_s, e.until_s, _singular(e), "caution") for e in path.singularities]
     faults = [(word, stretch) for word, stretches in _kinds(path) for stretch in stretches]
-    return passes + [PlayedEvent(s.t0_s, s.t1_s, f"{word}: {cause_text(path, s)}", "fail") for word, s in faults]
+    return passes + [
+        PlayedEvent(s.t0_s, s.t1_s, f"{word}: {cause_text(path, s)}", "fail", _touching(s.cause)) for word, s in faults
+    ]
+
+
+def _touching(cause: object) -> tuple[str, ...]:
+    pairs = cause.pairs if isinstance(cause, BodiesOverlap) else ()
+    return tuple(dict.fromkeys(name for pair in pairs for name in pair.names))
 
 
 def _programs(rows: ProgramFiles) -> list[ProgramLink]:

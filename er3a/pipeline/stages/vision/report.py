@@ -23,7 +23,7 @@ from er3a.pipeline.messages.vision import (
     direction_word,
     pose_words,
 )
-from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, player, player_style
+from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.vision.model import (
@@ -228,7 +228,7 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
         player=player(robot, _motions(results), load_scene(scene) if scene else None),
-        player_style=player_style(),
+        drawing_head=drawing_head(),
         next_pose=panel_link(found.next_view.q_deg, _listed(found.next_view.q_deg))
         if found and found.next_view
         else "",

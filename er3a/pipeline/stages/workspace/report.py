@@ -11,6 +11,7 @@ from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
 from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS
+from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace.capability_section import capability_context
 from er3a.pipeline.stages.workspace.model import (
@@ -23,11 +24,11 @@ from er3a.pipeline.stages.workspace.model import (
 from er3a.pipeline.stages.workspace.workspace_figures import (
     arc_rows,
     convergence,
+    in_space,
     sections,
     side_view,
     slices,
     top_view,
-    turning_figure,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
@@ -55,7 +56,8 @@ def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         method=say(summary.proof.method),
         rule=_rule(summary.enclosed_voids),
         pocket_mm=3000 * summary.pocket_block_m,
-        turning=turning_figure(robot, results),
+        turning=in_space(robot, results),
+        drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
         voids_more=max(0, len(summary.voids) - LISTED),
         change_rows=_change_rows(summary),

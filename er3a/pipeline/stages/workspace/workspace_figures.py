@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 from markupsafe import Markup
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -22,6 +21,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import POINTS, SWEEPS
+from er3a.pipeline.player.turning import ColourScale, Layer, turning_figure
 from er3a.pipeline.stages.workspace.model import (
     AxisSummary,
     Bars,
@@ -35,8 +35,8 @@ from er3a.pipeline.stages.workspace.model import (
     SideViewCells,
     WorkspaceResults,
 )
-from er3a.pipeline.viewing.figures import equal_scale, new_figure, turning_html
-from er3a.pipeline.viewing.numbers import fixed
+from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
@@ -384,11 +384,11 @@ def side_view(results: WorkspaceResults, has_tool: bool) -> Figure:
     for axes, point, colour in ((left, "wrist_centre", WRIST), (right, "flange" if has_tool else "tool_point", FLANGE)):
         mesh = _draw_samples(axes, results.side_view, "wrist_centre" if axes is left else "tool_point")
         figure.colorbar(mesh, ax=axes, label=tr("samples per litre"), location="top", shrink=0.8)
-        for number, arc in arcs_of(results.border, "side", point):
+        for i, arc in arcs_of(results.border, "side", point):
             x, z = arc.rho_m * 1000, arc.z_m * 1000
             axes.plot(x, z, color=colour, linewidth=1.5)
             if axes is left:
-                axes.annotate(str(number), (x[len(x) // 2], z[len(z) // 2]), **_numbered(colour))
+                axes.annotate(str(i), (x[len(x) // 2], z[len(z) // 2]), **_numbered(colour))
         equal_scale(axes, tr("x to the front (mm)"), tr("height along axis 1 (mm)") if axes is left else "")
         axes.set_aspect("equal", adjustable="box")
         axes.grid(False)
@@ -408,8 +408,8 @@ def side_view(results: WorkspaceResults, has_tool: bool) -> Figure:
 def arc_rows(border: Border) -> list[list[str]]:
     """The wrist centre's arcs with the joint values that make them, as rows of text."""
     return [
-        [str(number), word("workspace.sweeps", SWEEPS, arc.sweeps[0]), _swept(arc.q2_deg), _swept(arc.q3_deg)]
-        for number, arc in arcs_of(border, "side", "wrist_centre")
+        [str(i), word("workspace.sweeps", SWEEPS, arc.sweeps[0]), _swept(arc.q2_deg), _swept(arc.q3_deg)]
+        for i, arc in arcs_of(border, "side", "wrist_centre")
     ]
 
 
@@ -442,49 +442,18 @@ _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 _NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
 
 
-def turning_figure(robot: Robot, results: WorkspaceResults) -> Markup:
-    """The figure as HTML with all its script inside."""
-    figure = go.Figure()
+def in_space(robot: Robot, results: WorkspaceResults) -> Markup:
+    """The cloud's far half, the voids and the arm at zero in a figure that turns."""
     cloud, vertices, triangles = results.cloud, results.void_vertices, results.void_triangles
     far = np.flatnonzero(cloud.point_m[:, 1] >= results.summary.axis.point_m[1])[:CLOUD_POINTS]
     value = cloud.manipulability_m3[far]
-    marker = {
-        "size": 1.6,
-        "symbol": "square",  # two triangles each; a disc has dozens
-        "color": np.round(value, 6),
-        "colorscale": "Viridis",
-        "cmax": float(np.quantile(value, 0.99)),
-    }
-    x, y, z = np.round(cloud.point_m[far] * 1000, 1).T
-    figure.add_scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name=tr("cloud, far half"), hoverinfo="skip")
-    for number, void in enumerate(results.summary.voids, start=1):
-        corners = np.round(vertices.point_m[vertices.void == number] * 1000, 1)
-        faces = triangles.corners[triangles.void == number]
-        if not len(faces):
-            continue
-        name = _NAMES[void.kind]
-        figure.add_mesh3d(
-            **dict(zip("xyz", corners.T)),
-            **dict(zip("ijk", faces.T)),
-            color=_COLOURS[void.kind],
-            opacity=0.55,
-            flatshading=True,
-            name=tr(name, number=number),
-            showlegend=True,
-        )
-    x, y, z = (skeleton(robot, np.zeros(robot.joints)) * 1000).T
-    line = {"color": INK, "width": 9}
-    figure.add_scatter3d(
-        x=x, y=y, z=z, mode="lines+markers", line=line, marker={"size": 4, "color": INK}, name=tr("arm at 0")
-    )
-    axis = {"backgroundcolor": "white", "gridcolor": "#dddddd"}
-    figure.update_layout(
-        scene={
-            **{f"{k}axis": {**axis, "title": f"{k} (mm)"} for k in "xyz"},
-            "aspectmode": "data",
-            "camera": {"eye": {"x": 0.6, "y": -1.5, "z": 0.5}},
-        },
-        margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        legend={"orientation": "h", "y": 0.0},
-    )
-    return turning_html(figure)
+    most = float(np.quantile(value, 0.99)) or 1.0
+    layers = [Layer(tr("cloud, far half"), "points", 1000 * cloud.point_m[far], width=1.6, shade=value / most)]
+    for i, void in enumerate(results.summary.voids, start=1):
+        faces = triangles.corners[triangles.void == i]
+        if len(faces):
+            name, corners = tr(_NAMES[void.kind], number=i), 1000 * vertices.point_m[vertices.void == i]
+            layers.append(Layer(name, "surface", corners, _COLOURS[void.kind], faces=faces))
+    layers.append(Layer(tr("arm at 0"), "line", 1000 * skeleton(robot, np.zeros(robot.joints)), width=5.0))
+    scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
+    return turning_figure({"": layers}, scale)

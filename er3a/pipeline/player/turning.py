@@ -1,0 +1,125 @@
+"""A figure in space that turns: clouds, lines and surfaces in layers, drawn by the page itself.
+
+It is painted as the player paints an arm, on a plain canvas, so that a page carries no library for it.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+
+from er3a.numerics.arrays import Integers, Reals
+from er3a.pipeline.messages.language import N_, tr
+
+_HERE = Path(__file__).parent
+STEPS = 65_535  # that the box around everything is divided into
+SHADES = 64
+WORDS = {
+    "picture": N_("Drag or use the arrow keys to turn the picture, + and − to zoom."),
+    "shown": N_("shown"),
+    "no_script": N_("This picture needs JavaScript; the recording of this stage shows the same in the Rerun viewer."),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Something of a figure in space that can be shown or left out.
+
+    Attributes
+    ----------
+    name : what the figure's key calls it
+    kind : squares at the points, a line through them, or a surface of triangles
+    points_mm : (N, 3); a line is interrupted where one is NaN
+    colour : ``#rrggbb``; empty for the ink of the page
+    width : of a line or a square, px
+    shade : (N,) in 0..1, a place in the scale of colours, instead of ``colour``; none for surfaces
+    faces : (M, 3), points of each triangle of a surface, counter-clockwise from outside
+    """
+
+    name: str
+    kind: Literal["points", "line", "surface"]
+    points_mm: Reals
+    colour: str = ""
+    width: float = 2.0
+    shade: Reals | None = None
+    faces: Integers | None = None
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """What colours mean: a Matplotlib colour map, a title, and texts at places in 0..1."""
+
+    colours: str
+    title: str
+    ticks: Sequence[tuple[float, str]]
+
+
+def turning_figure(
+    groups: Mapping[str, Sequence[Layer]],
+    scale: ColourScale | None = None,
+    first: str | None = None,
+    azimuth_deg: float = -65.0,
+) -> Markup:
+    """The figure as HTML, one a page, whose head holds ``drawing_head``.
+
+    Parameters
+    ----------
+    groups : layers that are seen together, by name; a reader chooses one
+    first : the group that is seen at first, the first of all if None
+    azimuth_deg : from where it is seen at first, about z
+    """
+    points = np.concatenate([layer.points_mm for layers in groups.values() for layer in layers])
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    low[2] = min(low[2], 0.0)
+    low, high = low - 50.0, high + 50.0
+    data = {
+        "box": [low.tolist(), high.tolist()],
+        "azimuth": float(np.radians(azimuth_deg)),
+        "palette": [to_hex(colour) for colour in colormaps[scale.colours](np.linspace(0, 1, SHADES))] if scale else [],
+        "first": first,
+        "groups": [
+            {"name": name, "layers": [_layer(layer, low, high) for layer in layers]} for name, layers in groups.items()
+        ],
+    }
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
+    return Markup(
+        environment.get_template("turning.html.j2").render(
+            words={key: tr(text) for key, text in WORDS.items()},
+            groups=list(groups),
+            scale=scale,
+            data=data,
+            script=(_HERE / "turning.js").read_text(encoding="utf-8"),
+        )
+    )
+
+
+def _layer(layer: Layer, low: Reals, high: Reals) -> dict[str, Any]:
+    there = np.isfinite(layer.points_mm).all(axis=1)
+    places = np.round((layer.points_mm[there] - low) / (high - low) * STEPS)
+    packed: dict[str, Any] = {
+        "name": layer.name,
+        "kind": layer.kind,
+        "points": _packed(places, "<u2"),
+        "colour": layer.colour,
+        "width": layer.width,
+    }
+    if layer.shade is not None:
+        packed["shades"] = _packed(np.clip(layer.shade[there], 0, 1) * (SHADES - 1), "u1")
+    if layer.faces is not None:
+        packed["faces"] = _packed(layer.faces, "<u4")
+    if layer.kind == "line":
+        packed["starts"] = np.flatnonzero(np.diff(there.astype(int), prepend=0)[there] > 0).tolist()
+    return packed
+
+
+def _packed(values: Reals | Integers, kind: str) -> str:
+    return base64.b64encode(np.round(values).astype(kind).tobytes()).decode("ascii")
