@@ -44,7 +44,7 @@ const stretches = [...document.querySelectorAll("[data-from]")];
 
 function prepared(motion) {
   const count = motion.times.length;
-  return { ...motion, values: motion.values.map((text) => decodeValues(text, count)) };
+  return { ...motion, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
 }
 
 const start = () => motion.times[0];
@@ -102,12 +102,17 @@ function draw() {
   picture.floor(column(table.base, 3), data.size / 10, floor, page.grid);
   for (const { solids, poses } of shown) picture.shadow(solids, poses, floor, page.grid);
   picture.solids([{ solids: seen(surroundings), poses: [WORLD], ghost: false }, ...shown]);
+  motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) picture.line(trail, page.ink, 1.5);
-  for (const { way, status } of motion.events) if (way.length) picture.line(way, data.colours[status], 3);
+  for (const { t: from, until, status } of motion.events) {
+    const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - 1e-4 && motion.times[i] <= until + 1e-4);
+    if (status !== "plain" && way.length > 1) picture.line(way, data.colours[status], 3);
+  }
   for (const { from, to, text, t0, t1 } of motion.marks ?? []) {
     if (t < t0 || t > t1 || (t === t1 && t0 < t1 && t1 < end())) continue; // where two meet, the later one
-    picture.line([from, to], data.colours.mark, 3);
-    picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
+    const point = String(from) === String(to);
+    picture.line([from, to], data.colours.mark, point ? 9 : 3);
+    picture.word(text, point ? add(from, [0, 0, 0.08 * data.size]) : scaled(add(from, to), 0.5), page.ink, page.halo);
   }
   for (const { poses } of shown) toolFrame(poses.at(-1));
   for (const { text, at } of data.signs) picture.word(text, at, page.ink, page.halo);

@@ -15,7 +15,6 @@ from markupsafe import Markup
 
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
 from er3a.geometry.vectors import fibonacci_sphere
-from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.teach.scripts import TEACH, import_map
@@ -24,9 +23,8 @@ from er3a.robots.joint_limits import shown, size_of, theta_limits
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
-MOST_FRAMES = 240
+MOST_FRAMES, FRAMES_IN_ALL, FEWEST_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 UNTIMED_S = 8.0  # how long a motion without times is shown
-TRAIL_POINTS = 200
 MOST_FACES, FEWEST_CORNERS = 2000, 12  # of an arm, and of a convex piece
 SCENE_COLOUR = "#b9a78f"
 COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
@@ -166,6 +164,7 @@ def _data(
 ) -> dict[str, Any]:
     size = drawn_size(robot)
     bases = [arm.base[:3, 3] for arm in (robot, *beside)]
+    most = min(MOST_FRAMES, max(FEWEST_FRAMES, FRAMES_IN_ALL // len(motions)))
     return {
         "table": table_data(robot),
         "size": size,
@@ -179,7 +178,7 @@ def _data(
         "floor": floor_of(scene),
         "scene": scene_data(scene.solids if scene else ()),
         "carried": scene_data(scene.carried if scene else ()),
-        "motions": [_motion(robot, motion, beside) for motion in motions],
+        "motions": [_motion(motion, most) for motion in motions],
         "joints": _joints(robot),
         "words": words,
     }
@@ -264,22 +263,15 @@ def _solid(solid: Box | Cylinder | Sphere | Mesh) -> dict[str, Any]:
     return {"kind": "sphere", "radius": solid.radius, **common}
 
 
-def _motion(robot: Robot, motion: PlayedMotion, beside: Sequence[Robot]) -> dict[str, Any]:
-    rows = _shown(motion)
-    T = frames(robot, motion.q[rows])
-    others = [frames(arm, q[rows]) for arm, q in zip(beside, motion.beside, strict=True)]
-    apart = max(1, len(rows) // TRAIL_POINTS)
+def _motion(motion: PlayedMotion, most: int) -> dict[str, Any]:
+    rows = _shown(motion, most)
     return {
         "name": motion.name,
         "rate": None if motion.timed else max(1.0, float(motion.t[-1]) / UNTIMED_S),
         "text": motion.text,
-        "times": np.round(motion.t[rows], 6).tolist(),
+        "times": np.round(motion.t[rows], 4).tolist(),
         "values": [_packed(q[rows]) for q in (motion.q, *motion.beside)],
-        "trails": [np.round(own[::apart, -1, :3, 3], 5).tolist() for own in (T, *others)],
-        "events": [
-            asdict(event) | {"way": _way(event, motion.t[rows], T[:, -1, :3, 3])}
-            for event in sorted(motion.events, key=lambda event: event.t)
-        ],
+        "events": [asdict(event) for event in sorted(motion.events, key=lambda event: event.t)],
         "marks": [
             {"from": mark.start, "to": mark.end, "text": mark.text, "t0": mark.t0, "t1": mark.t1}
             for mark in motion.marks
@@ -291,16 +283,10 @@ def _packed(q: Reals) -> str:
     return base64.b64encode(q.astype("<f4").tobytes()).decode("ascii")
 
 
-def _way(event: PlayedEvent, t: Reals, points: Reals) -> list[list[float]]:
-    """The flange's way while something is wrong."""
-    during = points[(t >= event.t) & (t <= event.until)] if event.status in COLOURS else points[:0]
-    return np.round(during[:: max(1, len(during) // TRAIL_POINTS)], 5).tolist() if len(during) > 1 else []
-
-
-def _shown(motion: PlayedMotion) -> np.ndarray:
-    """Rows to be drawn: evenly spread in time, and those next to events."""
-    even = np.searchsorted(motion.t, np.linspace(motion.t[0], motion.t[-1], min(MOST_FRAMES, len(motion.t))))
+def _shown(motion: PlayedMotion, most: int) -> np.ndarray:
+    """Rows to be drawn: evenly spread in time, at most so many, and those next to events."""
+    even = np.searchsorted(motion.t, np.linspace(motion.t[0], motion.t[-1], min(most, len(motion.t))))
     events = np.searchsorted(motion.t, [time for event in motion.events for time in (event.t, event.until)])
     rows = np.unique(np.clip(np.concatenate([even, events, [0, len(motion.t) - 1]]), 0, len(motion.t) - 1))
-    _, first = np.unique(np.round(motion.t[rows], 6), return_index=True)
+    _, first = np.unique(np.round(motion.t[rows], 4), return_index=True)
     return rows[first].astype(int)

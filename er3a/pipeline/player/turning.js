@@ -95,7 +95,6 @@ function draw() {
     }
   }
   painted.sort((a, b) => b.depth - a.depth);
-  context.lineCap = "round";
   for (const { part, corners, x, y, side, colour } of painted) {
     if (!part) {
       context.fillStyle = colour;

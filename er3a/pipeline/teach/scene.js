@@ -48,7 +48,7 @@ export class Picture {
     this.taken = [];
     this.scale = Math.min(this.canvas.width, this.canvas.height) * FIELD;
     this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    this.context.lineJoin = "round";
+    Object.assign(this.context, { lineJoin: "round", lineCap: "round" });
   }
 
   /** Canvas coordinates of a point, and its distance along the line of sight. */

@@ -1,4 +1,5 @@
-// What a page's tables and figures can do beyond being read. Without scripts the page loses nothing but these.
+// What a page's tables and figures can do beyond being read, and files to save from it. Without scripts the page loses
+// nothing but these.
 "use strict";
 
 const WORDS = JSON.parse(document.getElementById("script-words").textContent);
@@ -540,4 +541,20 @@ for (const figure of document.querySelectorAll("figure")) {
   save.textContent = WORDS.svg;
   tools.append(toolButton(WORDS.enlarge, () => enlarge(image)), save);
   image.after(tools);
+}
+
+// A file that travels packed in its link is saved as it is.
+async function save(link) {
+  const packed = await fetch(`data:application/gzip;base64,${link.dataset.packed}`);
+  const text = await new Response(packed.body.pipeThrough(new DecompressionStream("gzip"))).blob();
+  const saved = Object.assign(document.createElement("a"), { href: URL.createObjectURL(text), download: link.download });
+  saved.click();
+  URL.revokeObjectURL(saved.href);
+}
+
+for (const link of document.querySelectorAll("[data-packed]")) {
+  link.addEventListener("click", (event) => {
+    event.preventDefault();
+    save(link);
+  });
 }

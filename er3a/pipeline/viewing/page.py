@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import os
 import platform
 import re
@@ -281,6 +282,11 @@ def run_command(study: Study, page: str) -> str | None:
 def text_address(text: str) -> str:
     """The data address of a file of text, for a link that saves it."""
     return f"data:text/plain;base64,{base64.b64encode(text.encode()).decode()}"
+
+
+def packed_text(text: str) -> str:
+    """A text for a link's ``data-packed``, which the page's script unpacks to be saved: gzip, in base64."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
 def _preview(picture: Path) -> str | None:

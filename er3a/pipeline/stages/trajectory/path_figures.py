@@ -79,6 +79,9 @@ def draw_path(ax: Axes, robot: Robot, path: PathSummary, rows: PathChecks, repai
         ax.plot(*project(repaired.xyz_mm).T, color=MODEL, linewidth=1.2, linestyle="--", zorder=5)
     _coloured(ax, project(points), rows.condition_number)
     flat = project(points)
+    for part in path.collisions:
+        during = (rows.t_s >= part.t0_s) & (rows.t_s <= part.t1_s)
+        ax.plot(*flat[during].T, color=VERDICTS["fail"], linewidth=3.5, zorder=5)
     ax.plot(*flat[0], "o", color=INK, markersize=5, zorder=6)
     ax.plot(*flat[-1], "s", color=INK, markersize=5, zorder=6)
     for i, event in zip(nearest, path.singularities):
@@ -401,7 +404,7 @@ def _curves(paths: list[Measured], results: TrajectoryResults) -> Figure:
 
 
 POINTS = 250
-LOG_RANGE = (0.5, 2.5)  # of the condition number
+LOG_RANGE = np.log10(3), np.log10(300)  # of the condition number
 MOST_ARMS = 3
 
 
@@ -413,8 +416,8 @@ def in_space(robot: Robot, results: TrajectoryResults) -> Markup:
         repaired = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
         groups[path.name] = list(_layers(robot, path, checks.take(checks.path == path.name), repaired))
     first = next((path.name for path in paths if path.singularities and path.kind != "joint"), None)
-    decades = [(0.5, "3"), (1.0, "10"), (2.0, "100"), (2.5, tr("300 or more"))]
-    ticks = [((at - LOG_RANGE[0]) / (LOG_RANGE[1] - LOG_RANGE[0]), text) for at, text in decades]
+    values = [(3, "3"), (10, "10"), (30, "30"), (300, tr("300 or more"))]
+    ticks = [((np.log10(value) - LOG_RANGE[0]) / (LOG_RANGE[1] - LOG_RANGE[0]), text) for value, text in values]
     return turning_figure(groups, ColourScale("viridis_r", tr("condition number"), ticks), first)
 
 
@@ -428,6 +431,10 @@ def _layers(robot: Robot, path: PathSummary, rows: PathChecks, repaired: Avoidan
     if not reached.all():
         out = np.where(reached[:, None], np.nan, rows.xyz_mm)[kept]
         yield Layer(tr("not reachable"), "line", out, "#888888", 6.0)
+    for part in path.collisions:
+        during = kept[(rows.t_s[kept] >= part.t0_s) & (rows.t_s[kept] <= part.t1_s)]
+        if len(during):
+            yield Layer(tr("collision"), "line", rows.xyz_mm[during], VERDICTS["fail"], 6.0)
     if len(repaired):
         yield Layer(tr("repaired"), "line", repaired.xyz_mm, MODEL, 2.5)
     q = meant(robot, rows.q_deg)

@@ -23,7 +23,7 @@ from er3a.pipeline.messages.trajectory import (
     reasons,
     strategy_word,
 )
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player
+from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.model import (
@@ -44,7 +44,7 @@ from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import head_of, render, run_command, text_address
+from er3a.pipeline.viewing.page import head_of, packed_text, render, run_command
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.programs.languages import titles_unwritten
 from er3a.robots.joint_limits import meant
@@ -81,10 +81,10 @@ class PathDrawing:
 
 @dataclass(frozen=True)
 class ProgramLink:
-    """A program of a path, to save: its file's name, the data address of its text, and whether there is none."""
+    """A program of a path, to save: its file's name, its text by :func:`packed_text`, and whether there is none."""
 
     file: str
-    uri: str
+    packed: str
     empty: bool
 
 
@@ -143,7 +143,9 @@ def _motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
     checks, avoidance, motions = results.checks, results.avoidance, []
     for path in results.summary.paths:
         rows = checks.take((checks.path == path.name) & checks.reachable)
-        motions.append(PlayedMotion(path.name, path_text(path), rows.t_s, meant(robot, rows.q_deg), _events(path)))
+        motions.append(
+            PlayedMotion(path.name, path_text(path), rows.t_s, meant(robot, rows.q_deg), _events(path), _contact(path))
+        )
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             name = tr("{path}, repaired", path=path.name)
@@ -159,6 +161,13 @@ def _events(path: PathSummary) -> list[PlayedEvent]:
     ]
 
 
+def _contact(path: PathSummary) -> list[Mark]:
+    if path.clear_until is None:
+        return []
+    x, y, z = (value / 1000 for value in path.clear_until.contact_mm)
+    return [Mark(part.t0_s, part.t1_s, (x, y, z), (x, y, z), tr("first contact")) for part in path.collisions[:1]]
+
+
 def _touching(cause: object) -> tuple[str, ...]:
     pairs = cause.pairs if isinstance(cause, BodiesOverlap) else ()
     return tuple(dict.fromkeys(name for pair in pairs for name in pair.names))
@@ -166,7 +175,7 @@ def _touching(cause: object) -> tuple[str, ...]:
 
 def _programs(rows: ProgramFiles) -> list[ProgramLink]:
     texts = zip(rows.file.tolist(), rows.text.tolist())
-    return [ProgramLink(file, text_address(text), not text) for file, text in texts]
+    return [ProgramLink(file, packed_text(text), not text) for file, text in texts]
 
 
 def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing, programs: list[ProgramLink]) -> PathSection:
