@@ -111,7 +111,7 @@ function draw() {
   for (const { from, to, text, t0, t1 } of motion.marks ?? []) {
     if (t < t0 || t > t1 || (t === t1 && t0 < t1 && t1 < end())) continue; // where two meet, the later one
     const point = String(from) === String(to);
-    picture.line([from, to], data.colours.mark, point ? 9 : 3);
+    picture.line([from, point ? add(to, [0, 0, 1e-3 * data.size]) : to], data.colours.mark, point ? 9 : 3);
     picture.word(text, point ? add(from, [0, 0, 0.08 * data.size]) : scaled(add(from, to), 0.5), page.ink, page.halo);
   }
   for (const { poses } of shown) toolFrame(poses.at(-1));
