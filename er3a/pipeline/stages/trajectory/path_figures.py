@@ -5,7 +5,7 @@ Layout is fixed, so that matplotlib draws each figure once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -408,10 +408,9 @@ LOG_RANGE = np.log10(3), np.log10(300)  # of the condition number
 MOST_ARMS = 3
 
 
-def in_space(robot: Robot, results: TrajectoryResults) -> Markup:
+def in_space(robot: Robot, results: TrajectoryResults, paths: Sequence[PathSummary]) -> Markup:
     """Paths with the arm at their ends and at singular poses in a figure that turns; a list chooses the path."""
-    paths, checks, motions = results.summary.paths, results.checks, results.avoidance
-    groups = {}
+    checks, motions, groups = results.checks, results.avoidance, {}
     for path in paths:
         repaired = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
         groups[path.name] = list(_layers(robot, path, checks.take(checks.path == path.name), repaired))

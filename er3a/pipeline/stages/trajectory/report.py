@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,8 @@ from er3a.programs.languages import titles_unwritten
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-DRAWN = 250
+DRAWN = 250  # points of a curve
+DRAWN_PATHS = 16  # with a figure each
 AT_ANY_PACE = ("leaves limits", "collides", "unreachable", "none found")  # verdicts of paths that fail however slow
 STATUS: dict[PathVerdict, str] = {
     "safe": "pass",
@@ -106,7 +108,7 @@ class PathSection:
     programs: list[ProgramLink]
     repaired: list[ProgramLink]
     shortest: str
-    figure: PathDrawing
+    figure: PathDrawing | None
 
 
 def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
@@ -115,10 +117,11 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     summary, checks, motions = results.summary, results.checks, results.avoidance
     scene = study.scene(stored.robot, stored.stage)
     figure, sections = PathFigure(), []
-    for path in summary.paths:
+    for i, path in enumerate(_worst_first(summary.paths)):
         rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
         links = _programs(results.programs.take(results.programs.path == path.name))
-        sections.append(_section(path, rows, _figure(figure, robot, path, rows, own, summary.near), links))
+        drawn = _figure(figure, robot, path, rows, own, summary.near) if i < DRAWN_PATHS else None
+        sections.append(_section(path, rows, drawn, links))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -132,10 +135,19 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results),
         assumed=assumed,
-        turning=in_space(robot, results),
+        drawn_paths=DRAWN_PATHS,
+        turning=in_space(robot, results, [section.path for section in sections[:DRAWN_PATHS]]),
         player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
         drawing_head=drawing_head(),
     )
+
+
+def _worst_first(paths: Sequence[PathSummary]) -> Sequence[PathSummary]:
+    """The paths in the study's order, but where they are too many to draw all of them those that fail first."""
+    if len(paths) <= DRAWN_PATHS:
+        return paths
+    ranks = ("fail", "caution", "pass")
+    return sorted(paths, key=lambda path: (ranks.index(STATUS[path.verdict]), path.expect == path.verdict))
 
 
 def _motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
@@ -178,7 +190,9 @@ def _programs(rows: ProgramFiles) -> list[ProgramLink]:
     return [ProgramLink(file, packed_text(text), not text) for file, text in texts]
 
 
-def _section(path: PathSummary, rows: PathChecks, figure: PathDrawing, programs: list[ProgramLink]) -> PathSection:
+def _section(
+    path: PathSummary, rows: PathChecks, figure: PathDrawing | None, programs: list[ProgramLink]
+) -> PathSection:
     return PathSection(
         path=path,
         status=STATUS[path.verdict],
