@@ -352,8 +352,8 @@ class ClearanceSection:
     rows: list[list[str]]
 
 
-def clearance_section(results: TrajectoryResults) -> ClearanceSection:
-    """What the section needs."""
+def clearance_section(results: TrajectoryResults, most: int) -> ClearanceSection:
+    """What the section needs; at most so many paths, those with the least clearance, are drawn."""
     paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
     if not paths:
         return ClearanceSection(None, [])
@@ -365,8 +365,11 @@ def clearance_section(results: TrajectoryResults) -> ClearanceSection:
         caption = tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
     if any(path.unreachable for path, _ in paths):
         caption = joined([caption, tr("Grey: not reachable.")], " ")
+    drawn = sorted(paths, key=lambda measured: measured[1].least_mm)[:most] if len(paths) > most else paths
+    if len(paths) > most:
+        caption = joined([caption, tr("Drawn: the {count} paths with the least clearance.", count=most)], " ")
     alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
-    return ClearanceSection(Picture(_curves(paths, results), alt, caption), [_row(*measured) for measured in paths])
+    return ClearanceSection(Picture(_curves(drawn, results), alt, caption), [_row(*measured) for measured in paths])
 
 
 def _row(path: PathSummary, least: LeastClearance) -> list[str]:

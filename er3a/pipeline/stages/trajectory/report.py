@@ -52,7 +52,7 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 DRAWN = 250  # points of a curve
-DRAWN_PATHS = 16  # with a figure each
+MOST_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
 AT_ANY_PACE = ("leaves limits", "collides", "unreachable", "none found")  # verdicts of paths that fail however slow
 STATUS: dict[PathVerdict, str] = {
     "safe": "pass",
@@ -117,10 +117,12 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     summary, checks, motions = results.summary, results.checks, results.avoidance
     scene = study.scene(stored.robot, stored.stage)
     figure, sections = PathFigure(), []
-    for i, path in enumerate(_worst_first(summary.paths)):
+    count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
+    paths = _worst_first(summary.paths) if count < len(summary.paths) else summary.paths
+    for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
-        links = _programs(results.programs.take(results.programs.path == path.name))
-        drawn = _figure(figure, robot, path, rows, own, summary.near) if i < DRAWN_PATHS else None
+        links = _programs(results.programs.take((results.programs.path == path.name) & (i < count)))
+        drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
         sections.append(_section(path, rows, drawn, links))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render(
@@ -133,19 +135,17 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         robot_pages=study.pages(stored.robot),
         sections=sections,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
-        clearance=clearance_section(results),
+        clearance=clearance_section(results, count),
         assumed=assumed,
-        drawn_paths=DRAWN_PATHS,
-        turning=in_space(robot, results, [section.path for section in sections[:DRAWN_PATHS]]),
+        drawn_paths=count,
+        turning=in_space(robot, results, paths[:count]),
         player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
         drawing_head=drawing_head(),
     )
 
 
 def _worst_first(paths: Sequence[PathSummary]) -> Sequence[PathSummary]:
-    """The paths in the study's order, but where they are too many to draw all of them those that fail first."""
-    if len(paths) <= DRAWN_PATHS:
-        return paths
+    """Those that fail first, of them those that were not expected to."""
     ranks = ("fail", "caution", "pass")
     return sorted(paths, key=lambda path: (ranks.index(STATUS[path.verdict]), path.expect == path.verdict))
 
