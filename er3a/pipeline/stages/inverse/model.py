@@ -379,11 +379,11 @@ class InverseResults(Results[InverseSummary]):
 RESULTS = InverseResults
 
 
-MOST_SHOWN = 60
+MOST_SHOWN = 32
 
 
 def shown_targets(targets: Sequence[TargetResult]) -> list[TargetResult]:
-    """All targets, in their order; of more than 60 as many of each outcome, taken evenly over the list."""
+    """All targets, in their order; of more than 32 as many of each outcome, taken evenly over the list."""
     if len(targets) <= MOST_SHOWN:
         return list(targets)
     by_outcome: dict[str, list[int]] = {}
