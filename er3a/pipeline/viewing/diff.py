@@ -131,7 +131,7 @@ def _in_heads(robot: str, stage: str, old: Head, new: Head) -> list[Change]:
         found.append(Change(robot, stage, tr("verdict"), status, turned, tr("changed"), new.text))
     elif old.text != new.text:
         found.append(Change(robot, stage, tr("verdict's text"), old.text, new.text, tr("reworded")))
-    before, after = ({figure.name: figure for figure in head.figures} for head in (old, new))
+    before, after = ({figure.name: figure for figure in (*head.figures, *head.numerics)} for head in (old, new))
     for name in {**before, **after}:
         a, b = before.get(name), after.get(name)
         shown = b or a

@@ -140,13 +140,24 @@ class ShownFigure:
     part: bool
 
 
+NUMERICS = {  # key figures that answer no question of a verdict
+    "characteristic_length",
+    "power_balance",
+    "round_trip_joint_error",
+    "samples",
+    "velocity_check",
+    "worst_orientation_residual",
+    "worst_position_residual",
+}
+
+
 @dataclass(frozen=True)
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
     ``finding`` is what the sentence says; ``caveats`` by the stage that it rests on: what to know first;
     ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to. ``not_examined``: what
-    the verdict leaves out, and of which.
+    the verdict leaves out, and of which. ``numerics``: figures that speak of the computation, not of the arm.
     """
 
     robot: str
@@ -159,6 +170,7 @@ class Head:
     demonstrations: int
     finding: Any
     not_examined: tuple[tuple[str, str], ...] = ()
+    numerics: tuple[ShownFigure, ...] = ()
 
 
 def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
@@ -185,7 +197,17 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     text = say_all(verdict.findings)
     missed = tuple((left_out_text(each), joined(each.names, ", ")) for each in stored.results.summary.not_examined)
     return Head(
-        stored.robot, stage, verdict.status, text, shown, stored.provenance, caveats, meant, verdict.finding, missed
+        stored.robot,
+        stage,
+        verdict.status,
+        text,
+        tuple(figure for figure in shown if figure.name not in NUMERICS),
+        stored.provenance,
+        caveats,
+        meant,
+        verdict.finding,
+        missed,
+        tuple(figure for figure in shown if figure.name in NUMERICS),
     )
 
 
