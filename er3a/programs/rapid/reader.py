@@ -17,7 +17,7 @@ from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
 from er3a.programs.rapid.data_types import SHAPES, Shape, starting
-from er3a.programs.rapid.files import modules_of
+from er3a.programs.rapid.files import HEADER, modules_of
 from er3a.programs.syntax import (
     Assign,
     Binary,
@@ -60,7 +60,6 @@ RAPID = Lexicon(
     folds=True,
 )
 """RAPID overview, section 1 (Expressions): NOT, OR and XOR bind least."""
-HEADER = re.compile(r"(?s)\A\s*%%%.*?%%%")
 ENDS = frozenset(
     (
         *("ENDPROC", "ENDFUNC", "ENDTRAP", "ENDMODULE", "ENDRECORD", "ENDIF", "ENDWHILE", "ENDFOR", "ENDTEST"),
@@ -78,7 +77,8 @@ MOTIONS = frozenset(
     )
 )
 SEARCHES = ("SEARCHL", "SEARCHC")
-SYNCHRONISED = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
+CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
+"""Motions that call a procedure, named by a text, where they end."""
 CHANGING = {"TPREADNUM": 0, "TPREADFK": 0, "TPREADDNUM": 0, "GETSYSDATA": 0, "GETDATAVAL": 1}
 """Instructions that change one of their arguments, by its number."""
 WAITS = frozenset(
@@ -195,12 +195,15 @@ class RapidWords(Words):
         """Arguments by place and, behind a backslash, by name; a name alone is a switch."""
         placed: list[Expression | None] = []
         named: list[tuple[str, Expression]] = []
+        first = self.at
         while not (self.accept(close) if close else self.kind == "end"):
             if self.kind == "end":
                 raise MisreadError(f"'{close}' is missing")
             if self.accept(","):
                 continue
             if not self.accept("\\"):
+                if self.at > first and self.texts[self.at - 1] != "," and self.texts[self.at - 1] != "(":
+                    raise MisreadError(f"',' expected before '{self.next}'")
                 placed.append(self.expression())
                 continue
             name = self.name()
@@ -456,7 +459,8 @@ class _ModuleReader:
     def _skip_head(self, token: Token) -> None:
         self.cursor.at += 1
         if token.text == "MODULE":
-            self.cursor.at += 1
+            while (name := self.cursor.next()) is not None and name.line == token.line and name.text != "(":
+                self.cursor.at += 1
             if (after := self.cursor.next()) is not None and after.text == "(":
                 self.cursor.until(")")
                 self.cursor.at += 1
@@ -741,13 +745,14 @@ class _BodyReader:
         """An instruction of the controller."""
         builder, (placed, named) = self.builder, given
         options = {key for key, _ in named}
-        synchronised = name in MOTIONS and (name in SYNCHRONISED or "ID" in options)
-        if synchronised or (name in NOT_SIMULATED and not (name == "SINGAREA" and "OFF" in options)):
+        if name in NOT_SIMULATED and not (name == "SINGAREA" and "OFF" in options):
             self.module.findings.append(NotSimulated(text, place))
         if name in MOTIONS:
             builder.add(Move(place, name, placed, text, (), named))
             if name in SEARCHES:
                 builder.unknown(place, text)  # the arm stops where the signal comes
+            if name in CALLING and placed and placed[-1] is not None:
+                self.late(place, placed[-1], ((), ()), text)
             return
         if name == "WAITTIME" and placed:
             builder.add(Waiting(place, "seconds", placed[0], text))
