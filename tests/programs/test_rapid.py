@@ -381,7 +381,7 @@ def test_modules_share_what_is_not_local(tmp_path):
     (tmp_path / "points.sys").write_text(
         f"MODULE points(SYSMODULE)\n PERS robtarget there:=[[5,6,7],[1,0,0,0],[0,0,0,0],{NONE}];\n"
         " LOCAL VAR num n:=50;\n LOCAL PROC helper() n:=n+1; ENDPROC\n"
-        " PROC approach(num x)\n  helper;\n  MoveL Offs(there,x,n,0),@;\n ENDPROC\nENDMODULE\n"
+        " PROC approach(num x)\n  helper;\n  MoveL Offs(there,x,n,0),v100,fine,tool0;\n ENDPROC\nENDMODULE\n"
     )
     (tmp_path / "other.mod").write_text("MODULE other\n PROC main()\n  Stop;\n ENDPROC\nENDMODULE\n")
     path = saved(tmp_path, "n:=1; approach 10; MoveL Offs(there,n,0,0),@; MORE PROC helper() ENDPROC")
