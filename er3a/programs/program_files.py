@@ -21,8 +21,8 @@ DEEPEST = 6  # folders of an archive
 def files_of(path: Path) -> tuple[Path, ...]:
     """A program's file, the modules that it calls, and the files with their points and frames, where there are such."""
     suffix = path.suffix.lower()
-    called = MODULES.get(suffix, lambda _: ())(path) if path.is_file() else ()
-    modules = (path, *called)
+    finder = MODULES.get(suffix)
+    modules = (path, *finder(path)) if finder is not None and path.is_file() else (path,)
     beside = [data_file_of(module, POINTS[suffix]) for module in modules] if suffix in POINTS else []
     shared = shared_data_of(path) if suffix in KRL else None
     return tuple(file for file in (*modules, *beside, shared) if file is not None)

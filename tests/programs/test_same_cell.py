@@ -38,8 +38,8 @@ def lines():
     forth, down, away = start.copy(), start.copy(), start.copy()
     forth[:3, 3] += [0.02, -0.06, 0.04]
     forth[:3, :3] = start[:3, :3] @ [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]
-    down[2, 3] = 0.01
-    away[:3, 3] += [0.0, 0.7, 0.0]
+    down[:3, 3] += [0.1, 0.07, -0.45]
+    away[:3, 3] += [0.5, 0.35, 0.0]
     return [forth, start], down, away
 
 

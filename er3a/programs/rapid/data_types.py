@@ -115,7 +115,8 @@ def typed(value: Value, shape: Shape) -> Value:
 def starting(shape: Shape) -> Value | None:
     """What a variable holds that is declared without a value (RAPID overview, 1 Data types); None if not known."""
     if len(shape) == 1:
-        return {"NUM": 0, "DNUM": 0, "BOOL": False, "STRING": ""}.get(str(shape[0]))
+        plain_values: dict[str, Value] = {"NUM": 0, "DNUM": 0, "BOOL": False, "STRING": ""}
+        return plain_values.get(str(shape[0]))
     parts = [starting(part[1]) for part in shape[1:] if isinstance(part, tuple) and isinstance(part[1], tuple)]
     found = tuple(each for each in parts if each is not None)
     return typed(found, shape) if len(found) == len(shape) - 1 and shape[0] != "[]" else None

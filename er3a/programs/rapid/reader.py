@@ -40,6 +40,7 @@ from er3a.programs.syntax import (
     Value,
     Variable,
     Waiting,
+    number,
 )
 
 PATTERN = re.compile(
@@ -494,9 +495,9 @@ class _ModuleReader:
             initial = starting(shape)
             for size in reversed(sizes):
                 shape = ("[]", shape)
-                count = size.value if isinstance(size, Constant) else 0
-                known = isinstance(count, int) and 0 < count <= MOST_ELEMENTS and initial is not None
-                initial = (initial,) * int(count) if known and initial is not None else None
+                count = number(size.value) if isinstance(size, Constant) else None
+                known = count is not None and 0 < count <= MOST_ELEMENTS
+                initial = (initial,) * int(count or 0) if known and initial is not None else None
             scope.shapes[name] = shape
             if local:
                 scope.own.add(name)
@@ -758,8 +759,8 @@ class _BodyReader:
             builder.add(Waiting(place, "seconds", placed[0], text))
             return
         if name == "CALLBYVAR" and len(placed) == 2 and placed[0] is not None and placed[1] is not None:
-            number = Invocation("NUMTOSTR", (placed[1], Constant(0)))
-            self.late(place, Invocation(ARITHMETIC, (Constant("+"), placed[0], number)), ((), ()), text)
+            suffix = Invocation("NUMTOSTR", (placed[1], Constant(0)))
+            self.late(place, Invocation(ARITHMETIC, (Constant("+"), placed[0], suffix)), ((), ()), text)
             return
         if name in WAITS:
             builder.add(Waiting(place, "condition", None, text))
@@ -953,8 +954,9 @@ def _counted(change: int | None) -> Callable[[_BodyReader, Place, RapidWords, st
 
     def read(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
         target = body.scope.settled(words.reference())
-        amount: Expression = Constant(change)
-        if change is None:
+        if change is not None:
+            amount: Expression = Constant(change)
+        else:
             words.expect(",")
             amount = body.value(words)
         words.finish()
