@@ -34,6 +34,7 @@ import scipy
 from er3a.by_value import ByValue
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
+from er3a.robots.masses import MassBody
 
 RateUnit = Literal["m/s", "m/s2", "rad/s", "rad/s2", "share", "s"]
 ZoneKind = Literal["fine", "distance", "angle", "share", "velocity", "named"]
@@ -105,10 +106,12 @@ class NamedFrame(ByValue):
     ----------
     name : as the program calls it (``TOOL_DATA[3]``, ``tool0``); empty if it names none
     pose : (4, 4), m; None if the program does not give it
+    load : mass of a tool in the flange's frame; None if the program does not give it
     """
 
     name: str = ""
     pose: Reals | None = None
+    load: MassBody | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

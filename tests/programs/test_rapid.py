@@ -459,21 +459,29 @@ def test_blocks_without_an_end_are_one_error_with_its_line(case, tmp_path):
     assert "line" in str(caught.value)
 
 
-def test_loads_of_written_tools_are_named_and_names_kept(tmp_path):
-    execution = run(tmp_path, "MoveAbsJ home,v200,z10,gripper; MoveL p,slow,fine,gripper\\WObj:=table;", robot=ROBOT)
+def test_tools_come_back_with_their_names_and_masses(tmp_path):
+    data = DATA.replace(
+        "[2,[0,0,60],[1,0,0,0],0,0,0]", "[2.5,[10,0,60],[0.70710678118,0,0,0.70710678118],0.1,0.2,0.3]", 1
+    )
+    body = "MoveAbsJ home,v200,z10,gripper; MoveL p,slow,fine,gripper\\WObj:=table;"
+    execution = run(tmp_path, body, data, robot=ROBOT)
+    load = motions(execution)[0].tool.load
+    assert (load.mass, load.centre) == (2.5, (0.01, 0.0, 0.06))
+    np.testing.assert_allclose(np.diag(load.inertia_matrix), [0.2, 0.1, 0.3], atol=1e-9)
     written = write_program(execution.listing(), "rapid", WriteOptions(ROBOT))
     text = written.files[".mod"]
     assert "PERS tooldata gripper:=[TRUE,[[0.000000,0.000000,120.000000]" in text
     assert "PERS wobjdata table:=[FALSE,TRUE" in text
-    assert any(isinstance(each, ToolNotGiven) for each in written.findings)
+    assert not any(isinstance(each, ToolNotGiven) for each in written.findings)
     (tmp_path / "again.mod").write_text(text)
     again = execute(read_program(tmp_path / "again.mod"), ROBOT)
     for before, after in zip(motions(execution), motions(again), strict=True):
         np.testing.assert_allclose(after.tool.pose, before.tool.pose, atol=1e-9)
         np.testing.assert_allclose(after.base.pose, before.base.pose, atol=1e-9)
-        assert (after.speed, after.turn_speed, after.zone.value) == (
-            before.speed,
-            pytest.approx(before.turn_speed),
-            before.zone.value,
-        )
-    assert write_program(again.listing(), "rapid", WriteOptions(ROBOT)).files[".mod"].replace("again", "job") == text
+        np.testing.assert_allclose(after.tool.load.inertia_matrix, load.inertia_matrix, atol=1e-8)
+        assert after.speed == before.speed
+        assert after.turn_speed == before.turn_speed or after.turn_speed == pytest.approx(before.turn_speed)
+        assert after.zone.value == before.zone.value
+    unknown = run(tmp_path, "MoveAbsJ home,v200,z10,gripper;", DATA.replace("[2,[0", "[0.001,[0"), robot=ROBOT)
+    named = write_program(unknown.listing(), "rapid", WriteOptions(ROBOT)).findings
+    assert [each.name for each in named if isinstance(each, ToolNotGiven)] == ["the load of gripper"]

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import Branch, numbers_of, pose_of
 from er3a.programs.syntax import Record, Value, finite, number, numbers
+from er3a.robots.masses import MassBody
 
 Shape = tuple["str | Shape", ...]
 """A type: its word alone, a record as its word and then pairs of a name and a shape, an array as ``[]`` and a shape."""
@@ -183,6 +184,23 @@ def rotation_of(value: Value | None) -> Reals | None:
     return found
 
 
+def load_of(value: Value | None) -> MassBody | None:
+    """Mass, centre and inertia of loaddata; None unless all its numbers are given.
+
+    3 loaddata: kg, mm, moments of inertia in kg m^2 about the axes aom through the centre of mass. 3 tooldata: a
+    tool's are those of the wrist's frame, which is the flange's.
+    """
+    mass, moments = number(part(value, "MASS")), [number(part(value, name)) for name in ("IX", "IY", "IZ")]
+    centre, R = plain(part(value, "COG"), 3), rotation_of(part(value, "AOM"))
+    given = [each for each in moments if each is not None]
+    if mass is None or not mass > 0 or centre is None or R is None or len(given) < 3:
+        return None
+    full = R @ np.diag(given) @ R.T
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = full.tolist()
+    x, y, z = (each / 1000 for each in centre)
+    return MassBody(mass, (x, y, z), (xx, yy, zz, xy, xz, yz))
+
+
 def orient_record(R: Reals) -> Record:
     """A rotation (3, 3) as an orient."""
     T = np.eye(4)
@@ -208,6 +226,8 @@ def moved_target(target: Record, T: Reals) -> Record:
 
 
 QUARTER = math.pi / 2
+LEAST_LOAD = 0.001
+"""kg, of a tool whose mass is not known: tool0 and most templates have it (3 loaddata)."""
 AT_A_QUARTER = 1e-3  # rad; nearer to a quarter's end an axis belongs to both: programs round their positions
 CONFIGURED = (0, 3, 5)
 """Axes whose quarters confdata gives: 1, 4 and 6."""

@@ -33,6 +33,7 @@ from er3a.programs.instructions import (
 )
 from er3a.programs.rapid.data_types import (
     JOINTTARGET,
+    LEAST_LOAD,
     NO_AXIS,
     ROBTARGET,
     SPEEDDATA,
@@ -43,6 +44,7 @@ from er3a.programs.rapid.data_types import (
     Shape,
     branch_of,
     external_axes,
+    load_of,
     moved_target,
     orient_record,
     part,
@@ -398,7 +400,8 @@ def _tool(memory: ProgramMemory, expression: object, value: Value) -> tuple[Name
     if pose is None:
         name = name or (value.text if isinstance(value, Unclear) else "tooldata")
         pose = _mapped(memory, name)
-    return NamedFrame(name, pose), stationary
+    load = load_of(part(typed(value, TOOLDATA), "TLOAD"))
+    return NamedFrame(name, pose, load if load is not None and load.mass > LEAST_LOAD else None), stationary
 
 
 def _base(memory: ProgramMemory, expression: object, value: Value | None) -> tuple[NamedFrame, bool]:

@@ -24,11 +24,19 @@ from er3a.programs.instructions import (
     Zone,
     numbers_of,
 )
-from er3a.programs.rapid.data_types import AXIS_SPEED, SLIDE_SPEED, TOOL_SPEEDS, TURN_SPEED, ZONES, quarters_of
+from er3a.programs.rapid.data_types import (
+    AXIS_SPEED,
+    LEAST_LOAD,
+    SLIDE_SPEED,
+    TOOL_SPEEDS,
+    TURN_SPEED,
+    ZONES,
+    quarters_of,
+)
 from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, ascii_text, fixed, share_of_max, short
+from er3a.robots.masses import MassBody
 
 NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
-LEAST_LOAD = "[0.001,[0,0,0.001],[1,0,0,0],0,0,0]"
 DIGITS, QUATERNION_DIGITS = 6, 10
 RESERVED_TEXT = """
 alias and backward case connect const default div do else elseif endfor endfunc endif endmodule endproc endrecord
@@ -152,8 +160,9 @@ class RapidWriter(Writer):
             self.frames[key] = name
             pose = _pose_text(frame.pose)
             if kind == "tool":
-                self.declared.append(f"PERS tooldata {name}:=[TRUE,{pose},{LEAST_LOAD}];")
-                self.name_tool(f"the load of {name}")
+                self.declared.append(f"PERS tooldata {name}:=[TRUE,{pose},{_load_text(frame.load)}];")
+                if frame.load is None:
+                    self.name_tool(f"the load of {name}")
             else:
                 null_pose = "[[0,0,0],[1,0,0,0]]"
                 self.declared.append(f'PERS wobjdata {name}:=[FALSE,TRUE,"",{pose},{null_pose}];')
@@ -215,6 +224,20 @@ class RapidWriter(Writer):
 def _joints_text(joints: Reals) -> str:
     degrees = [fixed(math.degrees(value), DIGITS) for value in joints]
     return f"[[{','.join([*degrees, *['0'] * (6 - len(degrees))])}],{NO_AXES}]"
+
+
+def _load_text(load: MassBody | None) -> str:
+    """loaddata, with the principal axes of the inertia; the least that a controller takes if it is not known."""
+    if load is None:
+        return f"[{LEAST_LOAD},[0,0,{LEAST_LOAD}],[1,0,0,0],0,0,0]"
+    moments, axes = np.linalg.eigh(load.inertia_matrix)
+    if np.array_equal(load.inertia_matrix, np.diag(np.diag(load.inertia_matrix))):
+        moments, axes = np.diag(load.inertia_matrix), np.eye(3)
+    turn = np.eye(4)
+    turn[:3, :3] = axes if np.linalg.det(axes) > 0 else -axes
+    quaternion = ",".join(fixed(each, QUATERNION_DIGITS) for each in numbers_of(turn, "abb")[3:])
+    centre = ",".join(short(each * 1000) for each in load.centre)
+    return f"[{short(load.mass)},[{centre}],[{quaternion}],{','.join(short(float(each), 9) for each in moments)}]"
 
 
 def _pose_text(pose: Reals) -> str:
