@@ -390,6 +390,11 @@ def test_modules_share_what_is_not_local(tmp_path):
     np.testing.assert_allclose([each.target.pose[:2, 3] * 1000 for each in found], [[15, 57], [6, 6]])
 
 
+def test_what_an_instruction_reads_has_no_known_value(tmp_path):
+    for body in ("TPReadNum n,text;", "flag:=StrToVal(text,n);", "IF StrToVal(text,n) Stop;", "ReadRawBytes raw,n;"):
+        assert isinstance(move(tmp_path, f"{body} MoveL Offs(p,n,0,0),@;").target, UnresolvedTarget), body
+
+
 def test_both_sides_of_a_signal_are_followed(tmp_path):
     execution = run(tmp_path, "IF di1=1 THEN MoveL p,@; ELSE MoveL down,@; ENDIF")
     assert len(motions(execution)) == 2

@@ -40,6 +40,7 @@ from er3a.programs.syntax import (
     Value,
     Variable,
     Waiting,
+    inner,
     number,
 )
 
@@ -82,6 +83,10 @@ CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
 """Motions that call a procedure, named by a text, where they end."""
 CHANGING = {"TPREADNUM": 0, "TPREADFK": 0, "TPREADDNUM": 0, "GETSYSDATA": 0, "GETDATAVAL": 1}
 """Instructions that change one of their arguments, by its number."""
+READING = ("READ", "GET", "UNPACK", "RMQGET", "RMQREAD", "SOCKETRECEIVE", "SOCKETACCEPT", "UIMSGBOX", "PACK", "COPYRAW")
+"""How instructions begin that may change any variable that they are given."""
+CHANGING_FUNCTIONS = {"STRTOVAL": 1, "TESTANDSET": 0, "GETNEXTSYM": 0}
+"""Functions that change one of their arguments, by its number."""
 WAITS = frozenset(
     (
         *("WAITDI", "WAITDO", "WAITAI", "WAITAO", "WAITGI", "WAITGO", "WAITUNTIL", "WAITSYNCTASK", "WAITTESTANDSET"),
@@ -129,7 +134,6 @@ NOT_SIMULATED = frozenset(
             "WZDISABLE",
             "WZFREE",
             "MOTIONPROCESSMODESET",
-            "PATHACCLIM",
         ),
     )
 )
@@ -677,6 +681,16 @@ class _BodyReader:
             tuple((name, settled(each)) for name, each in named),
         )
 
+    def forget_changed(self, place: Place, expression: Expression, text: str) -> None:
+        """What a function in an expression changes has no known value behind it."""
+        for each in inner(expression):
+            self.forget_changed(place, each, text)
+        if isinstance(expression, Invocation) and expression.function in CHANGING_FUNCTIONS:
+            at = CHANGING_FUNCTIONS[expression.function]
+            given = expression.arguments[at] if at < len(expression.arguments) else None
+            if isinstance(given, (Variable, Element, Member)):
+                self.builder.add(Assign(place, given, Constant(Unclear(expression.function.lower())), text))
+
     def late(self, place: Place, called: Expression, given: Given, text: str) -> None:
         """A call of the procedure that a text names when the program runs: one after the other is asked for."""
         prefix, whole = _prefix(called)
@@ -730,6 +744,7 @@ class _BodyReader:
             words.finish()
             shape = self.scope.shapes.get(first) if isinstance(target, Variable) else None
             builder.add(Assign(place, target, self.scope.typed(value, shape), text))
+            self.forget_changed(place, value, text)
             return
         words.take()
         if first in PLAIN_WORDS:
@@ -769,6 +784,8 @@ class _BodyReader:
         changed = [each for key, each in named if key in ("TIMEFLAG", "VALUE")]
         if name in CHANGING and CHANGING[name] < len(placed):
             changed.append(placed[CHANGING[name]] or Constant(0))
+        if name.startswith(READING):
+            changed += [each for each in (*placed, *(each for _, each in named)) if each is not None]
         for each in changed:
             if isinstance(each, (Variable, Element, Member)):
                 builder.add(Assign(place, each, Constant(Unclear(f"what {name} gives")), text))
@@ -813,7 +830,9 @@ def _if(body: _BodyReader, place: Place) -> None:
     if cursor.at < len(cursor.tokens) and cursor.tokens[cursor.at].text == "THEN":
         cursor.at += 1
         text = _words_text(cursor, start)
-        builder.open_if(place, body.condition(condition), text)
+        found = body.condition(condition)
+        body.forget_changed(place, found, text)
+        builder.open_if(place, found, text)
         body.instructions("ENDIF", "ELSEIF", "ELSE")
         while cursor.word() != "ENDIF":
             if cursor.word() not in ("ELSEIF", "ELSE"):
@@ -837,6 +856,7 @@ def _if(body: _BodyReader, place: Place) -> None:
     except MisreadError:
         builder.unknown(place, text)
         return
+    body.forget_changed(place, test, text)
     kept = [each for each in tokens if each.kind != "comment"][words.at :]
     builder.open_if(place, test, cursor.text([each for each in tokens if each.kind != "comment"][: words.at]))
     body.instruction(place, kept)
