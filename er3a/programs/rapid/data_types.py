@@ -1,11 +1,10 @@
 """RAPID's structured data: their components, the predefined ones, and what poses, targets and frames mean.
 
 Entries are named as in ABB's *Technical reference manual: RAPID Instructions, Functions and Data types*
-(3HAC050917-001; 1 instructions, 2 functions, 3 data types, each by the alphabet): "3 robtarget" is the entry *robtarget*
-of its section 3. Read in ABB's own text (*Basic Characteristics RAPID*): confdata's quarters, robtarget,
-the frames of wobjdata. The bits of cfx are as two public post-processors write them. All else, such as the sizes of
-predefined zones, the order of RelTool's turns and the priorities of operators, is common knowledge that was not held
-against the manual's text.
+(3HAC050917-001; 1 instructions, 2 functions, 3 data types): "3 robtarget" is the entry *robtarget* of its section 3.
+Read in ABB's own text (*Basic Characteristics RAPID*): confdata's quarters, robtarget, the frames of wobjdata. The bits
+of cfx are as two public post-processors write them. All else, such as the sizes of predefined zones, the order of
+RelTool's turns and the priorities of operators, is common knowledge that was not held against the manual's text.
 """
 
 from __future__ import annotations
