@@ -326,21 +326,30 @@ class PlainWriter(Writer):
 
     def verbatim(self, text: str) -> None: ...
 '''
-    record = """    "plain": Language(
-        "PLAIN", (".plain",), re.compile(r"(?m)^GO "), read_plain, RplDialect, PlainWriter, SIX_ANGLES
-    ),
-    "csv": Language("""
+    record = '''"""Plain programs among the languages."""
+
+from __future__ import annotations
+
+import re
+
+from er3a.programs.language import SIX_ANGLES, Language
+from er3a.programs.plain.reader import read_plain
+from er3a.programs.plain.writer import PlainWriter
+from er3a.programs.rpl_dialect import RplDialect
+
+PLAIN = Language("PLAIN", (".plain",), re.compile(r"(?m)^GO "), read_plain, RplDialect, PlainWriter, SIX_ANGLES)
+'''
     edits = {
-        "er3a/programs/syntax.py": (('"xpl", "csv"]', '"xpl", "csv", "plain"]'),),
-        "er3a/programs/plain_reader.py": reader,
-        "er3a/programs/plain_writer.py": writer,
+        "er3a/programs/syntax.py": (('"rapid", "csv"]', '"rapid", "csv", "plain"]'),),
+        "er3a/programs/plain/__init__.py": "",
+        "er3a/programs/plain/language.py": record,
+        "er3a/programs/plain/reader.py": reader,
+        "er3a/programs/plain/writer.py": writer,
         "er3a/programs/languages.py": (
-            ('    "csv": Language(', record),
+            ('    "csv": Language(', '    "plain": PLAIN,\n    "csv": Language('),
             (
                 "from er3a.programs.program_files",
-                "from er3a.programs.plain_reader import read_plain\n"
-                "from er3a.programs.plain_writer import PlainWriter\n"
-                "from er3a.programs.program_files",
+                "from er3a.programs.plain.language import PLAIN\nfrom er3a.programs.program_files",
             ),
         ),
     }

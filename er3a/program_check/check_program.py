@@ -47,7 +47,7 @@ from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles
 from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
 from er3a.programs.instructions import ArmMotion, Decision, MovesBeside, Pause, Place, PoseTarget, Unknown
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import FormInferred, NameTwice, NotUnderstood
+from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
 from er3a.robots.robot import Robot
 
@@ -312,7 +312,9 @@ def _which(finding: CheckFinding) -> str:
 
 
 def _place_of(finding: CheckFinding, top: Place) -> Place:
-    return finding.place if isinstance(finding, (NameTwice, NotUnderstood, FormInferred)) else top
+    """Where a finding about the text stands."""
+    place = getattr(finding, "place", None)
+    return place if isinstance(place, Place) else top
 
 
 def _unreached(execution: Execution) -> tuple[Place, ...]:

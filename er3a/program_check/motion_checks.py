@@ -125,8 +125,14 @@ def tool_law(motion: ArmMotion, size: float, assumed: AssumedRates) -> MotionLaw
     return law_of(size, v, a)
 
 
-def joint_law(motion: ArmMotion, steps: Reals, limits: JointLimits, assumed: AssumedRates) -> MotionLaw:
-    """The law of a joint move whose joints turn by ``steps`` (n,) in rad, all together."""
+def joint_law(
+    motion: ArmMotion, steps: Reals, limits: JointLimits, assumed: AssumedRates, length: float = 0.0
+) -> MotionLaw:
+    """The law of a joint move whose joints turn by ``steps`` (n,) in rad, all together.
+
+    With a speed of the tool it takes as long as the tool's straight way of ``length`` (m), and no joint is faster than
+    it can be.
+    """
     speed, acceleration = motion.speed, motion.acceleration
     if speed is not None and speed.unit == "s" and speed.value > 0:
         return MotionLaw(speed.value, RAMP_OF_A_DURATION)
@@ -135,19 +141,23 @@ def joint_law(motion: ArmMotion, steps: Reals, limits: JointLimits, assumed: Ass
     if speed is not None and speed.unit == "rad/s" and speed.value > 0:
         a = _given(acceleration, "rad/s2") or float(limits.acceleration[lead])
         return law_of(float(size[lead]), speed.value, a)
-    share = _given(speed, "share") or assumed.joint_share
+    along = _given(speed, "m/s")
+    share = 1.0 if along is not None else _given(speed, "share") or assumed.joint_share
     quick = _given(acceleration, "share") or 1.0
     laws = [
         law_of(float(way), float(v) * share, float(a) * quick)
         for way, v, a in zip(size, limits.speed, limits.acceleration)
         if way > 0
     ]
-    return max(laws, key=lambda law: law.duration)
+    law = max(laws, key=lambda law: law.duration)
+    if along is None or law.duration >= length / along:
+        return law
+    return MotionLaw(length / along, law.ramp)
 
 
 def is_given(motion: ArmMotion) -> bool:
     """Whether a motion's speed is one that its law uses."""
-    units = ("s", "rad/s", "share") if motion.kind == "joint" else ("s", "m/s")
+    units = ("s", "rad/s", "share", "m/s") if motion.kind == "joint" else ("s", "m/s")
     return motion.speed is not None and motion.speed.unit in units and motion.speed.value > 0
 
 
@@ -290,10 +300,10 @@ def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: Ch
     step = end - start
     if np.abs(step).max() < NO_WAY:
         return None
-    law = joint_law(motion, step, rules.limits, rules.assumed)
-    move = _JointMove(law, start, step)
     tool = forward(arm, np.stack([start, end]))
     moved = float(np.linalg.norm(tool[1, :3, 3] - tool[0, :3, 3]))
+    law = joint_law(motion, step, rules.limits, rules.assumed, moved)
+    move = _JointMove(law, start, step)
     turn = tool[1, :3, :3] @ tool[0, :3, :3].T
     turned = float(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
     times = np.linspace(0.0, law.duration, _points(0.0, float(np.abs(step).max())))
@@ -342,10 +352,12 @@ def tool_way(
         shape = line(T_start, end, 1.0) if via is None else _arc(T_start, via, end, (1.0, None), motion.angle)
     except PoseError:
         return ArcHasNoCircle()
-    size = max(shape.length, TURN_LENGTH * shape.turned)
-    if size < NO_WAY:
+    turn_length = TURN_LENGTH
+    if motion.turn_speed is not None and motion.speed is not None and motion.speed.unit == "m/s":
+        turn_length = motion.speed.value / motion.turn_speed
+    if max(shape.length, TURN_LENGTH * shape.turned) < NO_WAY:
         return None
-    law = tool_law(motion, size, rules.assumed)
+    law = tool_law(motion, max(shape.length, turn_length * shape.turned), rules.assumed)
     path: Segment = (
         line(T_start, end, law.duration, None, law.ramp)
         if via is None

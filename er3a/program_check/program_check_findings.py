@@ -190,6 +190,15 @@ class TurnNotMet:
 
 
 @dataclass(frozen=True)
+class ConfigurationNotMet:
+    """No solution within the limits has the target's configuration, or a ``line`` does not arrive in it."""
+
+    text: str
+    where: Literal["target", "line"]
+    code: Literal["configuration_not_met"] = "configuration_not_met"
+
+
+@dataclass(frozen=True)
 class ConfigurationNotRead:
     """What the target says of its configuration is not known; the solution nearest to the joints before was taken."""
 
@@ -419,6 +428,7 @@ CheckFinding = (
     | ArrivesOtherwise
     | TurnsAtStart
     | TurnNotMet
+    | ConfigurationNotMet
     | ConfigurationNotRead
     | ConfigurationGuessed
     | MotionCollides

@@ -62,6 +62,7 @@ from er3a.program_check.program_check_findings import (
     CheckFinding,
     ClearOfAssumed,
     ConfigurationGuessed,
+    ConfigurationNotMet,
     ConfigurationNotRead,
     ExternalAxesLeftOut,
     FrameNotGiven,
@@ -81,6 +82,7 @@ from er3a.program_check.program_check_findings import (
     ZoneTooLarge,
     ZoneWithoutSize,
 )
+from er3a.programs.branches import on_branch
 from er3a.programs.execution import Ending, Execution
 from er3a.programs.instructions import (
     ArmMotion,
@@ -97,7 +99,6 @@ from er3a.robots.robot import Robot
 
 FLANGE = "tool0"
 SAME_DIGITS = 6  # of angles in rad
-SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,15 +202,13 @@ def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals
         return Goal(None, pose, True, (*placed.taken, TargetOutOfReach(found.unsolved)))
     rows = found.q[found.within_limits] if found.within_limits.any() else found.q
     findings: list[CheckFinding] = list(placed.taken)
-    given = dict(target.configuration)
-    turn = given.get("T")
-    if isinstance(turn, (int, float)) and placed.motion.kind == "joint":
-        met = _with_signs(rows, int(turn))
-        rows = rows if met is None else met
-        if met is None:
-            findings.append(TurnNotMet(int(turn)))
-    elif given and placed.motion.kind == "joint" and _different(rows) > 1:
-        words = (f"S {value:g}" if key == "S" else f"{value}" for key, value in given.items())
+    joint = placed.motion.kind == "joint"
+    if target.branch is not None and joint:
+        met = on_branch(placed.arm, rows, target.branch)
+        rows = rows[met] if met.any() else rows
+        findings += () if met.any() else (_branch_not_met(target, joint),)
+    elif target.configuration and target.branch is None and joint and _different(rows) > 1:
+        words = (f"S {value:g}" if key == "S" else f"{value}" for key, value in target.configuration)
         findings.append(ConfigurationNotRead(", ".join(words)))
     if reference is None and not findings and (different := _different(rows)) > 1:
         findings.append(ConfigurationGuessed(different))
@@ -223,12 +222,13 @@ def _different(rows: Reals) -> int:
     return len(np.unique(np.round(rows, SAME_DIGITS), axis=0))
 
 
-def _with_signs(rows: Reals, turn: int) -> Reals | None:
-    """The solutions whose joints have the signs that KRL's Turn gives: bit i - 1 is set where axis i is below 0."""
-    below = np.array([(turn >> i) & 1 for i in range(rows.shape[1])], bool)
-    met = ((rows < 0) == below) | (np.abs(rows) < SIGN_ZERO)
-    kept = met.all(axis=1)
-    return rows[kept] if kept.any() else None
+def _branch_not_met(target: PoseTarget, joint: bool) -> CheckFinding:
+    """That no solution has the configuration of a target, or that a line does not arrive in it."""
+    given = dict(target.configuration)
+    if isinstance(turn := given.get("T"), (int, float)):
+        return TurnNotMet(int(turn))
+    shown = ", ".join(f"{key} {value:g}" if isinstance(value, float) else f"{value}" for key, value in given.items())
+    return ConfigurationNotMet(shown, "target" if joint else "line")
 
 
 MOST_REASONS = 1000  # targets out of reach for which it is told why
@@ -736,6 +736,10 @@ class StepChecker:
         if any(isinstance(each, WayOutOfReach) for each in way.findings):
             findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
         told = (*findings, *way.findings)
+        target = placed.motion.target
+        if isinstance(target, PoseTarget) and target.branch is not None and way.end is not None:
+            arrived = on_branch(way.arm, way.end[None], target.branch)[0]
+            told += () if arrived else (_branch_not_met(target, joint=False),)
         return self._measured(CheckedMotion(kind, placed, before, way, way.end, told, moments=way.moments))
 
     def _via(self, placed: PlacedMotion, before: Reals) -> Reals | None:
@@ -877,7 +881,8 @@ def _key(motion: ArmMotion) -> Hashable:
     frames = tuple(
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
     )
-    return (motion.kind, targets, motion.angle, motion.speed, motion.acceleration, motion.zone, frames)
+    rates = (motion.speed, motion.turn_speed, motion.acceleration)
+    return (motion.kind, targets, motion.angle, rates, motion.zone, frames)
 
 
 def _target_key(target: Target | None) -> Hashable:
@@ -886,5 +891,5 @@ def _target_key(target: Target | None) -> Hashable:
             return (target.joints.tobytes(), target.external)
         case PoseTarget():
             near = None if target.near is None else target.near.tobytes()
-            return (target.pose.tobytes(), target.configuration, near, target.external)
+            return (target.pose.tobytes(), target.configuration, target.branch is None, near, target.external)
     return target

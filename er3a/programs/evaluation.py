@@ -161,6 +161,7 @@ ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "*": operator.mul,
     "%": operator.mod,
     "MOD": operator.mod,
+    "DIV": lambda a, b: float(int(a / b)),
 }
 IN_DEGREES: Mapping[str, Callable[[float], float]] = {
     "SIN": lambda x: math.sin(math.radians(x)),

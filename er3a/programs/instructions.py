@@ -34,6 +34,7 @@ import scipy
 from er3a.by_value import ByValue
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
+from er3a.robots.masses import MassBody
 
 RateUnit = Literal["m/s", "m/s2", "rad/s", "rad/s2", "share", "s"]
 ZoneKind = Literal["fine", "distance", "angle", "share", "velocity", "named"]
@@ -105,10 +106,12 @@ class NamedFrame(ByValue):
     ----------
     name : as the program calls it (``TOOL_DATA[3]``, ``tool0``); empty if it names none
     pose : (4, 4), m; None if the program does not give it
+    load : mass of a tool in the flange's frame; None if the program does not give it
     """
 
     name: str = ""
     pose: Reals | None = None
+    load: MassBody | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,12 +128,30 @@ class JointTarget(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Branch(ByValue):
+    """Which of several solutions a target means.
+
+    Attributes
+    ----------
+    ranges : (n, 2), rad, from where to where each joint may be; infinite where it may be anywhere
+    behind_axis_1 : whether the wrist centre is on the other side of axis 1 than with all joints at 0; None for either
+    behind_lower_arm : the same of the line from axis 2 to axis 3
+    """
+
+    ranges: Reals
+    behind_axis_1: bool | None = None
+    behind_lower_arm: bool | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PoseTarget(ByValue):
     """T_base_tool (4, 4) in m, in the motion's base and for its tool.
 
     Attributes
     ----------
-    configuration : what the program says about the branch, as it says it: KRL's S and T, RPL's CFG and turns
+    configuration : what the program says about the branch, as it says it: KRL's S and T, RPL's CFG and turns, RAPID's
+        confdata
+    branch : what is understood of that; None for nothing
     near : (n,), rad, joints that the solution shall be near to
     joints : (n,), rad, the solution, where it is known
     external : as of :class:`JointTarget`
@@ -141,6 +162,7 @@ class PoseTarget(ByValue):
     near: Reals | None = None
     joints: Reals | None = None
     external: tuple[tuple[str, float], ...] = ()
+    branch: Branch | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +193,8 @@ class ArmMotion(ByValue):
     angle : rad, by which the arc goes on (KRL's CA); None if it ends at the target
     spline_block : number of the spline block that it belongs to
     speed, acceleration : None where the program leaves them as they are on the controller
+    turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
+        as lengths do
     """
 
     kind: MotionKind
@@ -184,6 +208,7 @@ class ArmMotion(ByValue):
     tool: NamedFrame = field(default_factory=NamedFrame)
     base: NamedFrame = field(default_factory=NamedFrame)
     spline_block: int | None = None
+    turn_speed: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from er3a.programs.instructions import (
     FINE,
     ArmMotion,
     Aside,
+    Branch,
     Instruction,
     JointTarget,
     MotionKind,
@@ -47,6 +49,7 @@ FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
 AXIS_KINDS = ("AXIS", "E6AXIS")
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
+SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 Frames = tuple[NamedFrame, NamedFrame]
 UNREAD = Unclear("")
@@ -167,7 +170,16 @@ def _pose(memory: ProgramMemory, value: Record, frames: Frames, text: str) -> Ta
         given = [old if each is None else each for each, old in zip(given, numbers_of(seen, "kuka"))]
     plain = tuple(each for each in given if each is not None)
     configuration = tuple((key, part) for key in ("S", "T") if (part := number(value.get(key))) is not None)
-    return PoseTarget(pose_of(plain, "kuka"), configuration, external=_external(value))
+    branch = _branch(dict(configuration).get("T"), memory.cell.joints)
+    return PoseTarget(pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch)
+
+
+def _branch(turn: float | None, joints: int) -> Branch | None:
+    """What Turn says of a solution: bit i - 1 is set where axis i is below 0."""
+    if turn is None:
+        return None
+    below = [(int(turn) >> i) & 1 for i in range(joints)]
+    return Branch(np.array([(-np.inf, SIGN_ZERO) if each else (-SIGN_ZERO, np.inf) for each in below]))
 
 
 def tool_of(memory: ProgramMemory) -> NamedFrame:
@@ -526,6 +538,8 @@ class KrlDialect:
         made = [make(memory, value, (tool, base), (move.text, in_tool)) for value in values]
         if kind in ("line", "arc", "spline") and memory.read("$ORI_TYPE") == "#CONSTANT":
             made = [self._unturned(memory, each, (tool, base)) for each in made]
+        if kind != "joint":  # which ignores S and T
+            made = [replace(each, branch=None) if isinstance(each, PoseTarget) else each for each in made]
         via = made[0] if kind == "arc" else None
         block = memory.shared.get("%spline")
         return ArmMotion(
@@ -551,7 +565,7 @@ class KrlDialect:
             return UnresolvedTarget("$ORI_TYPE=#CONSTANT", "position_unknown")
         pose = goal.pose.copy()
         pose[:3, :3] = seen[:3, :3]
-        return PoseTarget(pose, goal.configuration, external=goal.external)
+        return replace(goal, pose=pose)
 
     def _argument(self, memory: ProgramMemory, argument: Expression | None) -> Value:
         """A motion's argument; to go to where the arm stands, wherever that is, no joint moves."""

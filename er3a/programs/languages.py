@@ -1,4 +1,4 @@
-"""The languages of robot programs, and programs read and written in them: one record for each language.
+"""Programs read and written in the languages that are registered here: one record for each language.
 
 :func:`read_program` tells a file's language and reads it; :func:`write_program` writes a sequence;
 :func:`er3a.programs.machine.execute` runs what was read, by the language's dialect.
@@ -7,20 +7,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs.csv_program import read_csv_program
-from er3a.programs.evaluation import MOST_ROBOT_AXES, Dialect
+from er3a.programs.evaluation import MOST_ROBOT_AXES
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing
 from er3a.programs.krl_dialect import KrlDialect
 from er3a.programs.krl_reader import read_krl
 from er3a.programs.krl_writer import KrlWriter
+from er3a.programs.language import SIX_ANGLES, Language
 from er3a.programs.lexing import ProgramText, read_program_text
 from er3a.programs.program_files import POINTS
 from er3a.programs.program_findings import NothingMoves
+from er3a.programs.rapid.language import RAPID
 from er3a.programs.rpl_dialect import RplDialect
 from er3a.programs.rpl_reader import read_rpl
 from er3a.programs.rpl_writer import RplWriter, XplWriter
@@ -28,37 +30,10 @@ from er3a.programs.syntax import Fixed, LanguageName, Move, Program
 from er3a.programs.urscript_dialect import UrScriptDialect
 from er3a.programs.urscript_reader import read_urscript
 from er3a.programs.urscript_writer import UrScriptWriter
-from er3a.programs.writing import WriteOptions, Writer, WrittenProgram
+from er3a.programs.writing import WriteOptions, WrittenProgram
 from er3a.programs.xpl_reader import read_xpl
 from er3a.robots.robot import Robot
 
-
-@dataclass(frozen=True)
-class Language:
-    """A language of robot programs.
-
-    Attributes
-    ----------
-    title : what it is called
-    suffixes : of its files, the usual one first, in small letters
-    sign : what texts of the language have; None where the opening alone tells
-    opening : with what all its texts begin, and those of no other language
-    dialect : how its expressions, motions and functions are meant when a program runs
-    writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
-    joints : how many joint angles a target can have; None for any number, of joints that slide too
-    """
-
-    title: str
-    suffixes: tuple[str, ...]
-    sign: re.Pattern[str] | None
-    reader: Callable[[ProgramText], Program]
-    dialect: Callable[[Program], Dialect]
-    writer: Callable[[Listing, WriteOptions], Writer] | None
-    joints: range | None
-    opening: str = ""
-
-
-SIX_ANGLES = range(6, 7)
 ROBOT_AXES = range(1, MOST_ROBOT_AXES + 1)  # A1 to A6 of KRL; E1 to E6 are axes beside the arm
 KRL_SIGN = r"(?im)^\s*(?:&ACCESS|(?:GLOBAL\s+)?DEF(?:FCT)?\s+[\w$\[\]\s]*\([^)]*\)\s*(?:;.*)?$|(?:S?PTP|S?LIN)\s+[{X])"
 URSCRIPT_SIGN = r"(?m)^\s*(?:def\s+\w+\(.*\)\s*:|move[jlpc]\(|set_tcp\()"
@@ -77,6 +52,7 @@ LANGUAGES: dict[LanguageName, Language] = {
     ),
     "rpl": Language("RPL", (".pgm",), re.compile(RPL_SIGN), read_rpl, RplDialect, RplWriter, SIX_ANGLES),
     "xpl": Language("XPL", (".xpl",), None, read_xpl, RplDialect, XplWriter, SIX_ANGLES, opening="<"),
+    "rapid": RAPID,
     "csv": Language("CSV", (".csv",), re.compile(CSV_SIGN), read_csv_program, RplDialect, None, None),
 }
 """Languages by name, in the order in which their signs are looked for."""
@@ -86,7 +62,7 @@ WITHOUT_JOINTS = "Write a table (csv), or a language that has these joints"
 
 
 def read_program(path: str | Path) -> Program:
-    """Read a robot program: KUKA KRL, URScript, EFORT RPL as text or XML, or a CSV table of joints.
+    """Read a robot program: KUKA KRL, URScript, EFORT RPL as text or XML, ABB RAPID, or a CSV table of joints.
 
     Raises
     ------

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from er3a.programs.lexing import read_program_text
+from er3a.programs.rapid import files as rapid
 
 POINTS = {".src": ".dat", ".sub": ".dat", ".pgm": ".var"}
 """Suffix of the file with a program's points, by that of the program."""
@@ -20,7 +21,8 @@ DEEPEST = 6  # folders of an archive
 def files_of(path: Path) -> tuple[Path, ...]:
     """A program's file, the modules that it calls, and the files with their points and frames, where there are such."""
     suffix = path.suffix.lower()
-    modules = (path, *modules_of(path)) if suffix in KRL and path.is_file() else (path,)
+    finder = MODULES.get(suffix)
+    modules = (path, *finder(path)) if finder is not None and path.is_file() else (path,)
     beside = [data_file_of(module, POINTS[suffix]) for module in modules] if suffix in POINTS else []
     shared = shared_data_of(path) if suffix in KRL else None
     return tuple(file for file in (*modules, *beside, shared) if file is not None)
@@ -47,6 +49,13 @@ def modules_of(path: Path) -> tuple[Path, ...]:
         found += new
         waiting += new
     return tuple(found)
+
+
+MODULES: dict[str, Callable[[Path], tuple[Path, ...]]] = {
+    **dict.fromkeys(KRL, modules_of),
+    **dict.fromkeys(rapid.SUFFIXES, rapid.modules_of),
+}
+"""By the suffix of a program, what finds the modules that it uses."""
 
 
 def data_file_of(path: Path, suffix: str) -> Path | None:

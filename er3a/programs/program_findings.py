@@ -36,6 +36,15 @@ class NotUnderstood:
 
 
 @dataclass(frozen=True)
+class NotSimulated:
+    """An instruction that is understood, but what it does to motions is not followed."""
+
+    text: str
+    place: Place
+    code: Literal["program_not_simulated"] = "program_not_simulated"
+
+
+@dataclass(frozen=True)
 class FormInferred:
     """An element whose form is not known from any file of the controller; it was read as like ones are built."""
 
@@ -59,7 +68,9 @@ class NothingMoves:
     code: Literal["program_nothing_moves"] = "program_nothing_moves"
 
 
-ProgramFinding = DataFileMissing | NameTwice | NotUnderstood | FormInferred | OtherEncoding | NothingMoves
+ProgramFinding = (
+    DataFileMissing | NameTwice | NotUnderstood | NotSimulated | FormInferred | OtherEncoding | NothingMoves
+)
 
 
 @dataclass(frozen=True)

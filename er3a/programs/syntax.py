@@ -113,7 +113,7 @@ def shown(value: Value) -> str:
 START = "%start"
 """Result of the call with which a program begins whose variables are those of its first routine."""
 
-LanguageName = Literal["krl", "urscript", "rpl", "xpl", "csv"]
+LanguageName = Literal["krl", "urscript", "rpl", "xpl", "rapid", "csv"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,9 +18,11 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Reals
+from er3a.programs.branches import on_branch
 from er3a.programs.instructions import (
     ArmMotion,
     Aside,
+    Branch,
     Decision,
     Disabled,
     Instruction,
@@ -145,8 +147,12 @@ class Resolver:
             self._solve_next()
         return self._solved[number]
 
-    def solve(self, poses: Reals, frames: Frames, near: Reals | None) -> list[Reals | None]:
+    def solve(
+        self, poses: Reals, frames: Frames, near: Reals | None, branch: Branch | None = None
+    ) -> list[Reals | None]:
         """Joints (n,) of poses (k, 4, 4) one after another, each nearest to those before and within the limits.
+
+        Of solutions on a ``branch`` only, where there are some.
 
         The list ends behind the first pose that has none, with None.
         """
@@ -158,7 +164,8 @@ class Resolver:
         chain: list[Reals] = []
         for _ in range(MOST_ROUNDS):  # until each pose is solved with the joints before it as reference
             try:
-                chain = _chain(inverse_batch(self.arm, flanges, references), reference)
+                found = inverse_batch(self.arm, flanges, references)
+                chain = _chain(found, reference, self.arm, branch)
             except PoseError:
                 return [None]
             before = np.stack([reference, *chain])[: len(flanges)]
@@ -202,7 +209,8 @@ class Resolver:
         if not isinstance(target, PoseTarget) or target.joints is not None:
             return getattr(target, "joints", None)
         near = before if target.near is None else target.near
-        return self.solve(target.pose[None], _frames(motion), near)[0]
+        branch = target.branch if motion.kind == "joint" else None
+        return self.solve(target.pose[None], _frames(motion), near, branch)[0]
 
     def _pose_in(self, frames: Frames) -> Reals | None:
         """Where the tool is, in a base for a tool."""
@@ -245,11 +253,13 @@ def _is_followed(motion: ArmMotion) -> bool:
     return given and motion.kind != "joint" and motion.angle is None
 
 
-def _chain(found: Solutions, reference: Reals) -> list[Reals]:
+def _chain(found: Solutions, reference: Reals, arm: Robot, branch: Branch | None) -> list[Reals]:
     """The solution of each pose that is nearest to the one before, up to the first pose that has none."""
     chain: list[Reals] = []
     rows = np.where((found.solved & found.within_limits)[..., None], found.q, np.inf)
     for solutions in rows:
+        if branch is not None and (met := on_branch(arm, solutions, branch) & np.isfinite(solutions[:, 0])).any():
+            solutions = np.where(met[:, None], solutions, np.inf)
         away = np.abs(solutions - reference).max(axis=1)
         best = int(away.argmin())
         if not np.isfinite(away[best]):

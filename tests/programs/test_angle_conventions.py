@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import transform
 from er3a.programs.instructions import Convention, numbers_of, pose_of
+from er3a.programs.languages import read_program
+from er3a.programs.machine import execute
 
 robomath = pytest.importorskip("robodk.robomath")
 CONVENTIONS: tuple[Convention, ...] = ("kuka", "efort", "staubli", "ur", "abb")
@@ -75,3 +77,40 @@ def test_abb_as_an_outsider_writes_it():
         np.testing.assert_allclose(pose_of(robomath.Pose_2_ABB(as_outsider(T)), "abb"), T, atol=1e-7)
         quaternion = robomath.quaternion_2_pose(list(numbers_of(T, "abb")[3:]))
         np.testing.assert_allclose(as_pose(quaternion)[:3, :3], T[:3, :3], atol=1e-9)
+
+
+def test_programs_in_the_form_of_an_outsiders_post_are_read_to_a_hundredth_of_a_millimetre(tmp_path):
+    """The lines of RoboDK's post for ABB: mm to three digits, quaternions to eight, a comma before each option."""
+    no_axes = "[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]"
+    wanted, lines = poses(60), []
+    for T in wanted:
+        x, y, z, *turn = robomath.Pose_2_ABB(as_outsider(T))
+        pose = f"[{x:.3f}, {y:.3f}, {z:.3f}],[{', '.join(f'{each:.8f}' for each in turn)}]"
+        lines.append(f"        MoveL [{pose},[0,0,0,0],{no_axes}],rdkSpeed,z1,rdkTool,\\WObj:=rdkWObj;")
+    head = """%%%
+  VERSION:1
+  LANGUAGE:ENGLISH
+%%%
+
+MODULE MOD_Prog
+
+    LOCAL PERS tooldata rdkTool := [TRUE,[[0,0,0],[1,0,0,0]],[2,[0,0,15],[1,0,0,0],0,0,0.005]];
+    LOCAL PERS wobjdata rdkWObj := [FALSE, TRUE, "", [[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+    VAR speeddata rdkSpeed := [250,500,5000,1000]; ! set default speed
+
+    PROC Prog()
+        ConfJ \\On;
+        ConfL \\Off;
+        rdkTool := [TRUE,[[0.000,0.000,200.000],[1.00000000,0.00000000,0.00000000,0.00000000]],[2,[0,0,15],[1,0,0,0],0,0,0.005]];
+"""  # noqa: E501
+    path = tmp_path / "Prog.mod"
+    path.write_text(f"{head}{chr(10).join(lines)}\n    ENDPROC\n\nENDMODULE\n", encoding="utf-8")
+    program = read_program(path)
+    assert program.findings == ()
+    found = execute(program).listing().motions
+    for T, motion in zip(wanted, found, strict=True):
+        np.testing.assert_allclose(motion.target.pose[:3, 3], T[:3, 3], atol=1e-5)  # m
+        np.testing.assert_allclose(motion.target.pose[:3, :3], T[:3, :3], atol=1e-7)
+        np.testing.assert_allclose(motion.tool.pose[:3, 3], [0, 0, 0.2])
+        assert motion.tool.load.mass == 2.0
+        assert motion.speed.value == 0.25

@@ -34,9 +34,9 @@ from er3a.programs.program_findings import (
 )
 from er3a.programs.writing import WriteOptions
 
-LANGUAGES = ("krl", "urscript", "rpl", "xpl")
+LANGUAGES = ("krl", "urscript", "rpl", "xpl", "rapid")
 ROBOT = load_robot("er3a_c60")
-PRINTED = {"krl": 1e-6, "rpl": 1e-6, "xpl": 1e-6, "urscript": np.degrees(1e-9)}  # deg
+PRINTED = {"krl": 1e-6, "rpl": 1e-6, "xpl": 1e-6, "rapid": 1e-6, "urscript": np.degrees(1e-9)}  # deg
 
 
 def saved(folder, written):
@@ -105,10 +105,10 @@ def test_lines_and_arcs_are_written_read_and_written_again(language, tmp_path):
     assert again.files == written.files
     kinds = [each.kind for each in execution.listing().motions]
     assert kinds[:2] == ["joint", "line"]
-    assert ("arc" in kinds) == (language in ("krl", "urscript"))
+    assert ("arc" in kinds) == (language in ("krl", "urscript", "rapid"))
 
 
-@pytest.mark.parametrize("language", ["krl", "urscript"])
+@pytest.mark.parametrize("language", ["krl", "urscript", "rapid"])
 def test_poses_come_back_to_the_digits_printed(language, tmp_path):
     q, command = tool_path()
     path = listing_of(command, ROBOT, q)

@@ -71,6 +71,7 @@ REMEDIES: dict[str, str] = {
     "arrives_otherwise": N_("Teach the target again where the line arrives, or go there by a joint move."),
     "turns_at_start": N_("Turn the joint by a joint move first, or begin the line beside the singular pose."),
     "turn_not_met": N_("Correct the target's Turn (T), or teach the target again."),
+    "configuration_not_met": N_("Teach the target again, or correct its configuration."),
     "configuration_guessed": N_("Give start_deg of the program, or begin with a move to joint angles."),
     "moves_beside": BY_HAND,
     "never_reached": N_("Remove this motion, or check what leads to it as a program of its own."),
@@ -87,6 +88,7 @@ REMEDIES: dict[str, str] = {
     "line_not_checked": BY_HAND,
     "may_move": BY_HAND,
     "program_not_understood": BY_HAND,
+    "program_not_simulated": N_("Check on the controller what this instruction does to the motions behind it."),
     "program_form_inferred": N_("Compare this element with what the controller does."),
     "external_axes_left_out": N_("Check by hand that the external axes stand as assumed."),
     "target_not_given": N_("Give the target in the program or in its data file."),
@@ -149,6 +151,11 @@ TEXTS = texts(
             "rest"
         ),
         "turn_not_met": "no solution within the limits has the signs that T {turn} asks for; the nearest was taken",
+        "configuration_not_met": by(
+            "where",
+            target="no solution within the limits has the configuration {text}; the nearest was taken",
+            line="the line does not arrive in the configuration {text}; a controller that supervises it stops",
+        ),
         "configuration_not_read": (
             "the meaning of the configuration {text} is not known; the solution nearest to the joints before was taken"
         ),
@@ -244,6 +251,7 @@ TEXTS = texts(
         "program_data_file_missing": "{file} is missing, which holds the program's points",
         "program_name_twice": "{name} is declared twice; the later one counts",
         "program_not_understood": "not understood: {text}",
+        "program_not_simulated": "not simulated: {text}",
         "program_form_inferred": "the structure of <{element}> is not documented; it was read like that of <while>",
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
         "program_nothing_moves": "no instruction moves the arm",

@@ -1,0 +1,40 @@
+"""What a language of robot programs is: a record that says how its texts are known, read, meant and written."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from er3a.programs.evaluation import Dialect
+from er3a.programs.instructions import Listing
+from er3a.programs.lexing import ProgramText
+from er3a.programs.syntax import Program
+from er3a.programs.writing import WriteOptions, Writer
+
+SIX_ANGLES = range(6, 7)
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language of robot programs.
+
+    Attributes
+    ----------
+    title : what it is called
+    suffixes : of its files, the usual one first, in small letters
+    sign : what texts of the language have; None where the opening alone tells
+    opening : with what all its texts begin, and those of no other language
+    dialect : how its expressions, motions and functions are meant when a program runs
+    writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
+    joints : how many joint angles a target can have; None for any number, of joints that slide too
+    """
+
+    title: str
+    suffixes: tuple[str, ...]
+    sign: re.Pattern[str] | None
+    reader: Callable[[ProgramText], Program]
+    dialect: Callable[[Program], Dialect]
+    writer: Callable[[Listing, WriteOptions], Writer] | None
+    joints: range | None
+    opening: str = ""

@@ -1,0 +1,1 @@
+"""ABB RAPID: its record, reader, dialect and writer."""

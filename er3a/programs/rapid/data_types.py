@@ -1,0 +1,270 @@
+"""RAPID's structured data: their components, the predefined ones, and what poses, targets and frames mean.
+
+Entries are named as in ABB's *Technical reference manual: RAPID Instructions, Functions and Data types*
+(3HAC050917-001; 1 instructions, 2 functions, 3 data types): "3 robtarget" is the entry *robtarget* of its section 3.
+Read in ABB's own text (*Basic Characteristics RAPID*): confdata's quarters, robtarget, the frames of wobjdata. The bits
+of cfx are as two public post-processors write them. All else, such as the sizes of predefined zones, the order of
+RelTool's turns and the priorities of operators, is common knowledge that was not held against the manual's text.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from er3a.numerics.arrays import Reals
+from er3a.programs.instructions import Branch, numbers_of, pose_of
+from er3a.programs.syntax import Record, Value, finite, number, numbers
+from er3a.robots.masses import MassBody
+
+Shape = tuple["str | Shape", ...]
+"""A type: its word alone, a record as its word and then pairs of a name and a shape, an array as ``[]`` and a shape."""
+
+NUM: Shape = ("NUM",)
+BOOL: Shape = ("BOOL",)
+STRING: Shape = ("STRING",)
+
+
+def record_shape(kind: str, **items: Shape) -> Shape:
+    """The shape of a record."""
+    return (kind, *((name.upper(), shape) for name, shape in items.items()))
+
+
+POS = record_shape("POS", x=NUM, y=NUM, z=NUM)  # 3 pos: mm
+ORIENT = record_shape("ORIENT", q1=NUM, q2=NUM, q3=NUM, q4=NUM)  # 3 orient: a quaternion, the scalar first
+POSE = record_shape("POSE", trans=POS, rot=ORIENT)
+CONFDATA = record_shape("CONFDATA", cf1=NUM, cf4=NUM, cf6=NUM, cfx=NUM)
+EXTJOINT = record_shape("EXTJOINT", **{f"eax_{letter}": NUM for letter in "abcdef"})
+ROBJOINT = record_shape("ROBJOINT", **{f"rax_{i}": NUM for i in range(1, 7)})
+LOADDATA = record_shape("LOADDATA", mass=NUM, cog=POS, aom=ORIENT, ix=NUM, iy=NUM, iz=NUM)
+ROBTARGET = record_shape("ROBTARGET", trans=POS, rot=ORIENT, robconf=CONFDATA, extax=EXTJOINT)
+JOINTTARGET = record_shape("JOINTTARGET", robax=ROBJOINT, extax=EXTJOINT)
+TOOLDATA = record_shape("TOOLDATA", robhold=BOOL, tframe=POSE, tload=LOADDATA)
+WOBJDATA = record_shape("WOBJDATA", robhold=BOOL, ufprog=BOOL, ufmec=STRING, uframe=POSE, oframe=POSE)
+SPEEDDATA = record_shape("SPEEDDATA", v_tcp=NUM, v_ori=NUM, v_leax=NUM, v_reax=NUM)
+ZONE_ITEMS = ("pzone_tcp", "pzone_ori", "pzone_eax", "zone_ori", "zone_leax", "zone_reax")
+ZONEDATA = record_shape("ZONEDATA", finep=BOOL, **dict.fromkeys(ZONE_ITEMS, NUM))
+SHAPES: Mapping[str, Shape] = {
+    str(shape[0]): shape
+    for shape in (
+        *(NUM, ("DNUM",), BOOL, STRING, POS, ORIENT, POSE, CONFDATA, EXTJOINT, ROBJOINT, LOADDATA, ROBTARGET),
+        *(JOINTTARGET, TOOLDATA, WOBJDATA, SPEEDDATA, ZONEDATA),
+    )
+}
+"""Types whose components are known."""
+
+NO_AXIS = 9e9
+"""Of an external axis that is not there, or stays."""
+NULL_POSE = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+TOOL_SPEEDS = (
+    *(5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800),
+    *(1000, 1500, 2000, 2500, 3000, 4000, 5000, 6000, 7000),
+)
+"""3 speeddata: v5 to v7000, mm/s; each with 500 deg/s, 5000 mm/s, 1000 deg/s."""
+TURN_SPEED, SLIDE_SPEED, AXIS_SPEED = 500.0, 5000.0, 1000.0
+TURN_SPEEDS = {"VROT1": 1, "VROT2": 2, "VROT5": 5, "VROT10": 10, "VROT20": 20, "VROT50": 50, "VROT100": 100}
+SLIDE_SPEEDS = {
+    "VLIN10": 10,
+    "VLIN20": 20,
+    "VLIN50": 50,
+    "VLIN100": 100,
+    "VLIN200": 200,
+    "VLIN500": 500,
+    "VLIN1000": 1000,
+}
+FASTEST = "VMAX"
+ZONES: Mapping[str, tuple[float, ...]] = {
+    "Z0": (0.3, 0.3, 0.3, 0.03, 0.3, 0.03),
+    "Z1": (1, 1, 1, 0.1, 1, 0.1),
+    "Z5": (5, 8, 8, 0.8, 8, 0.8),
+    "Z10": (10, 15, 15, 1.5, 15, 1.5),
+    "Z15": (15, 23, 23, 2.3, 23, 2.3),
+    "Z20": (20, 30, 30, 3.0, 30, 3.0),
+    "Z30": (30, 45, 45, 4.5, 45, 4.5),
+    "Z40": (40, 60, 60, 6.0, 60, 6.0),
+    "Z50": (50, 75, 75, 7.5, 75, 7.5),
+    "Z60": (60, 90, 90, 9.0, 90, 9.0),
+    "Z80": (80, 120, 120, 12, 120, 12),
+    "Z100": (100, 150, 150, 15, 150, 15),
+    "Z150": (150, 225, 225, 23, 225, 23),
+    "Z200": (200, 300, 300, 30, 300, 30),
+}
+"""3 zonedata: mm of the path, of the turn and of external axes; deg; mm; deg."""
+
+
+def typed(value: Value, shape: Shape) -> Value:
+    """A value as its declared type has it: aggregates get the names of their components; others stay as they are."""
+    if not isinstance(value, tuple) or len(shape) == 1:
+        return value
+    if shape[0] == "[]":
+        assert isinstance(shape[1], tuple)
+        inside = shape[1]
+        return tuple(typed(each, inside) for each in value)
+    parts = shape[1:]
+    if len(parts) != len(value):
+        return value
+    items = []
+    for part, each in zip(parts, value):
+        assert isinstance(part, tuple)
+        assert isinstance(part[0], str)
+        assert isinstance(part[1], tuple)
+        items.append((part[0], typed(each, part[1])))
+    return Record(str(shape[0]), tuple(items))
+
+
+def starting(shape: Shape) -> Value | None:
+    """What a variable holds that is declared without a value (RAPID overview, 1 Data types); None if not known."""
+    if len(shape) == 1:
+        plain_values: dict[str, Value] = {"NUM": 0, "DNUM": 0, "BOOL": False, "STRING": ""}
+        return plain_values.get(str(shape[0]))
+    parts = [starting(part[1]) for part in shape[1:] if isinstance(part, tuple) and isinstance(part[1], tuple)]
+    found = tuple(each for each in parts if each is not None)
+    return typed(found, shape) if len(found) == len(shape) - 1 and shape[0] != "[]" else None
+
+
+def predefined(name: str) -> Value | None:
+    """The value of a name that every controller has."""
+    if name == "FINE":
+        return typed((True, *(0.0,) * 6), ZONEDATA)
+    if name in ZONES:
+        return typed((False, *ZONES[name]), ZONEDATA)
+    if name[:1] == "V" and name[1:].isdigit() and int(name[1:]) in TOOL_SPEEDS:
+        return typed((float(name[1:]), TURN_SPEED, SLIDE_SPEED, AXIS_SPEED), SPEEDDATA)
+    if name == FASTEST:  # how fast that is depends on the arm
+        return Record("SPEEDDATA", (("FASTEST", True),))
+    if name in TURN_SPEEDS:
+        return typed((0.0, 0.0, 0.0, float(TURN_SPEEDS[name])), SPEEDDATA)
+    if name in SLIDE_SPEEDS:
+        return typed((0.0, 0.0, float(SLIDE_SPEEDS[name]), 0.0), SPEEDDATA)
+    load = (0.001, (0.0, 0.0, 0.001), (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    values: dict[str, tuple[Value, Shape]] = {
+        "TOOL0": ((True, NULL_POSE, load), TOOLDATA),
+        "WOBJ0": ((False, True, "", NULL_POSE, NULL_POSE), WOBJDATA),
+        "LOAD0": (load, LOADDATA),
+    }
+    if name in values:
+        return typed(*values[name])
+    return {"PI": math.pi, "HIGH": 1, "LOW": 0, "EDGE": 2, "WAIT_MAX": 0}.get(name)
+
+
+def part(value: Value | None, *path: str) -> Value | None:
+    """A component of a record, however deep."""
+    for name in path:
+        value = value.get(name) if isinstance(value, Record) else None
+    return value
+
+
+def plain(value: Value | None, count: int) -> tuple[float, ...] | None:
+    """So many finite numbers of a record or aggregate, or None."""
+    values = value.values() if isinstance(value, Record) else value
+    if not isinstance(values, tuple) or len(values) != count:
+        return None
+    found = numbers(values)
+    return found if found is not None and finite(found) else None
+
+
+def pose_matrix(value: Value | None) -> Reals | None:
+    """The transform (4, 4) in m of a pose; None unless its seven numbers are given and its quaternion has a length."""
+    trans, rot = (part(value, "TRANS"), part(value, "ROT")) if isinstance(value, Record) else (None, None)
+    if isinstance(value, tuple) and len(value) == 2:
+        trans, rot = value
+    xyz, quaternion = plain(trans, 3), plain(rot, 4)
+    if xyz is None or quaternion is None or math.hypot(*quaternion) < 1e-6:
+        return None
+    return pose_of((*xyz, *quaternion), "abb")
+
+
+def rotation_of(value: Value | None) -> Reals | None:
+    """The rotation (3, 3) of an orient."""
+    quaternion = plain(value, 4)
+    if quaternion is None or math.hypot(*quaternion) < 1e-6:
+        return None
+    found: Reals = Rotation.from_quat([*quaternion[1:], quaternion[0]]).as_matrix()
+    return found
+
+
+def load_of(value: Value | None) -> MassBody | None:
+    """Mass, centre and inertia of loaddata; None unless all its numbers are given.
+
+    3 loaddata: kg, mm, moments of inertia in kg m^2 about the axes aom through the centre of mass. 3 tooldata: a
+    tool's are those of the wrist's frame, which is the flange's.
+    """
+    mass, moments = number(part(value, "MASS")), [number(part(value, name)) for name in ("IX", "IY", "IZ")]
+    centre, R = plain(part(value, "COG"), 3), rotation_of(part(value, "AOM"))
+    given = [each for each in moments if each is not None]
+    if mass is None or not mass > 0 or centre is None or R is None or len(given) < 3:
+        return None
+    full = R @ np.diag(given) @ R.T
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = full.tolist()
+    x, y, z = (each / 1000 for each in centre)
+    return MassBody(mass, (x, y, z), (xx, yy, zz, xy, xz, yz))
+
+
+def orient_record(R: Reals) -> Record:
+    """A rotation (3, 3) as an orient."""
+    T = np.eye(4)
+    T[:3, :3] = R
+    found = typed(numbers_of(T, "abb")[3:], ORIENT)
+    assert isinstance(found, Record)
+    return found
+
+
+def pos_record(xyz: Reals) -> Record:
+    """A position (3,) in m as a pos."""
+    return Record("POS", tuple(zip("XYZ", (float(each) * 1000 for each in xyz))))
+
+
+def pose_record(T: Reals) -> Record:
+    """A transform (4, 4) in m as a pose."""
+    return Record("POSE", (("TRANS", pos_record(T[:3, 3])), ("ROT", orient_record(T[:3, :3]))))
+
+
+def moved_target(target: Record, T: Reals) -> Record:
+    """A robtarget with another pose (4, 4) in m."""
+    return target.having("TRANS", pos_record(T[:3, 3])).having("ROT", orient_record(T[:3, :3]))
+
+
+QUARTER = math.pi / 2
+LEAST_LOAD = 0.001
+"""kg, of a tool whose mass is not known: tool0 and most templates have it (3 loaddata)."""
+AT_A_QUARTER = 1e-3  # rad; nearer to a quarter's end an axis belongs to both: programs round their positions
+CONFIGURED = (0, 3, 5)
+"""Axes whose quarters confdata gives: 1, 4 and 6."""
+
+
+def branch_of(conf: Value | None, joints: int) -> Branch | None:
+    """What confdata says of an arm's solution; None if its numbers are not given.
+
+    3 confdata: cf1, cf4 and cf6 are the quarter turns in which axes 1, 4 and 6 are: 0 from 0 to 90 deg, 1 from 90 to
+    180 deg, -1 from -90 to 0 deg. cfx is 0 to 7: 1 is added for a negative axis 5, 2 where the wrist centre is behind
+    the lower arm, 4 where it is behind axis 1.
+    """
+    given = plain(conf, 4)
+    if given is None or joints != 6:
+        return None
+    ranges = np.tile([-np.inf, np.inf], (joints, 1))
+    for axis, quarter in zip(CONFIGURED, given):
+        ranges[axis] = quarter * QUARTER - AT_A_QUARTER, (quarter + 1) * QUARTER + AT_A_QUARTER
+    sides = round(given[3])
+    if not 0 <= sides <= 7:
+        return Branch(ranges)
+    ranges[4] = (-np.inf, AT_A_QUARTER) if sides & 1 else (-AT_A_QUARTER, np.inf)
+    return Branch(ranges, bool(sides & 4), bool(sides & 2))
+
+
+def quarters_of(joints: Reals) -> tuple[int, ...]:
+    """cf1, cf4 and cf6 of joints (6,) in rad; within the tolerance of a quarter's end the one that goes on from it."""
+    return tuple(math.floor((float(joints[axis]) + 1e-9) / QUARTER) for axis in CONFIGURED)
+
+
+def external_axes(value: Value | None) -> tuple[tuple[str, float], ...]:
+    """Axes beside the arm that an extjoint moves: those that are there and not at 0."""
+    if not isinstance(value, Record):
+        value = typed(value, EXTJOINT) if value is not None else None
+    if not isinstance(value, Record):
+        return ()
+    given = ((name.lower(), number(each)) for name, each in value.items)
+    return tuple((name, each) for name, each in given if each and abs(each) < NO_AXIS / 10)

@@ -1,0 +1,742 @@
+"""What RAPID's motions, data and functions mean: mm, degrees, quaternions whose scalar is first.
+
+Sources are named as in :mod:`er3a.programs.rapid.data_types`: "2 RelTool" is the entry of the function RelTool.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from er3a.geometry.transforms import rpy_of, transform
+from er3a.numerics.arrays import Reals
+from er3a.programs.evaluation import ProgramMemory
+from er3a.programs.instructions import (
+    FINE,
+    ArmMotion,
+    Aside,
+    Instruction,
+    JointTarget,
+    MotionKind,
+    NamedFrame,
+    Output,
+    PoseTarget,
+    Rate,
+    Target,
+    Unknown,
+    UnresolvedTarget,
+    Zone,
+)
+from er3a.programs.rapid.data_types import (
+    JOINTTARGET,
+    LEAST_LOAD,
+    NO_AXIS,
+    ROBTARGET,
+    SPEEDDATA,
+    TOOLDATA,
+    TURN_SPEED,
+    WOBJDATA,
+    ZONEDATA,
+    Shape,
+    branch_of,
+    external_axes,
+    load_of,
+    moved_target,
+    orient_record,
+    part,
+    plain,
+    pos_record,
+    pose_matrix,
+    pose_record,
+    predefined,
+    quarters_of,
+    rotation_of,
+    typed,
+)
+from er3a.programs.rapid.reader import ABSENT, ARITHMETIC, LATE, SEARCHES, STEP, TYPED, UPPER, WAITS
+from er3a.programs.syntax import (
+    Doing,
+    Invocation,
+    Move,
+    Program,
+    Record,
+    Unclear,
+    Value,
+    Variable,
+    number,
+    numbers,
+    shown,
+)
+
+ROBOT_BASE = NamedFrame("wobj0", np.eye(4))
+JOINT_FORMS = ("MOVEJ", "TRIGGJ")
+ARC_FORMS = ("MOVEC", "TRIGGC", "SEARCHC")
+SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
+FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
+SETTINGS = ("CONFJ", "CONFL", "ACCSET", "VELSET", "PDISPSET", "PDISPON", "PDISPOFF", "PATHACCLIM")
+"""Instructions that motions behind them depend on, and that are followed."""
+MODAL = ("%CONFJ", "%CONFL", "%ACC", "%SPEED", "%PDISP", "%ACCLIM")
+OUTPUTS = frozenset(
+    (
+        *(
+            "SETDO",
+            "SETAO",
+            "SETGO",
+            "SET",
+            "RESET",
+            "PULSEDO",
+            "INVERTDO",
+        ),
+        *("MOTIONSUP", "TRIGGIO", "TRIGGEQUIP", "TRIGGINT", "TRIGGSPEED", "TRIGGCHECKIO", "TRIGGRAMPAO"),
+    )
+)
+HARMLESS_TEXT = """
+ACTEVENTBUFFER ALIASIO BITCLEAR BITSET BOOKERRNO CANCELLOAD CLEARIOBUFF CLEARRAWBYTES CLKRESET CLKSTART CLKSTOP CLOSE
+CLOSEDIR COPYFILE COPYRAWBYTES DEACTEVENTBUFFER ERRLOG ERRRAISE ERRWRITE EXITCYCLE FRICIDINIT GETDATAVAL GETSYSDATA
+GETTRAPDATA GRIPLOAD IDELETE IDISABLE IENABLE IERROR INVERTDO IODISABLE IOENABLE IPERS IRMQMESSAGE ISIGNALAI
+ISIGNALAO ISIGNALDI ISIGNALDO ISIGNALGI ISIGNALGO ISLEEP ITIMER IVARVALUE IWATCH LOAD MAKEDIR MECHUNITLOAD MOTIONSUP
+OPEN OPENDIR PACKDNHEADER PACKRAWBYTES PDISPOFF PROCERRRECOVERY PULSEDO READANYBIN READBLOCK READCFGDATA READERRDATA
+READRAWBYTES REMOVEDIR REMOVEFILE RENAMEFILE RESET RESETPPMOVED RESTOPATH REWIND RMQEMPTYQUEUE RMQFINDSLOT RMQGETMESSAGE
+RMQGETMSGDATA RMQGETMSGHEADER RMQREADWAIT RMQSENDMESSAGE RMQSENDWAIT SAVE SAVECFGDATA SENDMESSAGE SET
+SETAO SETDATASEARCH SETDO SETGO SETSYSDATA SKIPWARN SOCKETACCEPT SOCKETBIND SOCKETCLOSE SOCKETCONNECT
+SOCKETCREATE SOCKETLISTEN SOCKETRECEIVE SOCKETRECEIVEFROM SOCKETSEND SOCKETSENDTO SPYSTART SPYSTOP STARTLOAD STOREPATH
+TEXTTABINSTALL TPERASE TPREADDNUM TPREADFK TPREADNUM TPSHOW TPWRITE TRIGGCHECKIO TRIGGEQUIP TRIGGINT TRIGGIO
+TRIGGRAMPAO TRIGGSPEED TRYINT UIMSGBOX UIMSGWRITE UIMSGWRITEABORT UISHOW UNLOAD UNPACKRAWBYTES WARMSTART WORLDACCLIM
+WRITE WRITEANYBIN WRITEBIN WRITEBLOCK WRITECFGDATA WRITERAWBYTES WRITESTRBIN STOPMOVE STARTMOVE STOPMOVERESET
+"""
+HARMLESS = frozenset(HARMLESS_TEXT.split())
+"""Instructions that move nothing and set nothing that motions depend on (1, by their names)."""
+ASIDE_NAMED_TEXT = """
+SINGAREA SOFTACT SOFTDEACT CIRPATHMODE PATHRESOL MOTIONPROCESSMODESET CORRCON WZBOXDEF WZCYLDEF WZSPHDEF WZDISABLE
+WZENABLE WZFREE WZDOSET WZLIMSUP WZHOMEJOINTDEF WZLIMJOINTDEF ACTUNIT DEACTUNIT SYNCMOVEON SYNCMOVEOFF SYNCMOVERESUME
+SYNCMOVESUSPEND SYNCMOVEUNDO SUPSYNCSENSORON SUPSYNCSENSOROFF MOVEEXTJ INDAMOVE INDCMOVE INDDMOVE INDRMOVE INDRESET
+DROPWOBJ EOFFSON EOFFSSET EOFFSOFF
+"""
+ASIDE_NAMED = frozenset(ASIDE_NAMED_TEXT.split())
+"""Instructions that are named as not simulated: the arm itself goes where its targets say."""
+PARAMETERS: Mapping[str, int] = {
+    **{"OFFS": 4, "RELTOOL": 4, "POSEMULT": 2, "POSEINV": 1, "POSEVECT": 2, "ORIENTZYX": 3, "EULERZYX": 1},
+    **{"NORIENT": 1, "DEFFRAME": 3, "DISTANCE": 2, "DOTPROD": 2, "VECTMAGN": 1, "CROBT": 0, "CJOINTT": 0, "CPOS": 0},
+    **{"CTOOL": 0, "CWOBJ": 0, "CALCROBT": 2, "CALCJOINTT": 2, "ABS": 1, "SQRT": 1, "SIN": 1, "COS": 1, "TAN": 1},
+    **{"ASIN": 1, "ACOS": 1, "ATAN": 1, "ATAN2": 2, "POW": 2, "EXP": 1, "TRUNC": 1, "ROUND": 1, "DIM": 2},
+    **{"STRLEN": 1, "STRPART": 3, "STRMAP": 3, "NUMTOSTR": 2, "VALTOSTR": 1, "PRESENT": 1, "BITAND": 2, "BITOR": 2},
+    **{"MIRPOS": 2, "NUMTODNUM": 1, "DNUMTONUM": 1},
+}
+"""Functions that are evaluated, with the number of their arguments."""
+ASKED_TEXT = """
+AINPUT AOUTPUT DINPUT DOUTPUT GINPUT GOUTPUT TESTDI TESTANDSET CLKREAD CDATE CTIME GETTIME CSPEEDOVERRIDE ISPERS ISVAR
+ISSTOPMOVEACT OPMODE RUNMODE ROBOS ROBNAME TASKRUNROB TASKRUNMEC GETTASKNAME GETMECUNITNAME GETNEXTMECHUNIT ISSYSID
+ISMECHUNITACTIVE ISFILE FILESIZE FSSIZE READBIN READDIR READMOTOR READNUM READSTR READSTRBIN READVAR SOCKETGETSTATUS
+SOCKETPEEK STRDIGCALC STRDIGCMP STRFIND STRFORMAT STRMATCH STRMEMB STRORDER STRTOBYTE STRTOVAL BYTETOSTR BITCHECK BITLSH
+BITNEG BITRSH BITXOR DECTOHEX HEXTODEC UIALPHAENTRY UICLIENTEXIST UIDNUMENTRY UIDNUMTUNE UILISTVIEW UIMESSAGEBOX
+UINUMENTRY UINUMTUNE GETSIGNALORIGIN IOUNITSTATE VALIDIO EVENTTYPE EXECHANDLER EXECLEVEL MOTORTEMP
+NONMOTIONMODE PATHLEVEL PPMOVEDINMANMODE RAWBYTESLEN RMQGETSLOTNAME TASKS TYPE TRIGGDATAVALID ARGNAME CSPEED
+GETAXISDISTANCE GETMAXNUMBEROFCYCLICBOOL GETNEXTSYM GETSYSINFO GETMODALPAYLOADMODE
+"""
+ASKED = frozenset(ASKED_TEXT.split())
+"""Functions whose value only the running cell knows."""
+IN_DEGREES: Mapping[str, Callable[..., float]] = {
+    "ABS": abs,
+    "SQRT": math.sqrt,
+    "EXP": math.exp,
+    "POW": math.pow,
+    "SIN": lambda x: math.sin(math.radians(x)),
+    "COS": lambda x: math.cos(math.radians(x)),
+    "TAN": lambda x: math.tan(math.radians(x)),
+    "ASIN": lambda x: math.degrees(math.asin(x)),
+    "ACOS": lambda x: math.degrees(math.acos(x)),
+    "ATAN": lambda x: math.degrees(math.atan(x)),
+    "ATAN2": lambda y, x: math.degrees(math.atan2(y, x)),
+    "NUMTODNUM": lambda x: x,
+    "DNUMTONUM": lambda x: x,
+}
+JOINTS_OF = "%JOINTS_OF"
+"""Kind of the joints of a target, which only the arm's table gives."""
+UNCLEAR = Unclear("")
+
+
+class RapidDialect:
+    """RAPID, as a run needs it."""
+
+    modal = frozenset(MODAL)
+    local_by_default = False
+    whole_division = False
+    first_index = 1
+
+    def __init__(self, program: Program):
+        pass
+
+    def begin(self, memory: ProgramMemory) -> None:
+        """No variable is there from the start."""
+
+    def is_signal(self, name: str) -> bool:
+        """Signals are set by instructions."""
+        return False
+
+    def is_followed(self, name: str, value: Value) -> bool:
+        """No variable asks for anything."""
+        return True
+
+    def named(self, name: str) -> bool:
+        """Tools and work objects keep the names of their variables."""
+        return False
+
+    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
+        """Speeds, zones, tool and work object that every controller has."""
+        return predefined(name)
+
+    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
+        """Aggregates."""
+        return values
+
+    def product(self, left: Value, right: Value) -> Value:
+        """There is none."""
+        return Unclear("a product")
+
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
+        """Mathematics, positions, where the arm stands; what is not known, or called otherwise, is unclear."""
+        values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)
+        named = {key: memory.value(each) for key, each in given.keywords}
+        unclear = Unclear(f"{given.function.lower()}({', '.join(map(shown, values))})")
+        if name == TYPED:
+            assert isinstance(values[1], tuple)
+            return typed(values[0], _as_shape(values[1]))
+        if name == ARITHMETIC:
+            return arithmetic(str(values[0]), values[1], values[2])
+        if name == UPPER:
+            return values[0].upper() if isinstance(values[0], str) else values[0]
+        if name == STEP:
+            first, last = number(values[0]), number(values[1])
+            return Unclear("a step") if first is None or last is None else 1 if first <= last else -1
+        if PARAMETERS.get(name) != len(values):
+            return unclear
+        if name in ("CROBT", "CJOINTT", "CPOS", "CTOOL", "CWOBJ", "CALCROBT", "CALCJOINTT"):
+            found = _of_position(memory, name, values, named, given)
+        elif name in IN_DEGREES:
+            found = _number_of(name, values)
+        else:
+            found = _of_data(name, values, named)
+        if found is None:
+            first_unclear = next((each for each in values if isinstance(each, Unclear)), None)
+            return first_unclear or unclear
+        return found
+
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
+        """MoveJ, MoveL, MoveC, MoveAbsJ, and those that do something besides."""
+        form = move.form
+        arc = form in ARC_FORMS or form.startswith("MOVEC")
+        joint = "ABSJ" in form or form.startswith(JOINT_FORMS)
+        kind: MotionKind = "arc" if arc else "joint" if joint else "line"
+        placed = list(move.arguments)
+        options = {name: memory.value(each) for name, each in move.settings}
+        if form in SEARCHES:  # signal, the point sought, targets, speed and tool; no zone
+            placed = [*placed[2:-1], None, placed[-1]] if len(placed) == 5 + arc else []
+        targets = 2 if arc else 1
+        if len(placed) < targets + 3:
+            unknown = UnresolvedTarget(move.text, "not_understood")
+            return ArmMotion(kind, unknown, form, unknown if arc else None)
+        behind = form.startswith("TRIGG")
+        zone_at, tool_at = (-2, -1) if behind else (targets + 1, targets + 2)
+        values = [UNCLEAR if each is None else memory.value(each) for each in placed]
+        tool, stationary = _tool(memory, placed[tool_at], values[tool_at])
+        wobj = dict(move.settings).get("WOBJ")
+        base, held = _base(memory, wobj, options.get("WOBJ"))
+        frames = (tool, _displaced(memory, base))
+        fixed = UnresolvedTarget(move.text, "external_tool") if stationary or held else None
+        checked = memory.read("%CONFJ" if kind == "joint" else "%CONFL") is not False
+        made = [
+            fixed or self._target(memory, value, frames, (move.text, kind, "ABSJ" in form), checked)
+            for value in values[:targets]
+        ]
+        speed, turn = _speed(memory, values[targets], options, kind)
+        zone = FINE if form in SEARCHES else _zone(values[zone_at], options, placed[zone_at])
+        via = made[0] if arc else None
+        if isinstance(via, PoseTarget):
+            via = replace(via, branch=None)
+        return ArmMotion(
+            kind,
+            made[-1],
+            SPELLED.get(form, form),
+            via,
+            None,
+            speed,
+            _acceleration(memory, kind),
+            zone,
+            *frames,
+            turn_speed=turn,
+        )
+
+    def _target(
+        self,
+        memory: ProgramMemory,
+        value: Value,
+        frames: tuple[NamedFrame, NamedFrame],
+        said: tuple[str, MotionKind, bool],
+        checked: bool,
+    ) -> Target:
+        """What a target means; ``said`` is the line, the motion's kind, and whether it wants joint angles."""
+        text, kind, absolute = said
+        if isinstance(value, Unclear):
+            return UnresolvedTarget(value.text or text, "undefined")
+        if isinstance(value, Record) and value.kind == JOINTS_OF and absolute:
+            return _joints_of(value, frames, text)
+        value = typed(value, JOINTTARGET if absolute else ROBTARGET)
+        external = external_axes(part(value, "EXTAX"))
+        if absolute:
+            return _joint_target(memory, value, text, external)
+        unclear = next((each for each in _leaves(value) if isinstance(each, Unclear)), None)
+        if unclear is not None:
+            return UnresolvedTarget(unclear.text, "undefined")
+        pose = pose_matrix(value)
+        if pose is None:
+            return UnresolvedTarget(text, "not_understood")
+        conf = plain(part(value, "ROBCONF"), 4)
+        said_of = tuple(zip(("cf1", "cf4", "cf6", "cfx"), conf)) if conf is not None else ()
+        branch = branch_of(conf, memory.cell.joints) if checked else None
+        kept = said_of if checked or kind != "joint" else ()
+        return PoseTarget(pose, kept, external=external, branch=branch)
+
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
+        """Settings, outputs, what is harmless; the rest is unknown."""
+        call = doing.what
+        assert isinstance(call, Invocation)
+        if call.function in SETTINGS:
+            return None if _set(memory, call) else Unknown(doing.text, may_move=False)
+        if call.function in OUTPUTS and call.arguments:
+            first = call.arguments[0]
+            return Output(first.name if isinstance(first, Variable) else call.function, doing.text)
+        if call.function == "EOFFSOFF" or self.harmless(call):
+            return Aside(doing.text)
+        return Unknown(doing.text)
+
+    def harmless(self, call: Invocation) -> bool:
+        """Functions and instructions whose exact name is known, and that set nothing."""
+        name = call.function
+        if name in SETTINGS or name == LATE:
+            return False
+        return name[:1] == "%" or name in PARAMETERS or name in HARMLESS or name in ASKED or name in ASIDE_NAMED | WAITS
+
+
+SPELLED = {
+    "MOVEJ": "MoveJ",
+    "MOVEL": "MoveL",
+    "MOVEC": "MoveC",
+    "MOVEABSJ": "MoveAbsJ",
+    "TRIGGL": "TriggL",
+    "TRIGGJ": "TriggJ",
+    "TRIGGC": "TriggC",
+    "SEARCHL": "SearchL",
+    "SEARCHC": "SearchC",
+}
+
+
+def _as_shape(value: tuple[Value, ...]) -> Shape:
+    return tuple(_as_shape(each) if isinstance(each, tuple) else str(each) for each in value)
+
+
+def _leaves(value: Value) -> list[Value]:
+    parts = value.values()[:2] if isinstance(value, Record) and value.kind == "ROBTARGET" else (value,)
+    inside = [each.values() if isinstance(each, Record) else (each,) for each in parts]
+    return [each for values in inside for each in values]
+
+
+def _joint_target(memory: ProgramMemory, value: Value, text: str, external: tuple[tuple[str, float], ...]) -> Target:
+    axes = part(value, "ROBAX")
+    values = axes.values() if isinstance(axes, Record) else ()
+    unclear = next((each for each in values if isinstance(each, Unclear)), None)
+    if unclear is not None:
+        return UnresolvedTarget(unclear.text, "undefined")
+    degrees = plain(axes, 6)
+    if degrees is None:
+        return UnresolvedTarget(text, "not_understood")
+    count = memory.cell.joints
+    if any(each and abs(each) < NO_AXIS / 10 for each in degrees[count:]):
+        return UnresolvedTarget(text, "too_many_joints")
+    return JointTarget(np.radians(degrees[:count]), external)
+
+
+def _joints_of(value: Record, frames: tuple[NamedFrame, NamedFrame], text: str) -> Target:
+    """The joints of a target for a tool and a work object, as a pose of those of the motion."""
+    target = part(value, "TARGET")
+    pose = pose_matrix(target)
+    tool, _ = frame_of_tool(part(value, "TOOL"))
+    base, _ = frame_of_object(part(value, "WOBJ") or predefined("WOBJ0"))
+    now, here = frames[0].pose, frames[1].pose
+    if pose is None or tool is None or base is None or now is None or here is None:
+        return UnresolvedTarget(text, "not_understood")
+    conf = plain(part(target, "ROBCONF"), 4)
+    found = np.linalg.inv(here) @ base @ pose @ np.linalg.inv(tool) @ now
+    said = tuple(zip(("cf1", "cf4", "cf6", "cfx"), conf)) if conf is not None else ()
+    return PoseTarget(found, said, branch=branch_of(conf, 6))
+
+
+def frame_of_tool(value: Value | None) -> tuple[Reals | None, bool]:
+    """T_flange_tool (4, 4) in m of tooldata, and whether the tool stands beside the arm (3 tooldata: robhold)."""
+    data = typed(value, TOOLDATA) if value is not None else None
+    return pose_matrix(part(data, "TFRAME")), part(data, "ROBHOLD") is False
+
+
+def frame_of_object(value: Value | None) -> tuple[Reals | None, bool]:
+    """T_robot_object (4, 4) in m of wobjdata, and whether the arm holds the object (3 wobjdata: robhold).
+
+    The object's frame stands in the user's frame, and that in the world, which is the robot's base unless a controller
+    is set up otherwise. None where an external unit moves the user's frame (ufprog FALSE, ufmec).
+    """
+    data = typed(value, WOBJDATA) if value is not None else None
+    user, own = pose_matrix(part(data, "UFRAME")), pose_matrix(part(data, "OFRAME"))
+    still = part(data, "UFPROG") is True
+    pose = user @ own if user is not None and own is not None and still else None
+    return pose, part(data, "ROBHOLD") is True
+
+
+def _name_of(expression: object) -> str:
+    return expression.name.lower() if isinstance(expression, Variable) else ""
+
+
+def _mapped(memory: ProgramMemory, name: str) -> Reals | None:
+    """The frame that the cell gives for a name, however its letters are written."""
+    return next((pose for key, pose in memory.cell.frames.items() if key.lower() == name), None)
+
+
+def _tool(memory: ProgramMemory, expression: object, value: Value) -> tuple[NamedFrame, bool]:
+    pose, stationary = frame_of_tool(value)
+    name = _name_of(expression)
+    if pose is None:
+        name = name or (value.text if isinstance(value, Unclear) else "tooldata")
+        pose = _mapped(memory, name)
+    load = load_of(part(typed(value, TOOLDATA), "TLOAD"))
+    return NamedFrame(name, pose, load if load is not None and load.mass > LEAST_LOAD else None), stationary
+
+
+def _base(memory: ProgramMemory, expression: object, value: Value | None) -> tuple[NamedFrame, bool]:
+    if value is None or value == ABSENT:
+        return ROBOT_BASE, False
+    pose, held = frame_of_object(value)
+    name = _name_of(expression)
+    if pose is None:
+        name = name or (value.text if isinstance(value, Unclear) else "wobjdata")
+        pose = _mapped(memory, name)
+    return NamedFrame(name, pose), held
+
+
+def _displaced(memory: ProgramMemory, base: NamedFrame) -> NamedFrame:
+    """A work object with the program's displacement."""
+    moved = memory.read("%PDISP")
+    if moved is None or base.pose is None:
+        return base
+    pose = pose_matrix(moved)
+    return NamedFrame("" if pose is not None else "PDispOn", None if pose is None else base.pose @ pose)
+
+
+def _speed(
+    memory: ProgramMemory, value: Value, options: Mapping[str, Value], kind: MotionKind
+) -> tuple[Rate | None, float | None]:
+    """Speed of the tool and of its turn (rad/s); 1 VelSet scales and bounds it."""
+    seconds = number(options.get("T"))
+    if seconds is not None and seconds > 0:
+        return Rate(seconds, "s"), None
+    share, most = _velocity(memory)
+    if isinstance(value, Record) and value.get("FASTEST") is True:
+        if kind == "joint":
+            return Rate(share, "share", "vmax"), None
+        return Rate(most / 1000 * share, "m/s", "vmax"), math.radians(TURN_SPEED) * share
+    data = typed(value, SPEEDDATA)
+    along, turn = number(part(data, "V_TCP")), number(part(data, "V_ORI"))
+    own = number(options.get("V"))
+    along = along if own is None else own
+    if along is None or along <= 0:
+        return None, None
+    limited = min(along * share, most)
+    return Rate(limited / 1000, "m/s"), math.radians(turn) * share if turn and kind != "joint" else None
+
+
+def _velocity(memory: ProgramMemory) -> tuple[float, float]:
+    """The share of programmed speeds, and the greatest in mm/s."""
+    found = plain(memory.read("%SPEED"), 2)
+    return (1.0, FULL_SPEED) if found is None else (found[0] / 100, found[1])
+
+
+def _acceleration(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
+    limit = number(memory.read("%ACCLIM"))
+    if limit is not None and kind != "joint":
+        return Rate(limit, "m/s2")
+    percent = number(memory.read("%ACC"))
+    return None if percent is None else Rate(percent / 100, "share")
+
+
+def _zone(value: Value, options: Mapping[str, Value], expression: object) -> Zone:
+    """3 zonedata; ``\\Z`` replaces the size of the path's zone; ``\\Inpos`` asks for a stop."""
+    if "INPOS" in options:
+        return FINE
+    own = number(options.get("Z"))
+    data = typed(value, ZONEDATA)
+    if own is None and part(data, "FINEP") is True:
+        return FINE
+    size = number(part(data, "PZONE_TCP")) if own is None else own
+    if size is None:
+        return Zone("named", 0.0, _name_of(expression) or "zonedata")
+    return Zone("distance", size / 1000, _name_of(expression) if own is None else "") if size > 0 else FINE
+
+
+def _set(memory: ProgramMemory, call: Invocation) -> bool:
+    """Carry a setting out; False for one that is not understood."""
+    values = [UNCLEAR if each is None else memory.value(each) for each in call.arguments]
+    options = {key: memory.value(each) for key, each in call.keywords}
+    match call.function:
+        case "CONFJ" | "CONFL":
+            memory.write(f"%{call.function}", "OFF" not in options)
+            return True
+        case "ACCSET":
+            percent = number(values[0]) if values else None
+            memory.write("%ACC", Unclear("AccSet") if percent is None else max(percent, SLOWEST_RAMP))
+            return percent is not None
+        case "VELSET":
+            found = numbers(tuple(values)) if len(values) == 2 else None
+            memory.write("%SPEED", Unclear("VelSet") if found is None else found)
+            return found is not None
+        case "PATHACCLIM":
+            limit = number(options.get("ACCMAX"))
+            memory.write("%ACCLIM", Unclear("off") if limit is None else limit)
+            return True
+        case "PDISPOFF":
+            memory.write("%PDISP", pose_record(np.eye(4)))
+            return True
+        case "PDISPSET":
+            pose = pose_matrix(values[0]) if values else None
+            memory.write("%PDISP", Unclear("PDispSet") if pose is None else pose_record(pose))
+            return pose is not None
+        case _:
+            return _displace(memory, call, values, options)
+
+
+def _displace(memory: ProgramMemory, call: Invocation, values: list[Value], options: Mapping[str, Value]) -> bool:
+    """1 PDispOn: by how much where the arm stands, or ExeP, is off the programmed point; turned too with ``\\Rot``."""
+    memory.write("%PDISP", Unclear("PDispOn"))
+    if len(values) != 2:
+        return False
+    tool, _ = _tool(memory, call.arguments[1], values[1])
+    base, _ = _base(memory, dict(call.keywords).get("WOBJ"), options.get("WOBJ"))
+    programmed = pose_matrix(typed(values[0], ROBTARGET))
+    given = options.get("EXEP")
+    actual = (
+        pose_matrix(typed(given, ROBTARGET)) if given is not None else memory.here.seen(tool, base, memory.cell.flange)
+    )
+    if programmed is None or actual is None:
+        return False
+    moved = actual @ np.linalg.inv(programmed)
+    if "ROT" not in options:
+        moved = np.eye(4)
+        moved[:3, 3] = actual[:3, 3] - programmed[:3, 3]
+    memory.write("%PDISP", pose_record(moved))
+    return True
+
+
+def arithmetic(sign: str, left: Value, right: Value) -> Value:
+    """Sums and products: of numbers, texts and positions, a number times a position, cross products, turns.
+
+    RAPID overview, 1 Expressions: pos * pos is the cross product, orient * orient the product of turns.
+    """
+    for side in (left, right):
+        if isinstance(side, Unclear):
+            return side
+    unclear = Unclear(f"{shown(left)} {sign} {shown(right)}")
+    if sign == "+" and isinstance(left, str) and isinstance(right, str):
+        return left + right if len(left) + len(right) < 1000 else unclear
+    a, b = number(left), number(right)
+    if a is not None and b is not None:
+        found = a + b if sign == "+" else a - b if sign == "-" else a * b
+        whole = isinstance(left, int) and isinstance(right, int) and abs(found) < 2**53
+        return int(found) if whole else found
+    xyz, other = plain(left, 3), plain(right, 3)
+    if xyz is not None and other is not None:
+        p, q = np.array(xyz), np.array(other)
+        return pos_record((p + q if sign == "+" else p - q if sign == "-" else np.cross(p, q)) / 1000)
+    if sign == "*" and (a is not None or b is not None) and (xyz is not None or other is not None):
+        scale = a if a is not None else b
+        assert scale is not None
+        return pos_record(scale * np.array(xyz if xyz is not None else other) / 1000)
+    turn, then = rotation_of(left), rotation_of(right)
+    return orient_record(turn @ then) if sign == "*" and turn is not None and then is not None else unclear
+
+
+def _number_of(name: str, values: tuple[Value, ...]) -> Value | None:
+    plain_values = numbers(values)
+    if plain_values is None:
+        return None
+    try:
+        found = IN_DEGREES[name](*plain_values)
+    except (ValueError, OverflowError, ZeroDivisionError):
+        return None
+    whole = name in ("ABS", "NUMTODNUM", "DNUMTONUM") and all(isinstance(each, int) for each in values)
+    return int(found) if whole else float(found)
+
+
+def _of_position(
+    memory: ProgramMemory, name: str, values: tuple[Value, ...], named: Mapping[str, Value], given: Invocation
+) -> Value | None:
+    """Where the arm stands, and what its table gives.
+
+    2 CRobT, 2 CPos: in the work object, for the tool; where none is given, those of the last motion.
+    """
+    words = dict(given.keywords)
+    here = memory.here
+    if name == "CJOINTT":
+        if here.joints is None:
+            return None
+        degrees: list[Value] = [*map(float, np.degrees(here.joints)), *[0.0] * (6 - len(here.joints))]
+        return typed((tuple(degrees), (NO_AXIS,) * 6), JOINTTARGET)
+    if name in ("CTOOL", "CWOBJ"):
+        return None
+    tool = _tool(memory, words.get("TOOL"), named["TOOL"])[0] if "TOOL" in named else here.tool
+    base = _base(memory, words.get("WOBJ"), named.get("WOBJ"))[0] if "WOBJ" in named else here.base
+    if name in ("CROBT", "CPOS"):
+        seen = here.seen(tool, _displaced(memory, base) if "WOBJ" in named else base, memory.cell.flange)
+        if seen is None:
+            return None
+        conf: Value = (0, 0, 0, 0)
+        if here.joints is not None and len(here.joints) == 6:
+            conf = (*quarters_of(here.joints), -1)
+        elif isinstance(here.pose, np.ndarray):
+            conf = (Unclear("cf1"),) * 4
+        return pos_record(seen[:3, 3]) if name == "CPOS" else _robtarget(seen, conf)
+    data = typed(values[0], JOINTTARGET if name == "CALCROBT" else ROBTARGET)
+    given_tool, _ = _tool(memory, given.arguments[1], values[1])
+    base, _ = _base(memory, words.get("WOBJ"), named.get("WOBJ"))
+    if name == "CALCJOINTT":
+        wobj = named.get("WOBJ") or predefined("WOBJ0")
+        if pose_matrix(data) is None or wobj is None:
+            return None
+        return Record(JOINTS_OF, (("TARGET", data), ("TOOL", values[1]), ("WOBJ", wobj)))
+    degrees_given = plain(part(data, "ROBAX"), 6)
+    flange = memory.cell.flange
+    if (
+        degrees_given is None
+        or flange is None
+        or given_tool.pose is None
+        or base.pose is None
+        or memory.cell.joints != 6
+    ):
+        return None
+    joints = np.radians(degrees_given)
+    pose: Reals = np.linalg.inv(base.pose) @ flange(joints) @ given_tool.pose
+    return _robtarget(pose, (*quarters_of(joints), -1))
+
+
+def _robtarget(T: Reals, conf: Value) -> Record:
+    """A robtarget of a pose (4, 4) in m; its cfx is -1 where the arm's sides are not known."""
+    items = (("TRANS", pos_record(T[:3, 3])), ("ROT", orient_record(T[:3, :3])))
+    found = typed((0, 0, conf, (NO_AXIS,) * 6), ROBTARGET)
+    assert isinstance(found, Record)
+    return Record("ROBTARGET", (*items, *found.items[2:]))
+
+
+def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
+    """Functions of positions, texts and numbers, as ABB's manual defines them (2, each by its name)."""
+    plain_values = numbers(values)
+    match name:
+        case "OFFS" | "RELTOOL":
+            return _shifted(name, values, named)
+        case "POSEMULT":
+            a, b = map(pose_matrix, values)
+            return None if a is None or b is None else pose_record(a @ b)
+        case "POSEINV":
+            pose = pose_matrix(values[0])
+            return None if pose is None else pose_record(np.asarray(np.linalg.inv(pose), np.float64))
+        case "POSEVECT":
+            pose, xyz = pose_matrix(values[0]), plain(values[1], 3)
+            if pose is None or xyz is None:
+                return None
+            return pos_record(pose[:3, :3] @ np.array(xyz) / 1000 + pose[:3, 3])
+        case "ORIENTZYX" if plain_values is not None:  # about z, then the new y, then the new x
+            return orient_record(transform(np.zeros(3), np.radians(plain_values[::-1]))[:3, :3])
+        case "EULERZYX":
+            turn = rotation_of(values[0])
+            axis = next((i for i, letter in enumerate("XYZ") if letter in named), None)
+            return None if turn is None or axis is None else float(np.degrees(rpy_of(turn)[axis]))
+        case "NORIENT":
+            turn = rotation_of(values[0])
+            return None if turn is None else orient_record(turn)
+        case "DEFFRAME":
+            return _frame_of_points(values, named)
+        case "DISTANCE" | "DOTPROD":
+            a3, b3 = plain(values[0], 3), plain(values[1], 3)
+            if a3 is None or b3 is None:
+                return None
+            return float(np.linalg.norm(np.subtract(a3, b3)) if name == "DISTANCE" else np.dot(a3, b3))
+        case "VECTMAGN":
+            xyz = plain(values[0], 3)
+            return None if xyz is None else float(np.linalg.norm(xyz))
+        case "TRUNC" | "ROUND" if plain_values is not None:
+            return _rounded(name, plain_values[0], number(named.get("DEC")) or 0)
+        case "DIM":
+            return _dimension(values)
+        case "PRESENT":
+            return None if isinstance(values[0], Unclear) else values[0] != ABSENT
+        case "STRLEN" if isinstance(values[0], str):
+            return len(values[0])
+        case "STRPART" if isinstance(values[0], str):
+            start, length = number(values[1]), number(values[2])
+            return None if start is None or length is None else values[0][int(start) - 1 : int(start) - 1 + int(length)]
+        case "NUMTOSTR" if plain_values is not None:
+            return f"{plain_values[0]:.{int(plain_values[1])}f}" if 0 <= plain_values[1] <= 15 else None
+        case "VALTOSTR" if isinstance(values[0], (int, float)) and not isinstance(values[0], bool):
+            return f"{values[0]:g}"
+        case "BITAND" | "BITOR" if isinstance(values[0], int) and isinstance(values[1], int):
+            return values[0] & values[1] if name == "BITAND" else values[0] | values[1]
+    return None
+
+
+def _shifted(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
+    """2 Offs: along the object's axes. 2 RelTool: along the tool's, then turned about x, the new y, the new z."""
+    target = typed(values[0], ROBTARGET)
+    pose = pose_matrix(target)
+    shift = numbers(values[1:])
+    if not isinstance(target, Record) or pose is None or shift is None:
+        return None
+    moved = pose.copy()
+    if name == "OFFS":
+        moved[:3, 3] += np.array(shift) / 1000
+        return target.having("TRANS", pos_record(moved[:3, 3]))
+    turns = [number(named.get(key, 0.0)) for key in ("RX", "RY", "RZ")]
+    angles = [each for each in turns if each is not None]
+    if len(angles) < 3:
+        return None
+    step = np.eye(4)
+    step[:3, 3] = np.array(shift) / 1000
+    step[:3, :3] = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
+    return moved_target(target, pose @ step)
+
+
+def _frame_of_points(values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
+    """2 DefFrame: origin at the first point, x towards the second, the third with a positive y."""
+    points = [plain(part(typed(each, ROBTARGET), "TRANS"), 3) for each in values]
+    if named or None in points:
+        return None
+    first, second, third = (np.array(each) / 1000 for each in points if each is not None)
+    x, towards = second - first, third - first
+    z = np.cross(x, towards)
+    if min(np.linalg.norm(x), np.linalg.norm(z)) < 1e-9:
+        return None
+    T = np.eye(4)
+    T[:3, 0], T[:3, 2], T[:3, 3] = x / np.linalg.norm(x), z / np.linalg.norm(z), first
+    T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
+    return pose_record(T)
+
+
+def _rounded(name: str, value: float, digits: float) -> Value:
+    scale = 10.0 ** int(digits)
+    found = math.trunc(value * scale) if name == "TRUNC" else math.floor(abs(value) * scale + 0.5)
+    signed = found if name == "TRUNC" else math.copysign(found, value)
+    return int(signed) if not digits else signed / scale
+
+
+def _dimension(values: tuple[Value, ...]) -> Value | None:
+    """2 Dim: how many elements an array has in a dimension."""
+    found, level = values[0], number(values[1])
+    for _ in range(int(level or 1) - 1):
+        found = found[0] if isinstance(found, tuple) and found else ()
+    return len(found) if isinstance(found, tuple) and found else None

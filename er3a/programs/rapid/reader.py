@@ -1,0 +1,1009 @@
+"""Reads ABB RAPID: a module with the modules beside it that it uses.
+
+Instructions that are not understood are kept; blocks and texts without an end are errors. The grammar is that of ABB's
+*Technical reference manual: RAPID overview* (3HAC050947-001), section 1, Basic RAPID programming.
+"""
+
+from __future__ import annotations
+
+import bisect
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from er3a.errors import InputError
+from er3a.programs.code_builder import CodeBuilder, fault, linked, within
+from er3a.programs.instructions import Place
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
+from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
+from er3a.programs.rapid.data_types import SHAPES, Shape, starting
+from er3a.programs.rapid.files import HEADER, modules_of
+from er3a.programs.syntax import (
+    Assign,
+    Binary,
+    Constant,
+    Doing,
+    Element,
+    Expression,
+    Fixed,
+    Halt,
+    Invocation,
+    Listed,
+    Member,
+    Move,
+    Opaque,
+    Program,
+    Return,
+    Routine,
+    RoutineParameter,
+    Unclear,
+    Value,
+    Variable,
+    Waiting,
+    inner,
+    number,
+)
+
+PATTERN = re.compile(
+    rf"""(?P<comment>![^\n]*)|(?P<text>"(?:[^"\n]|"")*")|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
+    r"""|(?P<mark>:=|<>|<=|>=|\S)"""
+)
+RAPID = Lexicon(
+    PATTERN,
+    ranks={
+        **dict.fromkeys(("OR", "XOR"), 1),
+        "AND": 2,
+        **dict.fromkeys(("=", "<>", "<", ">", "<=", ">="), 3),
+        **dict.fromkeys(("+", "-"), 4),
+        **dict.fromkeys(("*", "/", "DIV", "MOD"), 5),
+    },
+    right={"NOT": 2, "+": 5, "-": 5},
+    constants={"TRUE": True, "FALSE": False},
+    folds=True,
+)
+"""RAPID overview, section 1 (Expressions): NOT, OR and XOR bind least."""
+ENDS = frozenset(
+    (
+        *("ENDPROC", "ENDFUNC", "ENDTRAP", "ENDMODULE", "ENDRECORD", "ENDIF", "ENDWHILE", "ENDFOR", "ENDTEST"),
+        *("ELSE", "ELSEIF", "ERROR", "UNDO", "BACKWARD", "CASE", "DEFAULT", "PROC", "FUNC", "TRAP", "MODULE"),
+    )
+)
+"""Words that no instruction goes on beyond."""
+DECLARED = ("VAR", "PERS", "CONST")
+HANDLERS = ("ERROR", "UNDO", "BACKWARD")
+MOTIONS = frozenset(
+    (
+        *("MOVEJ", "MOVEL", "MOVEC", "MOVEABSJ", "MOVEJDO", "MOVELDO", "MOVECDO", "MOVEJAO", "MOVELAO", "MOVECAO"),
+        *("MOVEJGO", "MOVELGO", "MOVECGO", "MOVEJSYNC", "MOVELSYNC", "MOVECSYNC", "TRIGGJ", "TRIGGL", "TRIGGC"),
+        *("TRIGGJIOS", "TRIGGLIOS", "TRIGGABSJ", "SEARCHL", "SEARCHC"),
+    )
+)
+SEARCHES = ("SEARCHL", "SEARCHC")
+CALLING = ("MOVEJSYNC", "MOVELSYNC", "MOVECSYNC")
+"""Motions that call a procedure, named by a text, where they end."""
+CHANGING = {"TPREADNUM": 0, "TPREADFK": 0, "TPREADDNUM": 0, "GETSYSDATA": 0, "GETDATAVAL": 1}
+"""Instructions that change one of their arguments, by its number."""
+READING = ("READ", "GET", "UNPACK", "RMQGET", "RMQREAD", "SOCKETRECEIVE", "SOCKETACCEPT", "UIMSGBOX", "PACK", "COPYRAW")
+"""How instructions begin that may change any variable that they are given."""
+CHANGING_FUNCTIONS = {"STRTOVAL": 1, "TESTANDSET": 0, "GETNEXTSYM": 0}
+"""Functions that change one of their arguments, by its number."""
+WAITS = frozenset(
+    (
+        *("WAITDI", "WAITDO", "WAITAI", "WAITAO", "WAITGI", "WAITGO", "WAITUNTIL", "WAITSYNCTASK", "WAITTESTANDSET"),
+        *("WAITROB", "WAITLOAD", "WAITSENSOR", "WAITWOBJ"),
+    )
+)
+NOT_SIMULATED = frozenset(
+    (
+        *("SINGAREA", "SOFTACT", "SOFTDEACT", "ACTUNIT", "DEACTUNIT", "WAITWOBJ", "DROPWOBJ", "SYNCMOVEON"),
+        *(
+            "SYNCMOVEOFF",
+            "SYNCMOVERESUME",
+            "SYNCMOVESUSPEND",
+            "SYNCMOVEUNDO",
+            "WAITSYNCTASK",
+            "MOVEEXTJ",
+            "SUPSYNCSENSORON",
+        ),
+        *(
+            "SUPSYNCSENSOROFF",
+            "SYNCTOSENSOR",
+            "CORRCON",
+            "CORRWRITE",
+            "CIRPATHMODE",
+            "PATHRESOL",
+            "EOFFSON",
+            "EOFFSSET",
+        ),
+        *(
+            "INDAMOVE",
+            "INDCMOVE",
+            "INDDMOVE",
+            "INDRMOVE",
+            "INDRESET",
+            "WZENABLE",
+            "WZDOSET",
+            "WZLIMSUP",
+            "WZHOMEJOINTDEF",
+        ),
+        *(
+            "WZLIMJOINTDEF",
+            "WZBOXDEF",
+            "WZCYLDEF",
+            "WZSPHDEF",
+            "WZDISABLE",
+            "WZFREE",
+            "MOTIONPROCESSMODESET",
+        ),
+    )
+)
+"""What is known to shape a motion or to move something else, and is not followed: it is named."""
+UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
+ABSENT = "%absent"
+MOST_LATE = 200
+MOST_ELEMENTS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A word of a module's text."""
+
+    kind: str
+    text: str
+    raw: str
+    start: int
+    end: int
+    line: int
+
+
+class RapidWords(Words):
+    """Words of an instruction of RAPID."""
+
+    def __init__(self, tokens: Iterable[Token]):
+        self.lexicon = RAPID
+        self.at, self._depth, self._length = 0, 0, 0
+        kept = [each for each in tokens if each.kind != "comment"]
+        self.kinds = [*(token.kind for token in kept), "end"]
+        self.texts = [*(token.text for token in kept), ""]
+
+    def special(self) -> Expression | None:
+        """Aggregates, texts, the target that only the pendant shows."""
+        if self.kind == "text":
+            return Constant(self.take()[1:-1].replace('""', '"'))
+        if self.next == "*" and self.kind == "mark":
+            return Opaque(self.take())
+        if not self.accept("["):
+            return None
+        items: list[Expression] = []
+        while not self.accept("]"):
+            items.append(self.expression())
+            if not self.accept(","):
+                self.expect("]")
+                break
+        values = tuple(each.value for each in items if isinstance(each, Constant))
+        return Constant(values) if len(values) == len(items) else Listed("", tuple(items))
+
+    def parts_of(self, found: Expression) -> Expression:
+        """As in other languages, but for elements, which stand in braces."""
+        while True:
+            found = super().parts_of(found) if self.next != "[" else found
+            if not self.accept("{"):
+                return found
+            indices = [self.expression()]
+            while self.accept(","):
+                indices.append(self.expression())
+            self.expect("}")
+            for index in indices:
+                found = Element(found, (index,))
+
+    def arguments(self, close: str = ")") -> tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]:
+        """Arguments by place and, behind a backslash, by name; a name alone is a switch."""
+        placed: list[Expression | None] = []
+        named: list[tuple[str, Expression]] = []
+        first = self.at
+        while not (self.accept(close) if close else self.kind == "end"):
+            if self.kind == "end":
+                raise MisreadError(f"'{close}' is missing")
+            if self.accept(","):
+                continue
+            if not self.accept("\\"):
+                if self.at > first and self.texts[self.at - 1] != "," and self.texts[self.at - 1] != "(":
+                    raise MisreadError(f"',' expected before '{self.next}'")
+                placed.append(self.expression())
+                continue
+            name = self.name()
+            if self.accept(":="):
+                named.append((name, self.expression()))
+            elif self.accept("?"):
+                named.append((name, Variable(self.name())))
+            else:
+                named.append((name, Constant(True)))
+        return tuple(placed), tuple(named)
+
+
+@dataclass
+class Scope:
+    """What names mean in a module, or in a routine.
+
+    Attributes
+    ----------
+    shapes : types of variables; own : names that only the routine has
+    private : names that only the module has, with those under which the program has them
+    """
+
+    types: dict[str, Shape]
+    private: Mapping[str, str] = field(default_factory=dict)
+    shapes: dict[str, Shape] = field(default_factory=dict)
+    own: set[str] = field(default_factory=set)
+
+    def settled(self, expression: Expression) -> Expression:
+        """An expression with the module's own names, and with sums and products that RAPID has for positions too."""
+        expression = within(expression, self.settled)
+        if isinstance(expression, Variable) and expression.name not in self.own:
+            return replace(expression, name=self.private.get(expression.name, expression.name))
+        if isinstance(expression, Invocation):
+            return replace(expression, function=self.private.get(expression.function, expression.function))
+        if isinstance(expression, Binary) and expression.operator in ("+", "-", "*"):
+            return Invocation(ARITHMETIC, (Constant(expression.operator), expression.left, expression.right))
+        return expression
+
+    def typed(self, value: Expression, shape: Shape | None) -> Expression:
+        """A value with the names of its type's components."""
+        if shape is None or (len(shape) == 1):
+            return value
+        return Invocation(TYPED, (value, Constant(_as_value(shape))))
+
+
+def _as_value(shape: Shape) -> Value:
+    return tuple(each if isinstance(each, str) else _as_value(each) for each in shape)
+
+
+def read_rapid(source: ProgramText) -> Program:
+    """The program of a module: its ``main``, or else the first of its procedures that no other calls.
+
+    Raises
+    ------
+    InputError
+        for texts and blocks without an end
+    """
+    cursors = [Cursor(text) for text in (*map(read_program_text, modules_of(source.path)), source)]
+    procedures = {name: count for cursor in cursors for name, count in _procedures(cursor.tokens).items()}
+    types: dict[str, Shape] = dict(SHAPES)
+    findings: list[ProgramFinding] = []
+    readers = []
+    for cursor in cursors:
+        module, own_module = cursor.source.path.stem.upper(), cursor.source is source
+        private = {} if own_module else {name: f"{module}/{name}" for name in _private(cursor.tokens)}
+        reader = _ModuleReader(cursor, Scope(types, private), procedures)
+        reader.read()
+        readers.append(reader)
+        findings += [*cursor.source.findings, *reader.findings]
+    own = [each for each in readers[-1].routines if each.name not in readers[-1].traps]
+    data = [each for reader in readers for each in reader.data]
+    names = [each.target.name for each in data if isinstance(each.target, Variable)]
+    for name in sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else ():
+        last = next(each for each in reversed(data) if isinstance(each.target, Variable) and each.target.name == name)
+        findings.append(NameTwice(name, last.place))
+    by_name, told = linked([each for reader in readers for each in reader.routines])
+    return Program(
+        "rapid",
+        source.path.stem,
+        source.path,
+        by_name,
+        _entry(own, by_name),
+        tuple(data),
+        (*findings, *told),
+        source.lines,
+    )
+
+
+def _entry(own: list[Routine], routines: Mapping[str, Routine]) -> str:
+    if "MAIN" in routines:
+        return "MAIN"
+    called = {name for routine in routines.values() for name in _called(routine) if name != routine.name}
+    starts = [each for each in own if not each.parameters and "/" not in each.name]
+    free = [each for each in starts if each.name not in called] or starts
+    return free[0].name if free else (own[0].name if own else "")
+
+
+def _called(routine: Routine) -> Iterable[str]:
+    for operation in routine.code:
+        yield getattr(operation, "routine", "")
+
+
+def _tokens(source: ProgramText) -> list[Token]:
+    text = HEADER.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), source.text)
+    breaks = [match.start() for match in re.finditer("\n", text)]
+    found = []
+    for match in PATTERN.finditer(text):
+        kind, raw = match.lastgroup or "", match.group()
+        line = bisect.bisect_left(breaks, match.start()) + 1
+        if raw == '"':
+            raise fault(Place(source.path, line), "a text has no end", 'Close it with "')
+        found.append(Token(kind, raw.upper() if kind == "name" else raw, raw, match.start(), match.end(), line))
+    return found
+
+
+def _procedures(tokens: list[Token]) -> dict[str, int]:
+    """Procedures with the number of their arguments that must be given."""
+    found: dict[str, int] = {}
+    for i, token in enumerate(tokens[:-2]):
+        if token.kind == "name" and token.text == "PROC":
+            count, at = 0, i + 3
+            if at < len(tokens) and tokens[at].text != ")":
+                count = 1 if tokens[at].text != "\\" else 0
+                while at < len(tokens) and tokens[at].text != ")":
+                    count += tokens[at].text == "," and tokens[min(at + 1, len(tokens) - 1)].text != "\\"
+                    at += 1
+            found[tokens[i + 1].text] = count
+    return found
+
+
+def _private(tokens: list[Token]) -> set[str]:
+    """Names that are declared LOCAL."""
+    found = set()
+    for i, token in enumerate(tokens):
+        if token.kind != "name" or token.text != "LOCAL":
+            continue
+        words = [each.text for each in tokens[i + 1 : i + 4]]
+        if len(words) == 3:
+            found.add(words[1] if words[0] in ("PROC", "TRAP", "RECORD") else words[2])
+    return found
+
+
+class Cursor:
+    """The words of a module, read one after another."""
+
+    def __init__(self, source: ProgramText):
+        self.source, self.tokens, self.at = source, _tokens(source), 0
+
+    def next(self, comments: bool = False) -> Token | None:
+        """The next word; comments are passed unless asked for."""
+        while not comments and self.at < len(self.tokens) and self.tokens[self.at].kind == "comment":
+            self.at += 1
+        return self.tokens[self.at] if self.at < len(self.tokens) else None
+
+    def word(self) -> str:
+        """The next name, in capital letters; empty for anything else."""
+        token = self.next()
+        return token.text if token is not None and token.kind == "name" else ""
+
+    def take(self) -> str:
+        """The next name, which is passed."""
+        word = self.word()
+        self.at += 1
+        return word
+
+    def place(self) -> Place:
+        """Where the next word stands."""
+        token = self.next() or (self.tokens[-1] if self.tokens else None)
+        return Place(self.source.path, token.line if token else 1)
+
+    def text(self, tokens: list[Token]) -> str:
+        """The text of words, without comments and in one line."""
+        if not tokens:
+            return ""
+        lines = self.source.text[tokens[0].start : tokens[-1].end].split("\n")
+        return lines[0] if len(lines) == 1 else " ".join(each.raw for each in tokens if each.kind != "comment")
+
+    def simple(self) -> list[Token]:
+        """The words of an instruction up to its semicolon, which is passed, or to a word that can't belong to it."""
+        self.next()
+        first = self.at
+        while self.at < len(self.tokens):
+            token = self.tokens[self.at]
+            if token.text == ";" and token.kind == "mark":
+                self.at += 1
+                return self.tokens[first : self.at - 1]
+            if token.kind == "name" and token.text in ENDS and self.at > first:
+                break
+            self.at += 1
+        return self.tokens[first : self.at]
+
+    def until(self, *words: str) -> list[Token]:
+        """The words up to one of these, which is not passed."""
+        first = self.at
+        while self.at < len(self.tokens) and self.tokens[self.at].text not in words:
+            self.at += 1
+        return self.tokens[first : self.at]
+
+    def head(self, *words: str) -> list[Token]:
+        """The words up to one of these, which is passed; up to a semicolon or the end of the text if there is none."""
+        found = self.until(*words, ";")
+        self.at += 1
+        return found
+
+    def is_label(self) -> bool:
+        """Whether a name and a colon follow."""
+        return self.at + 1 < len(self.tokens) and self.tokens[self.at + 1].text == ":"
+
+
+class _ModuleReader:
+    """Declarations and routines of one module."""
+
+    def __init__(self, cursor: Cursor, scope: Scope, procedures: Mapping[str, int]):
+        self.cursor, self.scope, self.procedures = cursor, scope, procedures
+        self.routines: list[Routine] = []
+        self.traps: set[str] = set()
+        self.data: list[Assign] = []
+        self.findings: list[ProgramFinding] = []
+
+    def read(self) -> None:
+        """Declarations and routines."""
+        while (token := self.cursor.next()) is not None:
+            if token.text in ("MODULE", "ENDMODULE") and token.kind == "name":
+                self._skip_head(token)
+                continue
+            first = self.cursor.at
+            while self.cursor.word() in ("LOCAL", "TASK"):
+                self.cursor.at += 1
+            word = self.cursor.word()
+            if word in DECLARED:
+                builder = CodeBuilder("", (), self.cursor.place())
+                self.declaration(builder, self.scope, local=False)
+                self._keep(builder)
+            elif word == "RECORD":
+                self._record()
+            elif word == "ALIAS":
+                _, kind, name, *_ = [*self.cursor.simple(), *[Token("end", "", "", 0, 0, 0)] * 3]
+                self.scope.types[name.text] = self.scope.types.get(kind.text, (kind.text,))
+            elif word in ("PROC", "FUNC", "TRAP"):
+                self._routine(word)
+            else:
+                self.cursor.at = first
+                place, text = self.cursor.place(), self.cursor.text(self.cursor.simple())
+                self.findings.append(NotUnderstood(text, place))
+
+    def _keep(self, builder: CodeBuilder) -> None:
+        for each in builder.code:
+            if isinstance(each, Assign):
+                self.data.append(each)
+            elif isinstance(each, Fixed):
+                self.findings.append(NotUnderstood(getattr(each.instruction, "text", ""), each.place))
+
+    def _skip_head(self, token: Token) -> None:
+        self.cursor.at += 1
+        if token.text == "MODULE":
+            while (name := self.cursor.next()) is not None and name.line == token.line and name.text != "(":
+                self.cursor.at += 1
+            if (after := self.cursor.next()) is not None and after.text == "(":
+                self.cursor.until(")")
+                self.cursor.at += 1
+
+    def _record(self) -> None:
+        self.cursor.at += 1
+        name = self.cursor.word()
+        self.cursor.at += 1
+        items: list[tuple[str, Shape]] = []
+        while self.cursor.word() not in ("ENDRECORD", ""):
+            words = [each.text for each in self.cursor.simple() if each.kind == "name"]
+            if len(words) == 2:
+                items.append((words[1], self.scope.types.get(words[0], (words[0],))))
+        self.cursor.at += 1
+        self.scope.types[name] = (name, *items)
+
+    def declaration(self, builder: CodeBuilder, scope: Scope, local: bool) -> None:
+        """``VAR num n{3} := [1, 2, 3];``"""
+        place, tokens = self.cursor.place(), self.cursor.simple()
+        words = RapidWords(tokens)
+        try:
+            words.take()
+            kind, name = words.name(), words.name()
+            shape: Shape = scope.types.get(kind, (kind,))
+            sizes: list[Expression] = []
+            if words.accept("{"):
+                sizes.append(words.expression())
+                while words.accept(","):
+                    sizes.append(words.expression())
+                words.expect("}")
+            initial = starting(shape)
+            for size in reversed(sizes):
+                shape = ("[]", shape)
+                count = number(size.value) if isinstance(size, Constant) else None
+                known = count is not None and 0 < count <= MOST_ELEMENTS
+                initial = (initial,) * int(count or 0) if known and initial is not None else None
+            scope.shapes[name] = shape
+            if local:
+                scope.own.add(name)
+            else:
+                name = scope.private.get(name, name)
+            value: Expression | None = words.expression() if words.accept(":=") else None
+            words.finish()
+        except MisreadError:
+            builder.unknown(place, self.cursor.text(tokens), may_move=False)
+            return
+        if value is not None:
+            value = scope.typed(scope.settled(value), shape)
+        elif initial is not None:
+            value = Constant(initial)
+        builder.add(Assign(place, Variable(name), value, self.cursor.text(tokens), kind, local))
+
+    def _routine(self, word: str) -> None:
+        place = self.cursor.place()
+        self.cursor.at += 1
+        if word == "FUNC":
+            self.cursor.at += 1
+        name = self.cursor.word()
+        self.cursor.at += 1
+        scope = Scope(self.scope.types, self.scope.private, dict(self.scope.shapes))
+        name = scope.private.get(name, name)
+        parameters: list[RoutineParameter] = []
+        opened = self.cursor.next()
+        if word != "TRAP":
+            if not name or opened is None or opened.text != "(":
+                raise fault(place, f"this head of a {word} can't be read", f"Write {word} name()")
+            self.cursor.at += 1
+            inside = self.cursor.until(")")
+            self.cursor.at += 1
+            parameters = _parameters(inside, scope, place)
+        scope.own |= {each.name for each in parameters}
+        builder = CodeBuilder(name, tuple(parameters), place)
+        for parameter in parameters:
+            shape = scope.shapes.get(parameter.name)
+            if shape is not None and len(shape) > 1:
+                variable = Variable(parameter.name)
+                builder.add(Assign(place, variable, scope.typed(variable, shape), "", local=True))
+        end = f"END{word}"
+        _BodyReader(self, builder, scope).read(end)
+        self.routines.append(builder.routine(self.cursor.place()))
+        self.traps |= {name} if word == "TRAP" else set()
+        self.cursor.at += 1
+
+
+def _parameters(tokens: list[Token], scope: Scope, place: Place) -> list[RoutineParameter]:
+    found: list[RoutineParameter] = []
+    optional = out = False
+    words: list[str] = []
+
+    def finish() -> None:
+        if len(words) >= 2:
+            kind, name = words[-2], words[-1]
+            shape = scope.types.get(kind, (kind,))
+            scope.shapes[name] = ("[]", shape) if arrays else shape
+            found.append(RoutineParameter(name, out, Constant(ABSENT) if optional else None))
+        elif words:
+            raise fault(place, "a parameter has no type or no name", "Write PROC name(num n)")
+
+    arrays = 0
+    for token in tokens:
+        if token.kind == "comment":
+            continue
+        if token.text in (",", "\\", "|"):
+            finish()
+            words, out, arrays = [], False, 0
+            optional = token.text != "," or False
+        elif token.text in ("INOUT", "VAR", "PERS") and not words:
+            out = True
+        elif token.text == "{":
+            arrays += 1
+        elif token.kind == "name":
+            words.append(token.text)
+    finish()
+    return found
+
+
+class _BodyReader:
+    """The instructions of one routine."""
+
+    def __init__(self, module: _ModuleReader, builder: CodeBuilder, scope: Scope):
+        self.module, self.cursor, self.builder, self.scope = module, module.cursor, builder, scope
+
+    def read(self, end: str) -> None:
+        """Instructions up to the word that ends the routine, which is not passed, with its handlers."""
+        handler = self._handler_moves(end)
+        while (token := self.cursor.next(comments=True)) is not None:
+            if token.kind == "comment":
+                self._remark(token)
+            elif self.cursor.word() in DECLARED:
+                self.module.declaration(self.builder, self.scope, local=True)
+            else:
+                break
+        known = sorted(self.scope.own)
+        name = f"{self.builder.name}/ERROR"
+        if handler:  # what it does may come about at any time
+            call = Invocation(name, tuple(map(Variable, known)))
+            self.builder.beside(self.builder.place, call, f"ERROR ({self.builder.name})", "interrupt")
+        self.instructions(end)
+        if self.cursor.word() not in HANDLERS:
+            return
+        place = self.cursor.place()
+        builder = CodeBuilder(name, tuple(map(RoutineParameter, known)), place)
+        inside = _BodyReader(self.module, builder, self.scope)
+        while self.cursor.word() in HANDLERS:
+            self.cursor.at += 1
+            if (token := self.cursor.next()) is not None and token.text == "(":
+                self.cursor.head(")")
+            inside.instructions(end)
+            builder.add(Return(place))
+        if handler:
+            self.module.routines.append(builder.routine(self.cursor.place()))
+
+    def instructions(self, *ends: str) -> None:
+        """Instructions up to one of these words, or a handler's, which is not passed."""
+        while True:
+            token = self.cursor.next(comments=True)
+            if token is None:
+                raise fault(self.builder.place, f"{self.builder.name} has no {ends[0]}", f"Close it with {ends[0]}")
+            word = token.text if token.kind == "name" else ""
+            if token.kind == "comment":
+                self._remark(token)
+            elif word in (*ends, *HANDLERS) and not self._is_set():
+                return
+            elif word in BLOCKS:
+                BLOCKS[word](self, self._at(token))
+            elif word in ENDS and not self._is_set():
+                problem = f"{word} stands within {self.builder.name}"
+                raise fault(self._at(token), problem, f"Close it with {ends[0]} before")
+            elif word in DECLARED:
+                self.module.declaration(self.builder, self.scope, local=True)
+            elif word and self.cursor.is_label():
+                self.builder.label(word)
+                self.cursor.at += 2
+            else:
+                self.instruction(self._at(token), self.cursor.simple())
+
+    def instruction(self, place: Place, tokens: list[Token]) -> None:
+        """One instruction; one that is not understood is kept as such."""
+        text = self.cursor.text(tokens)
+        words = RapidWords(tokens)
+        if words.kind == "end":
+            return
+        try:
+            self._instruction(place, words, text)
+        except MisreadError:
+            self.builder.unknown(place, text)
+            if words.texts[1:2] == [":="] and words.kinds[0] == "name":
+                name = words.texts[0]
+                self.builder.add(Assign(place, self.scope.settled(Variable(name)), Constant(Unclear(name)), text))
+        except RecursionError:
+            raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+
+    def condition(self, tokens: list[Token]) -> Expression:
+        """A condition; one that is not understood is kept."""
+        words = RapidWords(tokens)
+        try:
+            found = words.expression()
+            words.finish()
+        except MisreadError:
+            return Opaque(self.cursor.text(tokens))
+        return self.scope.settled(found)
+
+    def value(self, words: RapidWords) -> Expression:
+        """The expression that comes next."""
+        return self.scope.settled(words.expression())
+
+    def given(self, words: RapidWords) -> Given:
+        """The arguments of an instruction."""
+        placed, named = words.arguments("")
+        settled = self.scope.settled
+        return (
+            tuple(None if each is None else settled(each) for each in placed),
+            tuple((name, settled(each)) for name, each in named),
+        )
+
+    def forget_changed(self, place: Place, expression: Expression, text: str) -> None:
+        """What a function in an expression changes has no known value behind it."""
+        for each in inner(expression):
+            self.forget_changed(place, each, text)
+        if isinstance(expression, Invocation) and expression.function in CHANGING_FUNCTIONS:
+            at = CHANGING_FUNCTIONS[expression.function]
+            given = expression.arguments[at] if at < len(expression.arguments) else None
+            if isinstance(given, (Variable, Element, Member)):
+                self.builder.add(Assign(place, given, Constant(Unclear(expression.function.lower())), text))
+
+    def late(self, place: Place, called: Expression, given: Given, text: str) -> None:
+        """A call of the procedure that a text names when the program runs: one after the other is asked for."""
+        prefix, whole = _prefix(called)
+        prefix = prefix.upper()
+        if whole:
+            self.builder.add(Doing(place, Invocation(prefix, *given), text))
+            return
+        fitting = [
+            name
+            for name, count in self.module.procedures.items()
+            if name.startswith(prefix) and count == len(given[0]) and name != "MAIN"
+        ]
+        if not fitting or len(fitting) > MOST_LATE:
+            self.builder.unknown(place, text)
+            return
+        for i, name in enumerate(fitting):
+            test = Binary("=", Invocation(UPPER, (called,)), Constant(name))
+            if i == 0:
+                self.builder.open_if(place, test, text)
+            else:
+                self.builder.next_arm(place, test, text)
+            self.builder.add(Doing(place, Invocation(name, *given), text))
+        self.builder.next_arm(place, None, text)
+        self.builder.add(Doing(place, Invocation(LATE, ()), text))
+        self.builder.close("if", place)
+
+    def _remark(self, token: Token) -> None:
+        self.builder.remark(self._at(token), token.raw[1:].strip())
+        self.cursor.at += 1
+
+    def _at(self, token: Token) -> Place:
+        return Place(self.cursor.source.path, token.line)
+
+    def _is_set(self) -> bool:
+        """Whether a value is given to the next word, so that it is a name."""
+        return self.cursor.at + 1 < len(self.cursor.tokens) and self.cursor.tokens[self.cursor.at + 1].text == ":="
+
+    def _instruction(self, place: Place, words: RapidWords, text: str) -> None:
+        builder, first = self.builder, words.next
+        if words.accept("%"):
+            called = self.value(words)
+            words.expect("%")
+            self.late(place, called, self.given(words), text)
+            return
+        if words.kind != "name":
+            raise MisreadError("an instruction begins with a name")
+        if words.texts[1] in (":=", ".", "{"):
+            target = self.scope.settled(words.reference())
+            words.expect(":=")
+            value = self.value(words)
+            words.finish()
+            shape = self.scope.shapes.get(first) if isinstance(target, Variable) else None
+            builder.add(Assign(place, target, self.scope.typed(value, shape), text))
+            self.forget_changed(place, value, text)
+            return
+        words.take()
+        if first in PLAIN_WORDS:
+            PLAIN_WORDS[first](self, place, words, text)
+            return
+        given = self.given(words)
+        name = self.scope.private.get(first, first)
+        if name in self.module.procedures:
+            builder.add(Doing(place, Invocation(name, *given), text))
+        else:
+            self._builtin(place, name, given, text)
+
+    def _builtin(self, place: Place, name: str, given: Given, text: str) -> None:
+        """An instruction of the controller."""
+        builder, (placed, named) = self.builder, given
+        options = {key for key, _ in named}
+        if name in NOT_SIMULATED and not (name == "SINGAREA" and "OFF" in options):
+            self.module.findings.append(NotSimulated(text, place))
+        if name in MOTIONS:
+            builder.add(Move(place, name, placed, text, (), named))
+            if name in SEARCHES:
+                builder.unknown(place, text)  # the arm stops where the signal comes
+            if name in CALLING and placed and placed[-1] is not None:
+                self.late(place, placed[-1], ((), ()), text)
+            return
+        if name == "WAITTIME" and placed:
+            builder.add(Waiting(place, "seconds", placed[0], text))
+            return
+        if name == "CALLBYVAR" and len(placed) == 2 and placed[0] is not None and placed[1] is not None:
+            suffix = Invocation("NUMTOSTR", (placed[1], Constant(0)))
+            self.late(place, Invocation(ARITHMETIC, (Constant("+"), placed[0], suffix)), ((), ()), text)
+            return
+        if name in WAITS:
+            builder.add(Waiting(place, "condition", None, text))
+        else:
+            builder.add(Doing(place, Invocation(name, placed, named), text))
+        changed = [each for key, each in named if key in ("TIMEFLAG", "VALUE")]
+        if name in CHANGING and CHANGING[name] < len(placed):
+            changed.append(placed[CHANGING[name]] or Constant(0))
+        if name.startswith(READING):
+            changed += [each for each in (*placed, *(each for _, each in named)) if each is not None]
+        for each in changed:
+            if isinstance(each, (Variable, Element, Member)):
+                builder.add(Assign(place, each, Constant(Unclear(f"what {name} gives")), text))
+
+    def _handler_moves(self, end: str) -> bool:
+        """Whether the routine has a handler that may move the arm."""
+        inside = False
+        for token in self.cursor.tokens[self.cursor.at :]:
+            if token.kind != "name":
+                continue
+            if token.text == end:
+                return False
+            inside = inside or token.text in HANDLERS
+            if inside and (token.text in MOTIONS or token.text in self.module.procedures):
+                return True
+        return False
+
+
+Given = tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]
+"""Arguments by place and by name."""
+Block = Callable[[_BodyReader, Place], None]
+
+
+def _prefix(expression: Expression) -> tuple[str, bool]:
+    """With what a text begins, as far as the program says, and whether that is all of it."""
+    if isinstance(expression, Constant) and isinstance(expression.value, str):
+        return expression.value, True
+    if not isinstance(expression, Invocation) or expression.function != ARITHMETIC:
+        return "", False
+    (first, whole), (second, ends) = (
+        _prefix(each) if each is not None else ("", False) for each in expression.arguments[1:]
+    )
+    return (first + second, ends) if whole else (first, False)
+
+
+def _if(body: _BodyReader, place: Place) -> None:
+    """``IF condition THEN``, or ``IF condition instruction;``."""
+    cursor, builder = body.cursor, body.builder
+    start = cursor.at
+    cursor.at += 1
+    condition = cursor.until("THEN", ";")
+    if cursor.at < len(cursor.tokens) and cursor.tokens[cursor.at].text == "THEN":
+        cursor.at += 1
+        text = _words_text(cursor, start)
+        found = body.condition(condition)
+        body.forget_changed(place, found, text)
+        builder.open_if(place, found, text)
+        body.instructions("ENDIF", "ELSEIF", "ELSE")
+        while cursor.word() != "ENDIF":
+            if cursor.word() not in ("ELSEIF", "ELSE"):
+                raise fault(place, "the IF that begins here has no end", "Close it with ENDIF")
+            begin = cursor.at
+            if cursor.take() == "ELSE":
+                builder.next_arm(place, None, "")
+            else:
+                other = cursor.head("THEN")
+                builder.next_arm(place, body.condition(other), _words_text(cursor, begin))
+            body.instructions("ENDIF", "ELSEIF", "ELSE")
+        builder.close("if", cursor.place())
+        cursor.at += 1
+        return
+    cursor.at = start + 1
+    tokens = cursor.simple()
+    words = RapidWords(tokens)
+    text = cursor.text(tokens)
+    try:
+        test = body.value(words)
+    except MisreadError:
+        builder.unknown(place, text)
+        return
+    body.forget_changed(place, test, text)
+    kept = [each for each in tokens if each.kind != "comment"][words.at :]
+    builder.open_if(place, test, cursor.text([each for each in tokens if each.kind != "comment"][: words.at]))
+    body.instruction(place, kept)
+    builder.close("if", place)
+
+
+def _words_text(cursor: Cursor, start: int) -> str:
+    """The condition of a block whose first word has this number."""
+    return cursor.text(cursor.tokens[start + 1 : cursor.at - 1])
+
+
+def _while(body: _BodyReader, place: Place) -> None:
+    start = body.cursor.at
+    body.cursor.at += 1
+    condition = body.cursor.head("DO")
+    body.builder.open_while(place, body.condition(condition), _words_text(body.cursor, start))
+    _inside(body, place, "while", "ENDWHILE")
+
+
+def _for(body: _BodyReader, place: Place) -> None:
+    """``FOR i FROM first TO last STEP step DO``; without a step it counts towards the last."""
+    cursor = body.cursor
+    cursor.at += 1
+    tokens = cursor.head("DO")
+    words = RapidWords(tokens)
+    try:
+        name = words.name()
+        words.expect("FROM")
+        first = body.value(words)
+        words.expect("TO")
+        last = body.value(words)
+        step = body.value(words) if words.accept("STEP") else Invocation(STEP, (first, last))
+        words.finish()
+    except MisreadError as error:
+        raise fault(place, f"this FOR can't be read ({error})", "Write FOR i FROM 1 TO 9 DO") from None
+    body.scope.own.add(name)
+    body.builder.add(Assign(place, Variable(name), None, "", local=True))
+    body.builder.open_for(place, name, first, last, step, cursor.text(tokens))
+    _inside(body, place, "for", "ENDFOR")
+
+
+def _inside(body: _BodyReader, place: Place, kind: str, end: str) -> None:
+    body.instructions(end)
+    if body.cursor.word() != end:
+        raise fault(place, f"the {kind.upper()} that begins here has no end", f"Close it with {end}")
+    body.builder.close(kind, body.cursor.place())
+    body.cursor.at += 1
+
+
+def _test(body: _BodyReader, place: Place) -> None:
+    """``TEST subject CASE 1, 2: ... DEFAULT: ... ENDTEST``."""
+    cursor = body.cursor
+    cursor.at += 1
+    subject = body.condition(cursor.until("CASE", "DEFAULT", "ENDTEST"))
+    body.builder.open_switch(place, subject)
+    while (word := cursor.word()) != "ENDTEST":
+        if word not in ("CASE", "DEFAULT"):
+            raise fault(place, "the TEST that begins here has no end", "Close it with ENDTEST")
+        at = cursor.place()
+        cursor.at += 1
+        tokens = cursor.head(":")
+        text = cursor.text(tokens)
+        values: list[Expression] | None = None
+        if word == "CASE":
+            words = RapidWords(tokens)
+            try:
+                values = [body.value(words)]
+                while words.accept(","):
+                    values.append(body.value(words))
+                words.finish()
+            except MisreadError as error:
+                raise fault(at, f"this CASE can't be read ({error})", "Write CASE 1, 2:") from None
+        body.builder.case(at, values, text)
+        body.instructions("CASE", "DEFAULT", "ENDTEST")
+    body.builder.close("switch", cursor.place())
+    cursor.at += 1
+
+
+BLOCKS: dict[str, Block] = {"IF": _if, "WHILE": _while, "FOR": _for, "TEST": _test}
+
+
+def _return(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    value = None if words.kind == "end" else body.value(words)
+    words.finish()
+    body.builder.add(Return(place, value))
+
+
+def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    body.builder.goto(place, words.name())
+
+
+def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    body.builder.add(Waiting(place, "operator", None, text))
+
+
+def _halt(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    body.builder.add(Halt(place))
+
+
+def _leave(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    """RAISE, RETRY, TRYNEXT: where they lead to is known when an error comes about, so nothing follows here."""
+    body.builder.add(Return(place))
+
+
+def _connect(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    """``CONNECT number WITH trap;``"""
+    words.reference()
+    words.expect("WITH")
+    name = words.name()
+    body.builder.beside(place, Invocation(body.scope.private.get(name, name), ()), text, "interrupt")
+
+
+def _counted(change: int | None) -> Callable[[_BodyReader, Place, RapidWords, str], None]:
+    """Incr, Decr, Add and Clear; None for the amount that is given."""
+
+    def read(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+        target = body.scope.settled(words.reference())
+        if change is not None:
+            amount: Expression = Constant(change)
+        else:
+            words.expect(",")
+            amount = body.value(words)
+        words.finish()
+        body.builder.add(Assign(place, target, Invocation(ARITHMETIC, (Constant("+"), target, amount)), text))
+
+    return read
+
+
+def _clear(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    target = body.scope.settled(words.reference())
+    words.finish()
+    body.builder.add(Assign(place, target, Constant(0), text))
+
+
+PLAIN_WORDS: dict[str, Callable[[_BodyReader, Place, RapidWords, str], None]] = {
+    "RETURN": _return,
+    "GOTO": _goto,
+    "STOP": _stop,
+    "BREAK": _stop,
+    "EXIT": _halt,
+    "EXITCYCLE": _halt,
+    "RAISE": _leave,
+    "RETRY": _leave,
+    "TRYNEXT": _leave,
+    "CONNECT": _connect,
+    "INCR": _counted(1),
+    "DECR": _counted(-1),
+    "ADD": _counted(None),
+    "CLEAR": _clear,
+}

@@ -1,0 +1,250 @@
+"""Writes ABB RAPID: a module with a procedure ``main``.
+
+Joint motions are MoveAbsJ, because cfx would need ABB's own zero and signs; lines and arcs carry the quarters of axes
+1, 4 and 6 where the joints are known, and are not supervised (``ConfL \\Off``). What was read as RAPID keeps its
+configuration. Durations are written as ``\\T``. A tool without known mass has the least load that a controller takes,
+and is named.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from er3a.numerics.arrays import Reals
+from er3a.programs.instructions import (
+    ArmMotion,
+    JointTarget,
+    Listing,
+    NamedFrame,
+    Output,
+    Pause,
+    PoseTarget,
+    Zone,
+    numbers_of,
+)
+from er3a.programs.rapid.data_types import (
+    AXIS_SPEED,
+    LEAST_LOAD,
+    SLIDE_SPEED,
+    TOOL_SPEEDS,
+    TURN_SPEED,
+    ZONES,
+    quarters_of,
+)
+from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, ascii_text, fixed, share_of_max, short
+from er3a.robots.masses import MassBody
+
+NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+DIGITS, QUATERNION_DIGITS = 6, 10
+RESERVED_TEXT = """
+alias and backward case connect const default div do else elseif endfor endfunc endif endmodule endproc endrecord
+endtest endtrap endwhile error exit false for from func goto if inout local main mod module nostepin not noview or pers
+proc raise readonly record retry return step sysmodule task test then to trap true trynext undo var viewonly while with
+xor
+"""
+RESERVED = frozenset(RESERVED_TEXT.split())
+
+
+class RapidWriter(Writer):
+    """Writes RAPID."""
+
+    languages = ("rapid",)
+
+    def __init__(self, listing: Listing, options: WriteOptions):
+        super().__init__(listing, options)
+        if self.name.lower() in RESERVED:
+            self.name = f"p{self.name}"
+        self.frames: dict[tuple[str, bytes], str] = {}
+        self.declared: list[str] = []
+        self.settings: dict[str, str] = {}
+
+    def files(self, head: list[str]) -> dict[str, str]:
+        """The .mod file."""
+        lines = [
+            f"MODULE {self.name}",
+            *(f"  ! {ascii_text(line)}" for line in head),
+            *(f"  {each}" for each in self.declared),
+        ]
+        body = ["PROC main()", *(f"  {line}" for line in self.lines), "ENDPROC"]
+        return {".mod": "\n".join((*lines, *(f"  {line}" for line in body), "ENDMODULE", ""))}
+
+    def begin_loop(self) -> None:
+        """``WHILE TRUE DO``; what was set before does not count within."""
+        self.lines.append("WHILE TRUE DO")
+        self.settings.clear()
+
+    def end_loop(self) -> None:
+        """``ENDWHILE``."""
+        self.lines.append("ENDWHILE")
+
+    def comment(self, text: str) -> None:
+        """``! text``."""
+        self.lines.append(f"! {ascii_text(text)}")
+
+    def pause(self, pause: Pause) -> None:
+        """WaitTime, Stop, or the wait that was read."""
+        if pause.seconds is not None:
+            self.lines.append(f"WaitTime {short(pause.seconds)};")
+        else:
+            self.lines.append("Stop;" if pause.condition is None else f"{pause.condition};")
+
+    def output(self, output: Output) -> None:
+        """The instruction that was read."""
+        self.lines.append(f"{output.value};")
+
+    def verbatim(self, text: str) -> None:
+        """A line as it was read."""
+        self.lines.append(f"{text};")
+
+    def motion(self, ready: ReadyMotion) -> None:
+        """MoveAbsJ, MoveJ, MoveL, MoveC with what has to be set before."""
+        motion = ready.motion
+        target = motion.target
+        own_pose = self.own and motion.kind == "joint" and isinstance(target, PoseTarget)
+        if motion.kind == "joint" and not own_pose:
+            joints = ready.joints
+            if joints is None and isinstance(target, JointTarget):
+                joints = target.joints
+            if joints is None or np.isnan(joints).any():
+                self.left_out(motion)
+                return
+            form, texts = "MoveAbsJ", [_joints_text(joints)]
+        else:
+            if ready.pose is None or (motion.kind == "arc" and ready.via is None) or motion.angle is not None:
+                self.left_out(motion)
+                return
+            form = {"arc": "MoveC", "joint": "MoveJ"}.get(motion.kind, "MoveL")
+            conf = self._configuration(ready, "ConfJ" if motion.kind == "joint" else "ConfL")
+            texts = [] if ready.via is None or motion.kind != "arc" else [_target_text(ready.via, conf)]
+            texts.append(_target_text(ready.pose, conf))
+        self.count["splines"] += motion.kind == "spline"
+        speed = self._speed(ready)
+        zone = self._zone(motion)
+        base = (
+            "" if motion.base.pose is None and not motion.base.name else f"\\WObj:={self._frame(motion.base, 'wobj')}"
+        )
+        tool = self._frame(motion.tool, "tool")
+        self._set_before(motion)
+        self.lines.append(f"{form} {','.join(texts)},{speed},{zone},{tool}{base};")
+
+    def _configuration(self, ready: ReadyMotion, supervision: str) -> str:
+        """The target's confdata as it was read, or by the joints; not supervised where neither is known."""
+        target = ready.motion.target
+        said = dict(target.configuration) if isinstance(target, PoseTarget) and self.own else {}
+        if {"cf1", "cf4", "cf6", "cfx"} <= said.keys():
+            followed = isinstance(target, PoseTarget) and target.branch is not None
+            self._set(supervision, f"{supervision} \\{'On' if followed else 'Off'};")
+            return "[" + ",".join(f"{float(said[key]):g}" for key in ("cf1", "cf4", "cf6", "cfx")) + "]"
+        self._set(supervision, f"{supervision} \\Off;")
+        joints = ready.joints if not self.own and ready.motion.kind != "joint" else None
+        if joints is None or len(joints) != 6 or np.isnan(joints).any():
+            return "[0,0,0,0]"
+        return "[" + ",".join(map(str, quarters_of(joints))) + ",0]"
+
+    def _frame(self, frame: NamedFrame, kind: str) -> str:
+        """The name of a tool or work object, which is declared once."""
+        plain = frame.name.isidentifier() and frame.name.isascii() and frame.name.lower() not in RESERVED
+        null = f"{kind}0"
+        if frame.pose is None:
+            if frame.name:
+                self.name_tool(frame.name)
+            return frame.name if plain else null
+        if np.array_equal(frame.pose, np.eye(4)) and (not frame.name or frame.name.lower() in (null, "base", "world")):
+            return null
+        key = (kind, frame.pose.tobytes())
+        if key not in self.frames:
+            taken = {*self.frames.values(), "tool0", "wobj0"}
+            name = frame.name if plain and frame.name not in taken else f"er3a_{kind}{len(self.frames) + 1}"
+            self.frames[key] = name
+            pose = _pose_text(frame.pose)
+            if kind == "tool":
+                self.declared.append(f"PERS tooldata {name}:=[TRUE,{pose},{_load_text(frame.load)}];")
+                if frame.load is None:
+                    self.name_tool(f"the load of {name}")
+            else:
+                null_pose = "[[0,0,0],[1,0,0,0]]"
+                self.declared.append(f'PERS wobjdata {name}:=[FALSE,TRUE,"",{pose},{null_pose}];')
+        return self.frames[key]
+
+    def _speed(self, ready: ReadyMotion) -> str:
+        motion = ready.motion
+        speed = motion.speed
+        if speed is None or not speed.value > 0:
+            self._set("vel", "VelSet 100,5000;")
+            return "v100" if motion.kind != "joint" else "vmax"
+        if speed.unit == "s":
+            return f"v1000\\T:={short(speed.value)}"
+        if speed.unit == "m/s":
+            self._set("vel", "VelSet 100,5000;")
+            along = speed.value * 1000
+            turn = TURN_SPEED if motion.turn_speed is None else math.degrees(motion.turn_speed)
+            if along in TOOL_SPEEDS and abs(turn - TURN_SPEED) < 1e-9:
+                return f"v{along:g}"
+            return f"[{short(along)},{short(turn)},{SLIDE_SPEED:g},{AXIS_SPEED:g}]"
+        share = share_of_max(ready, self.robot)
+        if speed.unit != "share":
+            self.count["estimated"] += 1
+        if share is None:
+            self._set("vel", "VelSet 100,5000;")
+            return "v100"
+        self.count["cut"] += share > 1 + 1e-9
+        self._set("vel", f"VelSet {short(min(max(share, 0.001), 1) * 100, 3)},5000;")
+        return "vmax"
+
+    def _zone(self, motion: ArmMotion) -> str:
+        """A zone by its name, or with turn and external axes as those that have one."""
+        zone: Zone = motion.zone
+        if zone.kind != "distance" or zone.value <= 0:
+            self.count["zones"] += zone.kind != "fine"
+            return "fine"
+        size = zone.value * 1000
+        name = next((name.lower() for name, sizes in ZONES.items() if abs(sizes[0] - size) < 1e-9), "")
+        wide = short(1.5 * size)
+        return name or f"[FALSE,{short(size)},{wide},{wide},{short(0.15 * size)},{wide},{short(0.15 * size)}]"
+
+    def _set_before(self, motion: ArmMotion) -> None:
+        acceleration = motion.acceleration
+        if acceleration is None:
+            return
+        if acceleration.unit == "share":
+            self._set("acc", f"AccSet {short(min(max(acceleration.value * 100, 20), 100), 3)},100;")
+        elif acceleration.unit == "m/s2":
+            value = short(acceleration.value)
+            self._set("limit", f"PathAccLim TRUE\\AccMax:={value},TRUE\\DecelMax:={value};")
+
+    def _set(self, key: str, line: str) -> None:
+        """A line that sets something, unless it is set so already."""
+        if self.settings.get(key) != line:
+            self.settings[key] = line
+            self.lines.append(line)
+
+
+def _joints_text(joints: Reals) -> str:
+    degrees = [fixed(math.degrees(value), DIGITS) for value in joints]
+    return f"[[{','.join([*degrees, *['0'] * (6 - len(degrees))])}],{NO_AXES}]"
+
+
+def _load_text(load: MassBody | None) -> str:
+    """loaddata, with the principal axes of the inertia; the least that a controller takes if it is not known."""
+    if load is None:
+        return f"[{LEAST_LOAD},[0,0,{LEAST_LOAD}],[1,0,0,0],0,0,0]"
+    moments, axes = np.linalg.eigh(load.inertia_matrix)
+    if np.array_equal(load.inertia_matrix, np.diag(np.diag(load.inertia_matrix))):
+        moments, axes = np.diag(load.inertia_matrix), np.eye(3)
+    turn = np.eye(4)
+    turn[:3, :3] = axes if np.linalg.det(axes) > 0 else -axes
+    quaternion = ",".join(fixed(each, QUATERNION_DIGITS) for each in numbers_of(turn, "abb")[3:])
+    centre = ",".join(short(each * 1000) for each in load.centre)
+    return f"[{short(load.mass)},[{centre}],[{quaternion}],{','.join(short(float(each), 9) for each in moments)}]"
+
+
+def _pose_text(pose: Reals) -> str:
+    x, y, z, *quaternion = numbers_of(pose, "abb")
+    turn = ",".join(fixed(each, QUATERNION_DIGITS) for each in quaternion)
+    return f"[[{fixed(x, DIGITS)},{fixed(y, DIGITS)},{fixed(z, DIGITS)}],[{turn}]]"
+
+
+def _target_text(pose: Reals, conf: str) -> str:
+    return f"{_pose_text(pose)[:-1]},{conf},{NO_AXES}]"

@@ -1,0 +1,283 @@
+"""The same cell in all languages that have routines: the same motions, the same findings, the same times.
+
+Each text is written by hand in its language's own units and angle conventions, from one list of joint angles, so that a
+reader that is wrong about units, order of turns, frames, speeds or loops can't agree with the others.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from er3a.files.robot_library import load_robot
+from er3a.files.scene_file import load_scene
+from er3a.kinematics.forward import forward
+from er3a.program_check.check_program import CheckOptions, assumed_limits, check_program
+from er3a.programs.instructions import numbers_of
+from er3a.programs.languages import read_program
+
+ROBOT = load_robot("er3a_c60")
+HOME = np.radians([0.0, -20.0, 15.0, 0.0, -60.0, 0.0])
+TURNED = HOME + np.radians([35.0, 0, 0, 0, 0, 0])
+TOOL = np.eye(4)
+TOOL[:3, 3] = [0.0, 0.0, 0.1]
+BASE = np.eye(4)
+BASE[:3, :3] = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+BASE[:3, 3] = [0.3, 0.1, 0.05]
+ARM = ROBOT.replace(tool=TOOL, base=np.eye(4))
+SPEED, TURN_SPEED, PAUSE = 0.2, 2.0, 0.5
+BEYOND = TURNED + np.radians([200.0, 0, 0, 0, 0, 0])
+"""One joint alone turns, to where its limit is passed."""
+
+
+def lines():
+    """T_robot_tool (4, 4) of the lines of the loop, tilted and back; then into the table, and out of reach."""
+    start = forward(ARM, TURNED)
+    forth, down, away = start.copy(), start.copy(), start.copy()
+    forth[:3, 3] += [0.02, -0.06, 0.04]
+    forth[:3, :3] = start[:3, :3] @ [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]
+    down[:3, 3] += [0.1, 0.07, -0.45]
+    away[:3, 3] += [0.5, 0.35, 0.0]
+    return [forth, start], down, away
+
+
+def numbers(values, digits=12):
+    return ",".join(f"{each:.{digits}f}" for each in values)
+
+
+def in_base(pose):
+    return np.linalg.inv(BASE) @ pose
+
+
+def krl():
+    def frame(pose):
+        return "{" + ",".join(f"{key} {each:.12f}" for key, each in zip("XYZABC", numbers_of(pose, "kuka"))) + "}"
+
+    def axes(q):
+        return "{" + ",".join(f"A{i} {each:.12f}" for i, each in enumerate(np.degrees(q), 1)) + "}"
+
+    loop, down, away = lines()
+    inside = "\n".join(f"  LIN {frame(in_base(each))}" for each in loop)
+    return (
+        ".src",
+        f"""DEF cell( )
+INT i
+BAS(#VEL_PTP,100)
+BAS(#ACC_PTP,100)
+$TOOL={frame(TOOL)}
+$BASE={frame(BASE)}
+$VEL.CP={SPEED}
+$ACC.CP=2.0
+FOR i=1 TO 2
+  PTP {axes(HOME)}
+  PTP {axes(TURNED)}
+{inside}
+ENDFOR
+WAIT SEC {PAUSE}
+LIN {frame(in_base(down))}
+PTP {axes(TURNED)}
+LIN {frame(in_base(away))}
+PTP {axes(TURNED)}
+PTP {axes(BEYOND)}
+END
+""",
+    )
+
+
+def urscript():
+    limits = assumed_limits(ARM, CheckOptions())
+    rates = f"a={limits.acceleration[0]:.12f}, v={limits.speed[0]:.12f}"
+
+    def pose(T):
+        return f"p[{numbers(numbers_of(T, 'ur'))}]"
+
+    loop, down, away = lines()
+    inside = "\n".join(f"    movel({pose(each)}, a=2.0, v={SPEED})" for each in loop)
+    return (
+        ".script",
+        f"""def cell():
+  set_tcp({pose(TOOL)})
+  i = 0
+  while (i < 2):
+    movej([{numbers(HOME)}], {rates})
+    movej([{numbers(TURNED)}], {rates})
+{inside}
+    i = i + 1
+  end
+  sleep({PAUSE})
+  movel({pose(down)}, a=2.0, v={SPEED})
+  movej([{numbers(TURNED)}], {rates})
+  movel({pose(away)}, a=2.0, v={SPEED})
+  movej([{numbers(TURNED)}], {rates})
+  movej([{numbers(BEYOND)}], {rates})
+end
+""",
+    )
+
+
+def pointc(pose):
+    return f"POINTC({numbers(numbers_of(pose, 'efort'))})"
+
+
+def pointj(q):
+    return f"POINTJ({numbers(np.degrees(q))})"
+
+
+def rpl():
+    loop, down, away = lines()
+    inside = "\n".join(f"  MLIN({pointc(each)}, v200, fine, gun);" for each in loop)
+    return (
+        ".pgm",
+        f"""i := 0;
+WHILE i < 2 DO
+  MJOINT({pointj(HOME)}, v100perc, fine, gun);
+  MJOINT({pointj(TURNED)}, v100perc, fine, gun);
+{inside}
+  i := i + 1;
+END_WHILE;
+DWELL({PAUSE});
+MLIN({pointc(down)}, v200, fine, gun);
+MJOINT({pointj(TURNED)}, v100perc, fine, gun);
+MLIN({pointc(away)}, v200, fine, gun);
+MJOINT({pointj(TURNED)}, v100perc, fine, gun);
+MJOINT({pointj(BEYOND)}, v100perc, fine, gun);
+""",
+    )
+
+
+def xpl():
+    def motion(word, target, speed):
+        parts = f"<target>{target}</target><speed>{speed}</speed><zone>fine</zone><tool>gun</tool>"
+        return f"<{word}>{parts}</{word}>"
+
+    def joint(q):
+        return motion("mjoint", pointj(q), "v100perc")
+
+    def line(pose):
+        return motion("mlin", pointc(pose), "v200")
+
+    loop, down, away = lines()
+    return (
+        ".XPL",
+        f"""<?xml version="1.0" encoding="utf-8"?>
+<Xpl-source><XplEnvironment><Pous><Pou><Name>Main</Name><Type>Program</Type><Body>
+<for><var>i</var><from>1</from><to>2</to><pouref>1</pouref></for>
+<dwell><expr>{PAUSE}</expr></dwell>
+{line(down)}
+{joint(TURNED)}
+{line(away)}
+{joint(TURNED)}
+{joint(BEYOND)}
+</Body><Pou><Name>1</Name><Body>
+{joint(HOME)}
+{joint(TURNED)}
+{line(loop[0])}
+{line(loop[1])}
+</Body></Pou></Pou></Pous></XplEnvironment></Xpl-source>
+""",
+    )
+
+
+def rapid():
+    axes = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+
+    def pose(T):
+        values = numbers_of(T, "abb")
+        return f"[{numbers(values[:3])}],[{numbers(values[3:])}]"
+
+    def joint(q):
+        return f"MoveAbsJ [[{numbers(np.degrees(q))}],{axes}],vmax,fine,gun;"
+
+    def line(T):
+        return f"MoveL [{pose(in_base(T))},[0,0,0,0],{axes}],slow,fine,gun\\WObj:=plate;"
+
+    loop, down, away = lines()
+    inside = "\n".join(f"      {line(each)}" for each in loop)
+    return (
+        ".mod",
+        f"""MODULE cell
+  PERS tooldata gun:=[TRUE,[{pose(TOOL)}],[1,[0,0,50],[1,0,0,0],0,0,0]];
+  PERS wobjdata plate:=[FALSE,TRUE,"",[{pose(BASE)}],[[0,0,0],[1,0,0,0]]];
+  CONST speeddata slow:=[{SPEED * 1000},{np.degrees(TURN_SPEED)},5000,1000];
+  PROC main()
+    ConfL \\Off;
+    FOR i FROM 1 TO 2 DO
+      {joint(HOME)}
+      {joint(TURNED)}
+{inside}
+    ENDFOR
+    WaitTime {PAUSE};
+    {line(down)}
+    {joint(TURNED)}
+    {line(away)}
+    {joint(TURNED)}
+    {joint(BEYOND)}
+  ENDPROC
+ENDMODULE
+""",
+    )
+
+
+TEXTS = {"krl": krl, "urscript": urscript, "rpl": rpl, "xpl": xpl, "rapid": rapid}
+
+
+def saved(folder, suffix, text):
+    path = folder / f"cell{suffix}"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def checks(tmp_path_factory):
+    """The cell's check in each language."""
+    folder = tmp_path_factory.mktemp("cell")
+    scene = load_scene("data/scenes/table_and_post.yaml")
+    found = {}
+    for language, text in TEXTS.items():
+        program = read_program(saved(folder, *text()))
+        assert program.language == language
+        found[language] = check_program(program, ARM, CheckOptions(start=HOME, scene=scene, frames={"gun": TOOL}))
+    return found
+
+
+def carried_out(check):
+    """The motions of the program's way, in their order."""
+    return [check.motions[i] for i in check.main if i in check.motions]
+
+
+@pytest.mark.long
+def test_the_motions_are_the_same(checks):
+    for (one, first), (other, second) in pairwise(checks.items()):
+        assert len(carried_out(first)) == 13
+        for a, b in zip(carried_out(first), carried_out(second), strict=True):
+            assert a.kind == b.kind, (one, other)
+            for mine, own in ((a.start, b.start), (a.end, b.end)):
+                assert (mine is None) == (own is None), (one, other)
+                if mine is not None and own is not None:
+                    np.testing.assert_allclose(mine, own, atol=1e-7, err_msg=f"{one} {other}")
+
+
+@pytest.mark.long
+def test_the_times_are_the_same(checks):
+    for (one, first), (other, second) in pairwise(checks.items()):
+        assert first.cycle.stopping_s == pytest.approx(second.cycle.stopping_s, abs=1e-6), (one, other)
+        for a, b in zip(carried_out(first), carried_out(second), strict=True):
+            assert (a.way is None) == (b.way is None)
+            if a.way is not None and b.way is not None:
+                assert a.way.law.duration == pytest.approx(b.way.law.duration, abs=1e-6), (one, other)
+
+
+@pytest.mark.long
+def test_the_findings_are_the_same(checks):
+    codes = {
+        language: [sorted({found.code for found in motion.findings}) for motion in carried_out(check)]
+        for language, check in checks.items()
+    }
+    for one, other in pairwise(codes):
+        assert codes[one] == codes[other], (one, other)
+    assert "motion_collides" in codes["rapid"][8]
+    assert "way_out_of_reach" in codes["rapid"][10]
+    assert "above_limit" in codes["rapid"][12]
+    assert not any("way_out_of_reach" in each or "motion_collides" in each for each in codes["rapid"][:8])
