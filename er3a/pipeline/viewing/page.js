@@ -372,6 +372,10 @@ function addContents() {
     summary.textContent = read < 0 || wide.matches ? WORDS.contents : `${WORDS.contents}: ${titles[read]}`;
     links.forEach((link, i) => (i === read ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current")));
   };
+  list.addEventListener("click", (event) => {
+    const folded = headings[links.indexOf(event.target)]?.closest("details.section");
+    if (folded) folded.open = true;
+  });
   wide.addEventListener("change", fit);
   for (const event of ["scroll", "resize"]) addEventListener(event, tell, { passive: true });
   fit();
@@ -509,7 +513,7 @@ explainTerms(JSON.parse(document.getElementById("terms").textContent));
 document.querySelectorAll(".scroll").forEach(fade);
 
 // A sheet of paper can't be unfolded.
-addEventListener("beforeprint", () => document.querySelectorAll(".provenance").forEach((details) => (details.open = true)));
+addEventListener("beforeprint", () => document.querySelectorAll(".provenance, details.section").forEach((details) => (details.open = true)));
 
 // On a phone each row of such a table is a card: its cells stand below one another, each after its column's name.
 function nameCells(table) {
