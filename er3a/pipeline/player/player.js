@@ -122,7 +122,7 @@ function tell() {
   clock.textContent = said.replace("{t}", fixed(t, digits)).replace("{end}", fixed(end(), digits));
   bar.setAttribute("aria-valuetext", clock.textContent);
   const near = motion.events.filter((event) => t >= event.t - 1e-9 && t <= event.until + 1e-9);
-  const text = near.map((event) => event.text).join("; ") || motion.text;
+  const text = near.map((event) => event.text).join(words.between) || motion.text;
   show(told, text);
   tellJoints();
   for (const plot of plots) plot(motion.name, t);

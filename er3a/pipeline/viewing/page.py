@@ -236,24 +236,31 @@ def render(
         "linked": linked,
         "grade": partial(word, "grade", GRADE_NAMES),
     }
-    html = environment.get_template(template.name).render(
-        style=(_HERE / "style.css").read_text(encoding="utf-8"),
-        script=(_HERE / "page.js").read_text(encoding="utf-8"),
-        script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
-        terms=glossary(),
-        verdict_words=VERDICT_WORDS,
-        pages=PAGES,
-        language=language.current(),
-        summary=summary,
-        head=head,
-        command=command,
-        provenance=head.provenance if head else provenance,
-        preview=_preview(output.with_suffix(".webp")),
-        versions=_versions(),
-        commit=_commit(),
-        **context,
+    html = closed_up(
+        environment.get_template(template.name).render(
+            style=(_HERE / "style.css").read_text(encoding="utf-8"),
+            script=(_HERE / "page.js").read_text(encoding="utf-8"),
+            script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
+            terms=glossary(),
+            verdict_words=VERDICT_WORDS,
+            pages=PAGES,
+            language=language.current(),
+            summary=summary,
+            head=head,
+            command=command,
+            provenance=head.provenance if head else provenance,
+            preview=_preview(output.with_suffix(".webp")),
+            versions=_versions(),
+            commit=_commit(),
+            **context,
+        )
     )
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+
+
+def closed_up(html: str) -> str:
+    """A page without the blanks that sentences of other languages have between them: none follow full-width marks."""
+    return re.sub(r"(?<=[，。；：！？、])(?:[ \n]+|&nbsp;)(?=[^\s])", "", html)
 
 
 def led(text: str) -> tuple[str, str]:
