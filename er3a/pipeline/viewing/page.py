@@ -62,6 +62,7 @@ SCRIPT_WORDS = {
     "previous": N_("Previous"),
     "next": N_("Next"),
     "all": N_("all at once"),
+    "colon": N_(": "),
 }
 
 
@@ -236,31 +237,37 @@ def render(
         "linked": linked,
         "grade": partial(word, "grade", GRADE_NAMES),
     }
-    html = closed_up(
-        environment.get_template(template.name).render(
-            style=(_HERE / "style.css").read_text(encoding="utf-8"),
-            script=(_HERE / "page.js").read_text(encoding="utf-8"),
-            script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
-            terms=glossary(),
-            verdict_words=VERDICT_WORDS,
-            pages=PAGES,
-            language=language.current(),
-            summary=summary,
-            head=head,
-            command=command,
-            provenance=head.provenance if head else provenance,
-            preview=_preview(output.with_suffix(".webp")),
-            versions=_versions(),
-            commit=_commit(),
-            **context,
-        )
+    html = environment.get_template(template.name).render(
+        style=(_HERE / "style.css").read_text(encoding="utf-8"),
+        script=(_HERE / "page.js").read_text(encoding="utf-8"),
+        script_words={key: tr(word) for key, word in SCRIPT_WORDS.items()},
+        terms=glossary(),
+        verdict_words=VERDICT_WORDS,
+        pages=PAGES,
+        language=language.current(),
+        summary=summary,
+        head=head,
+        command=command,
+        provenance=head.provenance if head else provenance,
+        preview=_preview(output.with_suffix(".webp")),
+        versions=_versions(),
+        commit=_commit(),
+        **context,
     )
+    html = closed_up(html) if language.current() == "zh" else html
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
 
 
+BLANKS = re.compile(
+    r"(?<=[，。；：！？、])(?:[ \n]+|&nbsp;)(?=[^\s])"  # behind full-width marks
+    r"|(?<=[\u4e00-\u9fff]) +(?=[\u4e00-\u9fff])"  # between two characters
+    r"|(?<=\d) +(?=°)"
+)
+
+
 def closed_up(html: str) -> str:
-    """A page without the blanks that sentences of other languages have between them: none follow full-width marks."""
-    return re.sub(r"(?<=[，。；：！？、])(?:[ \n]+|&nbsp;)(?=[^\s])", "", html)
+    """A page without the blanks that Chinese does not write."""
+    return BLANKS.sub("", html)
 
 
 def led(text: str) -> tuple[str, str]:
