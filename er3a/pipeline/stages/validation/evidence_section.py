@@ -169,7 +169,10 @@ def _other(evidence: TableEvidence) -> OtherSection | None:
     for joint in range(1, len(found.table.a) + 1):
         cells = []
         for kind in kinds:
-            each = by_name[f"{kind}{joint}"]
+            each = by_name.get(f"{kind}{joint}")
+            if each is None:  # a limit of a joint that turns on and on
+                cells.append(("–", False))
+                continue
             given = each.value or 0.0
             value = _limit(each) if kind in LIMITS else getattr(found.table, kind)[joint - 1] * IN_UNIT[kind]
             value = _roundest(value, each)
