@@ -140,7 +140,7 @@ def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str
             tr(item.says),
             _with_code(parts.get(f"stage_{item.code}") or tr(item.finds, **parts)),
             item.how,
-            tr(item.why, **parts) if item.why and status != "agrees" else "",
+            tr(item.why, **parts) if item.why and status != "agrees" and f"stage_{item.code}" not in parts else "",
             status,
             BADGES[status],
             _page_on(study.article, item.code) if study.article else "",
@@ -187,8 +187,10 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
     gone, meeting = numbers.changes_gone, numbers.changes_meeting
     parts |= {"changes_gone": len(gone), "changes_named": _named(gone), "changes_meeting": _named(meeting)}
     reach = numbers.reach
-    known, printed = (reach.known_mm, reach.printed_mm) if reach else (np.nan, np.nan)
-    parts |= {"reach_known_mm": known, "reach_printed_mm": printed}
+    if reach is None:
+        parts["stage_boundary"] = tr("No drawing of this arm was found, and this study knows no reach of it.")
+    else:
+        parts |= {"reach_known_mm": reach.known_mm, "reach_printed_mm": reach.printed_mm}
     parts |= {key: np.nan for key in ("holding_nm", "holding_loaded_nm") if parts[key] is None}
     parts |= {f"gain_{k}": value for k, value in enumerate(numbers.wrist_gain)}
     parts |= {f"figure_{name}": place for name, place in places.items()}
