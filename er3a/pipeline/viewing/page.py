@@ -87,7 +87,7 @@ class Numbering:
 
     def __call__(self, kind: str, name: str = "") -> Numbered:
         self._counts[kind] += 1
-        address = re.sub(r"[^\w-]+", "-", f"{kind}-{name or self._counts[kind]}")
+        address = re.sub(r"[^\w.-]+", "-", f"{kind}-{name or self._counts[kind]}")
         self._named[address] += 1
         again = self._named[address]
         return Numbered(address if again == 1 else f"{address}-{again}", tr(MARKS[kind], number=self._counts[kind]))
