@@ -54,7 +54,9 @@ def test_a_catalogue_that_is_none_is_refused_with_its_name(tmp_path):
         translations_in([tmp_path / "positions.csv"], "zh")
 
 
-@pytest.mark.parametrize("folder", ["robots", "programs", "vision", *(f"manual_refs/{name}" for name in SETS)])
+@pytest.mark.parametrize(
+    "folder", ["robots", "scenes", "programs", "vision", *(f"manual_refs/{name}" for name in SETS)]
+)
 def test_each_entry_of_a_shipped_catalogue_translates_a_text_of_its_folder(folder):
     catalogue = translations_in([ROOT / "data" / folder / "none.csv"], "zh")
     assert catalogue

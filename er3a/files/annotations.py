@@ -47,13 +47,17 @@ def translations_in(files: Iterable[Path], language: str) -> dict[str, str]:
     """
     files = list(files)
     found: dict[str, str] = {}
-    for catalogue in sorted({file.parent / f"{language}.po" for file in files}):
-        if catalogue.is_file():
-            found |= _catalogue(catalogue)
+    for catalogue in catalogues_beside(files, language):
+        found |= _catalogue(catalogue)
     for file in files:
         if file.suffix in (".yaml", ".yml"):
             _collect(read_yaml(file), language, found)
     return found
+
+
+def catalogues_beside(files: Iterable[Path], language: str) -> list[Path]:
+    """The catalogues of people's texts in the folders of files, in a language."""
+    return sorted(place for folder in {file.parent for file in files} if (place := folder / f"{language}.po").is_file())
 
 
 def _catalogue(file: Path) -> dict[str, str]:

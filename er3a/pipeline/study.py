@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from pydantic import Field, PrivateAttr, create_model, model_validator
 
 from er3a.errors import InputError
-from er3a.files.annotations import translations_in
+from er3a.files.annotations import catalogues_beside, translations_in
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.yaml_file import StrictModel, load, read_yaml
@@ -264,8 +264,14 @@ class StudyBase(StrictModel):
         """People's titles and notes in the language of the pages, by what they translate; none in English."""
         if self.report.language == "en":
             return {}
-        files = {file for name in self.robots for stage in self.stages(name) for file in self.inputs(name, stage)}
-        return translations_in(sorted(files), self.report.language)
+        return translations_in(sorted(self._input_files()), self.report.language)
+
+    def own_catalogues(self, language: LanguageCode) -> list[Path]:
+        """The catalogues of people's texts, beside the input files, that pages in a language show."""
+        return catalogues_beside(self._input_files(), language)
+
+    def _input_files(self) -> set[Path]:
+        return {file for name in self.robots for stage in self.stages(name) for file in self.inputs(name, stage)}
 
     def scenes(self, name: str, stage: str) -> list[Path]:
         """The file of :meth:`scene`, and those of convex pieces that it names; empty in open space."""

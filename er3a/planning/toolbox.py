@@ -13,6 +13,7 @@ from er3a.errors import Er3aError, ShapeError
 from er3a.geometry.transforms import as_floats, check_poses, rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.planning.moves import JointMove, line
+from er3a.robots.usable import warn_of_degrees
 
 
 def rpy(T: Reals) -> Reals:
@@ -42,7 +43,7 @@ def jtraj(
 
     Parameters
     ----------
-    q_start, q_end : (n,), rad or m
+    q_start, q_end : (n,), rad or m; values that can only be degrees are warned of
     t : (N,), s, rising: the move begins at the first and ends at the last
     velocities : (n,) each, rad/s or m/s, at start and end; None for rest
 
@@ -58,6 +59,8 @@ def jtraj(
     q_start, q_end, t = as_floats(q_start, "q_start"), as_floats(q_end, "q_end"), _times(t)
     if q_start.shape != q_end.shape or q_start.ndim != 1:
         raise ShapeError("q_end", q_end.shape, f"{q_start.shape}, as q_start")
+    warn_of_degrees(q_start, "q_start", stacklevel=3)
+    warn_of_degrees(q_end, "q_end", stacklevel=3)
     ends = (0.0, 0.0) if velocities is None else (velocities[0], velocities[1])
     return JointMove(q_start, q_end, float(t[-1] - t[0]), ends).joints(t - t[0])
 

@@ -1,8 +1,9 @@
 """What of a void is left if one entry of the table is another: what else than a limit may make it.
 
-An offset that is off by a right angle, a direction turned round and a length with the other sign are the commonest
-slips of a table. Each moves the reach of the arm as a whole, so it is not the void's own cells that are looked at but
-all that the changed arm encloses. Which of the changes is right, a void can't tell: references do.
+An offset that is off by a right angle, a direction turned round, and a length with the other sign or of half or twice
+its value (a diameter for a radius) are the commonest slips of a table. Each moves the reach of the arm as a whole, so
+it is not the void's own cells that are looked at but all that the changed arm encloses. Which of the changes is right,
+a void can't tell: references do.
 """
 
 from __future__ import annotations
@@ -20,8 +21,16 @@ from er3a.workspace.section_arm import FULL_TURN
 
 CELLS, POINTS = 2000, 100  # of the proof of each changed arm, and of the estimate beside it, which is not looked at
 TURNS_DEG = (-90.0, 90.0, 180.0)
+FACTORS = (-1.0, 0.5, 2.0)
 INNER = (1, 2, 3, 4)  # joints 2 to 5; turning joint 1 or 6 moves no section through the reach
-SHAPING = {"a": (0, 1, 2), "d": (3, 5)}  # lengths of an arm with a spherical wrist that shape its section
+# Lengths that shape the section of an arm with a spherical wrist, by their places.
+SHAPING: dict[Literal["a", "d"], tuple[int, ...]] = {"a": (0, 1, 2), "d": (3, 5)}
+
+
+Column = Literal["offset", "direction", "a", "d", "lower", "upper"]
+Unit = Literal["deg", "mm", ""]
+UNITS: dict[Column, Unit] = {"offset": "deg", "direction": "", "a": "mm", "d": "mm", "lower": "deg", "upper": "deg"}
+IN_SI: dict[Unit, float] = {"deg": np.pi / 180, "mm": 1e-3, "": 1.0}
 
 
 @dataclass(frozen=True)
@@ -30,16 +39,23 @@ class SingleChange:
 
     Attributes
     ----------
-    entry : "offset2", "direction3", "a2", "d4", or "lower2", "upper2" for a limit
+    column : of the table; "lower" and "upper" are limits
+    joint : 1 to 6
     given, tried : in ``unit``
     left_litres : bounds of the changed arm's enclosed voids together, as far as a coarse proof finds them
     """
 
-    entry: str
-    unit: Literal["deg", "mm", ""]
+    column: Column
+    joint: int
+    unit: Unit
     given: float
     tried: float
     left_litres: tuple[float, float]
+
+    @property
+    def entry(self) -> str:
+        """Column and joint, as "offset2"."""
+        return f"{self.column}{self.joint}"
 
 
 def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleChange, ...]:
@@ -50,14 +66,21 @@ def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleCha
     cause : what the limits say of the void; the limits that it names are among the changes
     """
     found = []
-    for entry, unit, given, tried, changed in (*_of_table(robot), *_of_limits(robot, cause)):
-        enclosed, _ = cavities(prove_robot(changed, CELLS, POINTS, seed).section)
+    for column, joint, given, tried in (*_of_table(robot), *_of_limits(robot, cause)):
+        enclosed, _ = cavities(prove_robot(with_entry(robot, column, joint, tried), CELLS, POINTS, seed).section)
         left = tuple(round(1000 * sum(getattr(void, bound) for void in enclosed), 3) for bound in ("lower", "upper"))
-        found.append(SingleChange(entry, unit, given, tried, (left[0], left[1])))
+        found.append(SingleChange(column, joint, UNITS[column], given, tried, (left[0], left[1])))
     return tuple(sorted(found, key=lambda change: (change.left_litres[1], change.entry, change.tried)))
 
 
-Candidate = tuple[str, Literal["deg", "mm", ""], float, float, Robot]
+def with_entry(robot: Robot, column: Column, joint: int, value: float) -> Robot:
+    """The robot with one entry changed; ``joint`` from 1, ``value`` in the column's unit."""
+    values = getattr(robot, column).copy()
+    values[joint - 1] = value * IN_SI[UNITS[column]]
+    return robot.replace(**{column: values})
+
+
+Candidate = tuple[Column, int, float, float]  # column, joint from 1, given and tried in the column's unit
 
 
 def _of_table(robot: Robot) -> Iterator[Candidate]:
@@ -66,26 +89,21 @@ def _of_table(robot: Robot) -> Iterator[Candidate]:
         if robot.upper[j] - robot.lower[j] < FULL_TURN:
             given = float(np.degrees(robot.offset[j]))
             for turn in TURNS_DEG:
-                changed = robot.replace(offset=_with(robot.offset, j, np.radians(given + turn)))
-                yield f"offset{j + 1}", "deg", round(given, 9), round(_half_turn(given + turn), 9), changed
+                yield "offset", j + 1, round(given, 9), round(_half_turn(given + turn), 9)
         if abs(robot.lower[j] + robot.upper[j]) > 1e-9:
-            changed = robot.replace(direction=_with(robot.direction, j, -robot.direction[j]))
-            yield f"direction{j + 1}", "", float(robot.direction[j]), -float(robot.direction[j]), changed
+            yield "direction", j + 1, float(robot.direction[j]), -float(robot.direction[j])
     for column, rows in SHAPING.items():
-        values = getattr(robot, column)
         for k in rows:
-            if values[k]:
-                mm = float(round(1000 * values[k], 6))
-                yield f"{column}{k + 1}", "mm", mm, -mm, robot.replace(**{column: _with(values, k, -values[k])})
+            mm = float(round(1000 * getattr(robot, column)[k], 6))
+            for factor in FACTORS if mm else ():
+                yield column, k + 1, mm, round(factor * mm, 6)
 
 
 def _of_limits(robot: Robot, cause: VoidCause) -> Iterator[Candidate]:
     """The limits that a void's cause names, widened as it says; sums of joints are left out."""
     for limit in _named(cause):
         if limit.factors == (1.0,) and limit.unit == "deg":
-            j = limit.joints[0] - 1
-            changed = robot.replace(**{limit.side: _with(getattr(robot, limit.side), j, np.radians(limit.extended))})
-            yield f"{limit.side}{j + 1}", "deg", round(limit.limit, 9), round(limit.extended, 9), changed
+            yield limit.side, limit.joints[0], round(limit.limit, 9), round(limit.extended, 9)
 
 
 def _named(cause: VoidCause) -> Sequence[Relaxed]:
@@ -94,12 +112,6 @@ def _named(cause: VoidCause) -> Sequence[Relaxed]:
     if isinstance(cause, SeveralLimits | Geometry) and cause.most is not None:
         return (cause.most,)
     return ()
-
-
-def _with(values: np.ndarray, place: int, value: float) -> np.ndarray:
-    changed = values.copy()
-    changed[place] = value
-    return changed
 
 
 def _half_turn(degrees: float) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from roboticstoolbox import jtraj as toolbox_jtraj
@@ -25,6 +27,14 @@ def test_jtraj_is_the_toolbox_s_with_a_time_vector():
     theirs = toolbox_jtraj(np.zeros(6), GOAL, T)
     for own, other in ((q, theirs.q), (qd, theirs.qd), (qdd, theirs.qdd)):
         assert np.allclose(own, other, atol=1e-9)
+
+
+def test_degrees_are_warned_of_where_no_robot_is_given():
+    with pytest.warns(er3a.InputWarning, match=r"np\.radians\(q_end\)"):
+        er3a.jtraj(np.zeros(6), np.degrees(GOAL), T)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        er3a.jtraj(np.zeros(6), 4 * np.pi * np.ones(6), T)  # two turns
 
 
 def test_jtraj_counts_from_the_first_time():

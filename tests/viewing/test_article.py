@@ -14,7 +14,8 @@ import pytest
 import yaml
 from roboticstoolbox import DHRobot, RevoluteDH, RevoluteMDH
 
-from er3a.pipeline.article.article_numbers import EXAMPLE, agreements, article_numbers
+from er3a.files.robot_library import load_robot
+from er3a.pipeline.article.article_numbers import EXAMPLE, ReachCheck, agreements, article_numbers
 from er3a.pipeline.article.article_page import write_article
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.article import ITEMS, SECTIONS
@@ -105,6 +106,31 @@ def test_one_entry_explains_the_article_s_text(numbers):
 def test_joint_5_near_0_needs_speed_as_one_over_its_sine(numbers):
     assert numbers.wrist_gain == pytest.approx(1 / np.sin(np.radians([5, 1, 0.1])), rel=1e-6)
     assert numbers.wrist_turn_deg == pytest.approx(1)
+
+
+def test_no_slider_alone_shows_the_wrist_singularity(numbers):
+    assert numbers.wrist_against_deg == pytest.approx(0, abs=1e-9)
+
+
+def test_the_reach_known_of_the_real_arm_is_not_the_printed_table_s(numbers, folder):
+    assert numbers.reach is None  # this study's tables are checked against the article's own sentences alone
+    known = replace(numbers, reach=ReachCheck(627.1, 1301.6, False))
+    assert agreements(known)["boundary"] == "differs"
+
+
+def test_6_kg_are_heavy_for_joint_2(numbers):
+    forearm_and_wrist_m = 0.27 + np.hypot(0.07, 0.299) + 0.0785
+    added = numbers.holding_loaded_nm - numbers.holding_nm
+    assert 0.5 * 6 * 9.81 * forearm_and_wrist_m < added < 6 * 9.81 * forearm_and_wrist_m
+    assert load_robot("er3_600").masses.wrist.payload == 3  # as the page says of the successor
+
+
+def test_a_hole_is_blamed_as_in_the_article_only_on_limits_and_directions(numbers):
+    meeting = {change.entry for change in numbers.changes_meeting}
+    assert meeting == {"offset2"}
+    assert agreements(numbers)["hole"] == "in_part"
+    limit = replace(numbers.changes_meeting[0], column="upper")
+    assert agreements(replace(numbers, changes_meeting=(limit,)))["hole"] == "agrees"
 
 
 def test_agreement_follows_the_numbers(numbers):

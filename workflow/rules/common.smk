@@ -33,7 +33,14 @@ ROBOTS = STUDY.names
 # Pages depend on the words of their language, results and recordings don't.
 LANGUAGE = STUDY.report.language
 language.use(LANGUAGE, STUDY.own_titles())
-CATALOGUE = [] if LANGUAGE == "en" else os.path.relpath(catalogue_file(LANGUAGE))
+
+
+def catalogues(code):
+    """The catalogues that pages in a language show: of our words, and of people's texts beside their files."""
+    return [os.path.relpath(file) for file in (catalogue_file(code), *STUDY.own_catalogues(code))]
+
+
+CATALOGUES = [] if LANGUAGE == "en" else catalogues(LANGUAGE)
 
 
 # Snakemake's own report: its text, and what it calls pages and robots. The text of its first page has no params.

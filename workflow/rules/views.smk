@@ -22,7 +22,7 @@ rule report:
     input:
         viewed,
         rests_on,
-        CATALOGUE,
+        CATALOGUES,
         picture,
     output:
         report(
@@ -50,7 +50,7 @@ rule teach:
     input:
         inputs("teach"),
         "results/{robot}/validation/summary.json",
-        CATALOGUE,
+        CATALOGUES,
     output:
         report(
             "reports/{robot}/teach.html",
@@ -76,7 +76,7 @@ rule teach:
 rule index:
     input:
         shown_in_index,
-        CATALOGUE,
+        CATALOGUES,
     output:
         report(
             "reports/index.html",
@@ -117,7 +117,7 @@ if STUDY.article:
                 for path in results_of(stage)
             ],
             [os.path.relpath(STUDY.robot_file(robot)) for robot in STUDY.article.names],
-            os.path.relpath(catalogue_file("zh")),
+            catalogues("zh"),
         output:
             "results/article.json",
             report(

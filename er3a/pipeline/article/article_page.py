@@ -140,7 +140,7 @@ def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str
             tr(item.says),
             _with_code(parts.get(f"stage_{item.code}") or tr(item.finds, **parts)),
             item.how,
-            tr(item.why, **parts) if item.why and status != "agrees" else "",
+            tr(item.why, **parts) if item.why and status != "agrees" and f"stage_{item.code}" not in parts else "",
             status,
             BADGES[status],
             _page_on(study.article, item.code) if study.article else "",
@@ -186,6 +186,12 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
         parts |= {f"{letter}_{key}": value for key, value in _flat(table).items()}
     gone, meeting = numbers.changes_gone, numbers.changes_meeting
     parts |= {"changes_gone": len(gone), "changes_named": _named(gone), "changes_meeting": _named(meeting)}
+    reach = numbers.reach
+    if reach is None:
+        parts["stage_boundary"] = tr("No drawing of this arm was found, and this study knows no reach of it.")
+    else:
+        parts |= {"reach_known_mm": reach.known_mm, "reach_printed_mm": reach.printed_mm}
+    parts |= {key: np.nan for key in ("holding_nm", "holding_loaded_nm") if parts[key] is None}
     parts |= {f"gain_{k}": value for k, value in enumerate(numbers.wrist_gain)}
     parts |= {f"figure_{name}": place for name, place in places.items()}
     for stage in STATUS_OF_STAGES:
@@ -211,7 +217,7 @@ def _flat(table: TableNumbers) -> dict[str, Any]:
 
 
 def _crossings(table: TableNumbers) -> str:
-    return ", ".join(fixed(t, 4) for t in table.line_crossings_s) or "–"
+    return joined((fixed(t, 4) for t in table.line_crossings_s), ", ") or "–"
 
 
 def _compared(numbers: ArticleNumbers) -> list[list[str]]:
@@ -224,7 +230,7 @@ def _compared(numbers: ArticleNumbers) -> list[list[str]]:
     return [
         row(
             tr("Statements of the article that hold"),
-            *("–" if t.statements is None else f"{t.statements_met} / {t.statements}" for t in tables),
+            *(tr("not examined") if t.statements is None else f"{t.statements_met} / {t.statements}" for t in tables),
         ),
         row(
             tr("Independent checks against CAD models and a URDF that pass"),
@@ -246,9 +252,9 @@ def _compared(numbers: ArticleNumbers) -> list[list[str]]:
         row(tr("Its centre: z (mm)"), *("–" if t.void_mm is None else fixed(t.void_mm[2], 0) for t in tables)),
         row(
             tr("The article's straight line"),
-            *(outcome_word(t.line) if t.line else "–" for t in tables),  # type: ignore[arg-type]
+            *(outcome_word(t.line) if t.line else tr("not examined") for t in tables),  # type: ignore[arg-type]
         ),
-        row(tr("It is singular at t (s)"), *(_crossings(t) for t in tables)),
+        row(tr("It is singular at t (s)"), *(_crossings(t) if t.line else tr("not examined") for t in tables)),
     ]
 
 

@@ -36,8 +36,15 @@ ITEMS = (
         "",
         N_("Payload"),
         N_("The arm is introduced as a desktop arm for 6 kg."),
-        N_("No document that er3a has states a payload of the ER3A-C60; nothing on this page rests on 6 kg."),
-        N_("No source was found for it."),
+        N_(
+            "No document that er3a has states a payload of the ER3A-C60; nothing else on this page rests on 6 kg. With "
+            "6 kg at its flange the real arm's joint 2 would have to hold up to {holding_loaded_nm:.0f} N m, without "
+            "load {holding_nm:.0f} N m."
+        ),
+        N_(
+            "No source was found for it, and none for what the drives can hold. The manual of the arm's successor, the "
+            "ER3-600, says 3 kg."
+        ),
     ),
     Item(
         "toolbox",
@@ -45,8 +52,11 @@ ITEMS = (
         "",
         N_("Robotics Toolbox"),
         N_("MATLAB's Robotics Toolbox is used, version 10 or 11 recommended."),
-        N_("The Toolbox was not run here. er3a does each step by itself."),
-        N_("It needs MATLAB."),
+        N_("The Toolbox was not run here: er3a does each step by itself, and every other item says with what."),
+        N_(
+            "It needs MATLAB. er3a's tests hold poses, the modified reading and the joint move against its Python "
+            "port, by the same author."
+        ),
     ),
     Item(
         "definitions",
@@ -164,10 +174,11 @@ ITEMS = (
         N_("Joint 5 near 0"),
         N_(
             "With axes 4 and 6 nearly in line, a small move of joint 4 or 6 is said to change the orientation "
-            "violently."
+            "violently, or a slider to move the tool hardly at all (again in 6.2)."
         ),
         N_(
-            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere. What grows is "
+            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere; against one degree of "
+            "joint 6 at joint 5 = 0 it turns by {wrist_against_deg:.3f}°, so no slider alone shows it. What grows is "
             "the joint speed that a turn of the tool needs: {gain_0:.1f}, {gain_1:.1f} and {gain_2:.0f} times the"
             " tool's own at joint 5 = 5°, 1° and 0.1° (figure {figure_wrist})."
         ),
@@ -412,10 +423,11 @@ ITEMS = (
         N_("Workspace drawing"),
         N_("Compare the cloud with the manual's drawing."),
         N_(
-            "No drawing of this arm was found. For the ER3-600, whose manual has one, the default study makes the"
-            " comparison."
+            "No drawing of this arm was found. A number of it is known from CAD models and a URDF: the wrist centre "
+            "gets {reach_known_mm:.1f} mm from axis 1, as printed {reach_printed_mm:.1f} mm. For the ER3-600, whose "
+            "manual has a drawing, the default study compares all of it."
         ),
-        N_("There is nothing to compare with."),
+        N_("The reach of the printed table is not that of the arm that it is said to be."),
     ),
     Item(
         "round_trip",

@@ -13,7 +13,7 @@ from er3a.collision.pairs import (
     ShapesAssumed,
     link_label,
 )
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
 
@@ -175,7 +175,7 @@ def body_word(name: str) -> str:
     if name == link_label(BASE):
         return sentence("link#base")
     number = name.removeprefix("link_")
-    return sentence("link#number", number=number) if number != name else name
+    return sentence("link#number", number=number) if number != name else own_title(name)
 
 
 def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str) -> str:
@@ -191,7 +191,7 @@ def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witne
                 "At least {least:.1f} mm apart in every pose; proven with {boxes} boxes.", least=least_mm, boxes=boxes
             )
         case "allowed" | "watched":
-            return tr("Decided in the robot or scene file: {reason}", reason=reason)
+            return tr("Decided in the robot or scene file: {reason}", reason=own_title(reason))
         case "undecided":
             return tr("Neither proven apart nor found to collide, in {boxes} boxes; checked.", boxes=boxes)
         case "overlaps":

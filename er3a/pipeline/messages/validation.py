@@ -13,6 +13,7 @@ from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_W
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
+    Claims,
     Confirmed,
     Contradicted,
     Contradiction,
@@ -71,7 +72,8 @@ TEXTS = texts(
             "count", "{count} label is missed, by up to {worst} mm.", "{count} labels are missed, by up to {worst} mm."
         ),
         "graded": "{own_source} ({grade})",
-        "claims": Plural(
+        "claims#all": "All {claims} claims in {reference_set} hold.",
+        "claims#some": Plural(
             "failed",
             "Of the {claims} claims in {reference_set}, {count} doesn't hold.",
             "Of the {claims} claims in {reference_set}, {count} don't hold.",
@@ -178,6 +180,11 @@ def counted_checks(counts: CheckCounts) -> str:
         same_passed=same.passed,
         same_total=same.total,
     )
+
+
+@say.register
+def _(found: Claims) -> str:
+    return say_as(found, "some" if found.failed else "all")
 
 
 def _of_claims(found: JudgedTable) -> list[str]:

@@ -167,7 +167,7 @@ def _changes(found: VoidUnexpected) -> str:
     least = [change for change in found.single_changes if change.left_litres[1] < 0.1 * found.litres]
     if not least:
         return ""
-    shown = sorted(least, key=lambda change: CHANGED_FIRST.index(change.entry.rstrip("123456")))
+    shown = sorted(least, key=lambda change: CHANGED_FIRST.index(change.column))
     named = joined([*map(change_text, shown[:NAMED_CHANGES]), *(["…"] if len(shown) > NAMED_CHANGES else [])], ", ")
     return sentence("void_changes", count=len(least), tried=len(found.single_changes), named=named)
 

@@ -130,7 +130,7 @@ function tell() {
   const [said, digits] = motion.rate ? [words.points, 0] : [words.clock, 3];
   clock.textContent = said.replace("{t}", fixed(t, digits)).replace("{end}", fixed(end(), digits));
   bar.setAttribute("aria-valuetext", clock.textContent);
-  const text = motion.events.filter(isNow).map((event) => event.text).join("; ") || motion.text;
+  const text = motion.events.filter(isNow).map((event) => event.text).join(words.between) || motion.text;
   show(told, text);
   tellJoints();
   for (const plot of plots) plot(motion.name, t);

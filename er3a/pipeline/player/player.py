@@ -125,7 +125,7 @@ def player(
     shown = [motion for motion in motions if len(motion.t) > 1]
     if not shown:
         return Markup()
-    words = {key: tr(word) for key, word in WORDS.items()}
+    words = {key: tr(word) for key, word in WORDS.items()} | {"between": tr("; ")}
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
     return Markup(
         environment.get_template("player.html.j2").render(

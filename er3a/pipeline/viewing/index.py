@@ -102,17 +102,17 @@ def _inputs(study: Study, results: Path) -> tuple[Input, ...]:
 
 def parameters(robot: Robot) -> dict[tuple[str, str, str], float | str | None]:
     """Values of a robot's table by (group, name, unit); None where unknown."""
-    of_joints = ["mm" if slides else "deg" for slides in robot.slides]
+    of_joints = ["mm" if slides else tr("deg") for slides in robot.slides]
     own = shown(robot, np.stack([robot.lower, robot.upper, robot.speed]))
     columns = (
         (tr("D-H table"), "a", ["mm"] * robot.rows, robot.a * 1000),
-        (tr("D-H table"), "α", ["deg"] * robot.rows, np.degrees(robot.alpha)),
+        (tr("D-H table"), "α", [tr("deg")] * robot.rows, np.degrees(robot.alpha)),
         (tr("D-H table"), "d", ["mm"] * robot.rows, robot.d * 1000),
-        (tr("zero"), tr("offset"), ["deg"] * robot.rows, np.degrees(robot.offset)),
+        (tr("zero"), tr("offset"), [tr("deg")] * robot.rows, np.degrees(robot.offset)),
         (tr("zero"), tr("direction"), [""] * robot.rows, [_sense(value) for value in robot.direction.tolist()]),
         (tr("limits"), tr("lower limit"), of_joints, own[0]),
         (tr("limits"), tr("upper limit"), of_joints, own[1]),
-        (tr("speeds"), tr("greatest speed"), [f"{unit}/s" for unit in of_joints], own[2]),
+        (tr("speeds"), tr("greatest speed"), ["mm/s" if slides else tr("deg/s") for slides in robot.slides], own[2]),
     )
     found: dict[tuple[str, str, str], float | str | None] = {
         (tr("D-H table"), tr("convention"), ""): tr(CONVENTIONS[robot.convention])

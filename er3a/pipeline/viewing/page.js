@@ -204,13 +204,13 @@ class Answers {
       const [along0, across0] = bars[0][4] ? [y, named(x, (bars[0][0] + bars[0][1]) / 2)] : [x, named(y, (bars[0][0] + bars[0][1]) / 2)];
       const marks = this.near(axes, u, v, w, h);
       return [across0, ...bars.map(([, , from, to, , title, colour]) => ({
-        text: `${title || along0.name}: ${from === 0 ? "" : `${reading(along0, from)} … `}${reading(along0, to)}`, colour,
-      })), ...marks.map(({ title, colour, point }) => ({ text: `${title || "●"}: ${reading(along0, bars[0][4] ? up(point[1]) : across(point[0]))}`, colour }))];
+        text: `${title || along0.name}${WORDS.colon}${from === 0 ? "" : `${reading(along0, from)} … `}${reading(along0, to)}`, colour,
+      })), ...marks.map(({ title, colour, point }) => ({ text: `${title || "●"}${WORDS.colon}${reading(along0, bars[0][4] ? up(point[1]) : across(point[0]))}`, colour }))];
     }
     const over = axes.drawn.filter((curve) => curve.over).map((curve) => ({ ...curve, height: heightAt(curve.runs, u) }));
     const read = over.filter(({ height }) => height >= box[1] - 1e-3 && height <= box[3] + 1e-3);
     if (read.length) {
-      return [named(x, across(u)), ...read.map(({ title, colour, height }) => ({ text: `${title || y.name}: ${reading(y, up(height))}`, colour }))];
+      return [named(x, across(u)), ...read.map(({ title, colour, height }) => ({ text: `${title || y.name}${WORDS.colon}${reading(y, up(height))}`, colour }))];
     }
     const [found] = this.near(axes, u, v, w, h);
     const [place, title] = found ? [found.point, found.title] : [[u, v], ""];
@@ -255,7 +255,7 @@ class Answers {
     const value = steps
       ? String(Math.round(along(scale, (Math.floor(best.part * steps) + 0.5) / steps)))
       : `≈ ${reading(scale, along(scale, best.part), 2)}`;
-    return { text: `${scale.name}: ${value}`, colour: `rgb(${own[0]} ${own[1]} ${own[2]})` };
+    return { text: `${scale.name}${WORDS.colon}${value}`, colour: `rgb(${own[0]} ${own[1]} ${own[2]})` };
   }
 }
 
@@ -370,9 +370,13 @@ function addContents() {
   const fit = () => (details.open = wide.matches);
   const tell = () => {
     const read = headings.findLastIndex((heading) => heading.checkVisibility() && heading.getBoundingClientRect().top < 120);
-    summary.textContent = read < 0 || wide.matches ? WORDS.contents : `${WORDS.contents}: ${titles[read]}`;
+    summary.textContent = read < 0 || wide.matches ? WORDS.contents : WORDS.contents + WORDS.colon + titles[read];
     links.forEach((link, i) => (i === read ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current")));
   };
+  list.addEventListener("click", (event) => {
+    const folded = headings[links.indexOf(event.target)]?.closest("details.section");
+    if (folded) folded.open = true;
+  });
   wide.addEventListener("change", fit);
   for (const event of ["scroll", "resize"]) addEventListener(event, tell, { passive: true });
   fit();
@@ -510,7 +514,7 @@ explainTerms(JSON.parse(document.getElementById("terms").textContent));
 document.querySelectorAll(".scroll").forEach(fade);
 
 // A sheet of paper can't be unfolded.
-addEventListener("beforeprint", () => document.querySelectorAll(".provenance").forEach((details) => (details.open = true)));
+addEventListener("beforeprint", () => document.querySelectorAll(".provenance, details.section").forEach((details) => (details.open = true)));
 
 // On a phone each row of such a table is a card: its cells stand below one another, each after its column's name.
 function nameCells(table) {

@@ -9,15 +9,16 @@ import platform
 import re
 import shlex
 import subprocess
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -62,6 +63,7 @@ SCRIPT_WORDS = {
     "previous": N_("Previous"),
     "next": N_("Next"),
     "all": N_("all at once"),
+    "colon": N_(": "),
 }
 
 
@@ -77,15 +79,19 @@ class Numbered:
 
 
 class Numbering:
-    """Counts the figures and tables of a page in its order; those with a name keep their address when others come."""
+    """Counts the figures and tables of a page in its order; their addresses are of their names, so that they stay when
+    others come. A name that is taken is counted; without one the number is the address."""
 
     def __init__(self) -> None:
         self._counts = dict.fromkeys(MARKS, 0)
+        self._named: Counter[str] = Counter()
 
     def __call__(self, kind: str, name: str = "") -> Numbered:
         self._counts[kind] += 1
-        number = self._counts[kind]
-        return Numbered(f"{kind}-{name or number}", tr(MARKS[kind], number=number))
+        address = re.sub(r"[^\w.-]+", "-", f"{kind}-{name or self._counts[kind]}")
+        self._named[address] += 1
+        again = self._named[address]
+        return Numbered(address if again == 1 else f"{address}-{again}", tr(MARKS[kind], number=self._counts[kind]))
 
 
 @dataclass(frozen=True)
@@ -158,6 +164,7 @@ class Head:
     ``finding`` is what the sentence says; ``caveats`` by the stage that it rests on: what to know first;
     ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to. ``not_examined``: what
     the verdict leaves out, and of which. ``numerics``: figures that speak of the computation, not of the arm.
+    ``links``: addresses that words of the text lead to.
     """
 
     robot: str
@@ -171,6 +178,7 @@ class Head:
     finding: Any
     not_examined: tuple[tuple[str, str], ...] = ()
     numerics: tuple[ShownFigure, ...] = ()
+    links: Mapping[str, str] = field(default_factory=dict)
 
 
 def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
@@ -250,6 +258,7 @@ def render(
         "own": language.own_title,
         "sentence": whole_sentence,
         "led": led,
+        "linked": linked,
         "grade": partial(word, "grade", GRADE_NAMES),
     }
     html = environment.get_template(template.name).render(
@@ -269,7 +278,20 @@ def render(
         commit=_commit(),
         **context,
     )
+    html = closed_up(html) if language.current() == "zh" else html
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+
+
+BLANKS = re.compile(
+    r"(?<=[，。；：！？、])(?:[ \n]+|&nbsp;)(?=[^\s])"  # behind full-width marks
+    r"|(?<=[\u4e00-\u9fff]) +(?=[\u4e00-\u9fff])"  # between two characters
+    r"|(?<=\d) +(?=°)"
+)
+
+
+def closed_up(html: str) -> str:
+    """A page without the blanks that Chinese does not write."""
+    return BLANKS.sub("", html)
 
 
 def led(text: str) -> tuple[str, str]:
@@ -278,6 +300,15 @@ def led(text: str) -> tuple[str, str]:
     if len(text) <= WHOLE or not ends:
         return text, ""
     return text[: ends[-1]], text[ends[-1] :].strip()
+
+
+def linked(text: str, links: Mapping[str, str]) -> Markup:
+    """A text in which the first of each of some words leads to an address."""
+    html = escape(text)
+    for name, address in links.items():
+        link = Markup('<a href="{}">{}</a>').format(address, name)
+        html = Markup(re.sub(rf"(?<![\w-]){re.escape(str(escape(name)))}(?![\w-])", lambda _: str(link), html, count=1))  # noqa: B023
+    return html
 
 
 def whole_sentence(finding: str) -> str:

@@ -145,7 +145,7 @@ def _calibration_story(calibration: SetCalibration, corrections: Corrections) ->
         more=typographic(say(found.more)) if found and found.more else "",
         picture=Picture(corrections_figure(own), alt, text) if len(own) else None,
         rows=[
-            [entry, fixed(nominal, 3), fixed(correction, 4), fixed(half_width, 4), unit]
+            [entry, fixed(nominal, 3), fixed(correction, 4), fixed(half_width, 4), tr(unit)]
             for entry, nominal, correction, half_width, unit in zip(
                 own.entry, own.nominal, own.correction, own.half_width, own.unit
             )
@@ -183,7 +183,7 @@ def corrections_figure(rows: Corrections) -> Figure:
         axes.errorbar(at, own.correction, own.half_width, fmt="o", color=MODEL, capsize=4, elinewidth=1.4)
         axes.set_xticks(at, own.entry, rotation=45 if len(own) > 8 else 0)
         axes.set_xlim(-0.6, len(own) - 0.4)
-        axes.set_ylabel(tr("correction ({unit})", unit=own.unit[0]))
+        axes.set_ylabel(tr("correction ({unit})", unit=tr(own.unit[0])))
         axes.grid(axis="x", visible=False)
     return figure
 
@@ -216,7 +216,7 @@ def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
             more=len(alike),
         )
     numbers = [fixed(value, 1) for value in (hypothesis.residual_before, hypothesis.residual_after)]
-    return [typographic(words), *numbers, hypothesis.unit, fixed(hypothesis.score, 1)]
+    return [typographic(words), *numbers, tr(hypothesis.unit), fixed(hypothesis.score, 1)]
 
 
 def corrected_robot(robot: Robot, diagnoses: Iterable[SetDiagnosis]) -> tuple[Robot | None, str]:

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
-from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import TableEvidence
@@ -60,8 +60,9 @@ OFF_COLUMNS = (
     N_("Documents"),
 )
 OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
+LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
-IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset"), 180 / pi)
+IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 OTHER_TITLES = {
     "described": N_("The table that independent documents describe"),
     "allowed": N_("Another table that fits every document"),
@@ -69,7 +70,7 @@ OTHER_TITLES = {
 OTHER_TEXTS = {
     "described": N_(
         "Of all tables that meet the independent documents this is the nearest that was found; what differs is marked. "
-        "Values are one choice within what the documents leave open."
+        "Values are one choice within what the documents leave open, with as few decimals as that allows."
     ),
     "allowed": N_("It meets every document as well: all that is open is changed at once; what differs is marked."),
 }
@@ -88,10 +89,14 @@ class EntryCell:
 
 @dataclass(frozen=True)
 class OtherSection:
-    """Another table: its title, a text, columns, and by joint its values and whether they differ from the robot's."""
+    """Another table: its title, a text, columns, and by joint its values and whether they differ from the robot's.
+
+    ``page`` : the address of the page on it; empty where it is no robot of the study.
+    """
 
     title: str
     text: str
+    page: str
     columns: list[str]
     rows: list[tuple[int, list[tuple[str, bool]]]]
 
@@ -156,18 +161,72 @@ def _other(evidence: TableEvidence) -> OtherSection | None:
     found = evidence.other
     if found is None:
         return None
-    by_name = {each.entry: each.value for each in evidence.entries}
+    by_name = {each.entry: each for each in evidence.entries}
     kinds = [kind for kind in OTHER_COLUMNS if f"{kind}1" in by_name]
+    if found.code == "described":
+        kinds += [kind for kind in LIMITS if f"{kind}1" in by_name]
     rows = []
     for joint in range(1, len(found.table.a) + 1):
         cells = []
         for kind in kinds:
-            value = round(getattr(found.table, kind)[joint - 1] * IN_UNIT[kind], 3)
-            given = by_name[f"{kind}{joint}"] or 0.0
+            each = by_name.get(f"{kind}{joint}")
+            if each is None:  # a limit of a joint that turns on and on
+                cells.append(("–", False))
+                continue
+            given = each.value or 0.0
+            value = _limit(each) if kind in LIMITS else getattr(found.table, kind)[joint - 1] * IN_UNIT[kind]
+            value = _roundest(value, each)
             cells.append((_plain(value), abs(value - given) > DIFFERS))
         rows.append((joint, cells))
     title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
-    return OtherSection(title, text, [tr(COLUMNS[kind]) for kind in kinds], rows)
+    return OtherSection(title, text, "", [tr(COLUMNS[kind]) for kind in kinds], rows)
+
+
+def _limit(each: EntryEvidence) -> float:
+    """A limit that documents exclude, as they have it; any other as it is given."""
+    if each.status == "contradicted" and each.interval is not None:
+        return sum(each.interval) / 2
+    return each.value or 0.0
+
+
+def _roundest(value: float, each: EntryEvidence) -> float:
+    """A value with as few decimals as the entry's evidence allows; with three where it leaves nothing open."""
+    low, high = each.interval or (value, value)
+    if each.status != "contradicted" and abs(value - (each.value or 0.0)) < DIFFERS:
+        return each.value or 0.0
+    return next((rounded for k in range(3) if low <= (rounded := round(value, k)) <= high), round(value, 3))
+
+
+def table_to_use(robot: Robot, other: Robot) -> OtherSection:
+    """The whole table of another robot of the study, limits included, as its file gives it.
+
+    What differs is marked where both tables are of one convention.
+    """
+    kinds = [kind for kind in OTHER_COLUMNS if kind != "beta" or other.beta.any()]
+    comparable = robot.convention == other.convention and robot.rows == other.rows and robot.joints == other.joints
+    rows = []
+    for k in range(other.rows):
+        cells = []
+        for kind in (*kinds, *LIMITS):
+            if kind in LIMITS and k >= other.joints:
+                cells.append(("–", False))
+                continue
+            unit = MM if kind in LIMITS and other.slides[k] else IN_UNIT[kind]
+            value = round(float(getattr(other, kind)[k]) * unit, 3)
+            differs = comparable and abs(value - float(getattr(robot, kind)[k]) * unit) > DIFFERS
+            cells.append((_plain(value), differs))
+        rows.append((k + 1, cells))
+    source = other.sources.get("dh")
+    parts = [tr("Source: {source}.", source=own_title(source.source))] if source else []
+    if comparable:
+        parts.append(tr("What differs is marked."))
+    return OtherSection(
+        tr("The table to use: {robot}", robot=other.name),
+        joined(parts, " "),
+        f"../{other.name}/validation.html",
+        [tr(COLUMNS[kind]) for kind in (*kinds, *LIMITS)],
+        rows,
+    )
 
 
 def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:

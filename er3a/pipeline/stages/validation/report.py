@@ -24,7 +24,12 @@ from er3a.pipeline.stages.validation.diagnosis_figures import (
     diagnosis_stories,
     typographic,
 )
-from er3a.pipeline.stages.validation.evidence_section import OTHER_TITLES, evidence_section, other_robot
+from er3a.pipeline.stages.validation.evidence_section import (
+    OTHER_TITLES,
+    evidence_section,
+    other_robot,
+    table_to_use,
+)
 from er3a.pipeline.stages.validation.model import (
     Axes,
     Check,
@@ -284,14 +289,18 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
     labels = results.key_poses.take(results.key_poses.group == "envelope")
     drawn = _drawn_axes(results.axes)
     source = robot.sources.get("dh")
+    contradicted = summary.verdict.status == "fail"
+    instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
-        head=_head(study, stored),
+        head=_head(stored, instead),
         command=run_command(study, f"{name}/validation.html"),
         robot=robot,
         robot_pages=study.pages(name),
+        fold=contradicted,
+        to_use=table_to_use(robot, study.robot(instead)) if instead else None,
         table_evidence=evidence_section(summary.evidence),
         frames=_frames_picture(robot, summary),
         formulas=formulas(robot),
@@ -318,14 +327,19 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
     )
 
 
-def _head(study: Study, stored: Stored[ValidationResults]) -> Head:
-    """The head; the verdict on a table that evidence contradicts begins with what to do."""
+def _head(stored: Stored[ValidationResults], instead: str | None) -> Head:
+    """The head; the verdict on a table that evidence contradicts begins with what to do.
+
+    Parameters
+    ----------
+    instead : a model of the same arm that evidence does not contradict
+    """
     head = head_of(stored, FIGURES)
     if head.status != "fail":
         return head
-    instead = alternative_table(study, stored.robot, stored.folder.parents[1]) if stored.folder else None
     same_arm = isinstance(head.finding, DefinedOtherwise)
-    return replace(head, text=joined([decision(head.status, (), instead, same_arm=same_arm), head.text], " "))
+    text = joined([decision(head.status, (), instead, same_arm=same_arm), head.text], " ")
+    return replace(head, text=text, links={instead: f"../{instead}/validation.html"} if instead else {})
 
 
 def _set_story(found: SetSummary, checks: Iterable[Judged], poses: KeyPoses) -> SetStory:

@@ -18,8 +18,8 @@ from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.geometry.transforms import rpy_along
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import joined, say, word
+from er3a.pipeline.messages.language import N_, own_title, tr
+from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.workspace import STATUS
 from er3a.pipeline.stages.workspace.model import (
     BoxPlaces,
@@ -126,8 +126,8 @@ def place_row(row: int, place: PlaceSummary, capability: CapabilitySummary) -> l
         word("workspace.status", STATUS, place.status),
         branch,
         fixed(100 * place.manipulability_ratio, 1),
-        fixed(place.limit_margin_deg, 1) + (f" (J{place.limit_joint})" if place.limit_joint is not None else ""),
-        fixed(place.clearance_mm, 0) + (f" ({say(place.clearance_pair)})" if place.clearance_pair is not None else ""),
+        bracketed(fixed(place.limit_margin_deg, 1), f"J{place.limit_joint}" if place.limit_joint is not None else ""),
+        bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
         _room(place),
     ]
 
@@ -463,7 +463,7 @@ def _clear_caption(clear: ClearSummary) -> str:
         what = tr(
             "An estimate: {share} % of the poses reached can be held without touching “{scene}” or the arm itself.",
             share=number(100 * clear.share, 2),
-            scene=clear.scene,
+            scene=own_title(clear.scene),
         )
     tried = tr(
         "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"

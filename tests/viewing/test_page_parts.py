@@ -1,0 +1,57 @@
+"""What all pages share: addresses of figures and tables that stay, words that lead on, and the table to use instead."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import er3a
+from er3a.identifiability.entry_evidence import EntryEvidence
+from er3a.pipeline.stages.validation.evidence_section import _roundest, table_to_use
+from er3a.pipeline.viewing.page import Numbering, linked
+from tests.conftest import ROOT
+
+CALL = re.compile(r"ui\.(picture|table)\((.*)\) \}\}")
+
+
+def test_addresses_are_of_names_and_unique():
+    numbered = Numbering()
+    marks = [numbered("figure", name) for name in ("reach", "", "reach", "Wall & floor")]
+    assert [mark.id for mark in marks] == ["figure-reach", "figure-2", "figure-reach-2", "figure-Wall-floor"]
+    assert [mark.text for mark in marks] == ["Figure 1", "Figure 2", "Figure 3", "Figure 4"]
+
+
+def test_each_figure_and_table_of_a_template_has_a_name():
+    for file in sorted((ROOT / "er3a/pipeline").rglob("*.j2")):
+        for kind, arguments in CALL.findall(file.read_text(encoding="utf-8")):
+            named = "name=" in arguments if kind == "table" else "," in arguments
+            assert named, f"{file.name}: {arguments}"
+
+
+def test_the_first_of_a_name_leads_on_and_texts_stay_texts():
+    text = "Not er3a_c60_article <b>: use er3a_c60, and er3a_c60 again."
+    html = linked(text, {"er3a_c60": "../er3a_c60/validation.html"})
+    assert html == (
+        'Not er3a_c60_article &lt;b&gt;: use <a href="../er3a_c60/validation.html">er3a_c60</a>, and er3a_c60 again.'
+    )
+
+
+def test_the_table_to_use_is_whole_and_as_its_file_gives_it():
+    real, article = er3a.load_robot("er3a_c60"), er3a.load_robot("er3a_c60_article")
+    section = table_to_use(article, real)
+    rows = [[value for value, _ in cells] for _, cells in section.rows]
+    assert section.page == "../er3a_c60/validation.html"
+    assert rows[1] == ["270", "0", "0", "−90", "−1", "−130", "90"]
+    marked = np.array([[differs for _, differs in cells] for _, cells in section.rows])
+    assert marked[1].tolist() == [True, False, False, True, True, True, True]
+    assert not np.array([[differs for _, differs in cells] for _, cells in table_to_use(real, real).rows]).any()
+
+
+@pytest.mark.parametrize(
+    ("value", "interval", "shown"), [(269.999, (269.9, 270.1), 270), (321.48, (321.45, 321.55), 321.5)]
+)
+def test_a_value_is_rounded_as_far_as_documents_leave_open(value, interval, shown):
+    entry = EntryEvidence("a2", 650.0, "mm", "contradicted", interval, (), (), "article")
+    assert _roundest(value, entry) == shown
