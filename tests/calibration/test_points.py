@@ -4,6 +4,7 @@ what is no noise is said."""
 from __future__ import annotations
 
 import json
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -87,8 +88,7 @@ class Bench:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("noise", [0.01, 0.1, 2.0])
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize(("name", "noise"), list(zip(ARMS, [0.1, 0.01, 2.0], strict=True)))
 def test_base_tool_table_and_deviation_are_found_and_no_term_that_is_not_there(name, noise, random):
     bench = Bench(name, random)
     out = (3, 77, 150)
@@ -112,8 +112,7 @@ TERMS = [
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("term", range(len(TERMS)))
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize(("name", "term"), list(zip(cycle(ARMS), range(len(TERMS)))))
 def test_a_term_that_is_there_is_found_and_no_other(name, term, random):
     own, coefficients = TERMS[term]
     bench = Bench(name, random, {own: coefficients})

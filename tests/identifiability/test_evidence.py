@@ -312,14 +312,11 @@ def poses(random: np.random.Generator, count: int) -> np.ndarray:
 @pytest.mark.long
 def test_a_tracker_settles_a_foreign_arm_but_for_how_its_flange_is_turned(random):
     robot, stated = puma(), tracked(puma(), poses(random, 20), 0.1)
-    expected = dict.fromkeys(("direction2", "direction5", "a2", "d4", "alpha1", "offset3", "alpha4"), {"settled"})
-    expected |= {"d2": {"gauge"}, "d3": {"gauge"}}
-    expected |= dict.fromkeys(("offset6", "alpha6", "direction6"), {"open", "weak"})
+    expected = dict.fromkeys(("direction2", "direction5", "a2", "d4", "alpha1", "offset3", "alpha4"), ("settled",))
+    expected |= dict.fromkeys(("d2", "d3"), ("gauge",)) | dict.fromkeys(("offset6", "alpha6"), ("open", "weak"))
     found = evidence_of(robot, stated, Documents(), only=tuple(expected))
     for name, statuses in expected.items():
         assert found[name].status in statuses
-    wrong = evidence_of(changed(robot, "a2", 3.0), stated, Documents(), only=["a2", "d4"])
-    assert (wrong["a2"].status, wrong["d4"].status) == ("contradicted", "settled")
 
 
 @pytest.mark.long
@@ -392,10 +389,10 @@ def _slope(robot: Robot, name: str, at: np.ndarray) -> np.ndarray:
 
 @pytest.mark.long
 def test_derived_documents_prove_nothing(random):
-    """The same tracker once as a document of its own, once made from what the table was made from."""
+    """The same tracker once as a document of its own, once with an ancestor in common with the table's."""
     robot = puma().replace(origins={entry.name: "manual" for entry in entries_of(puma())})
     stated = tracked(robot, poses(random, 12), 0.1)
-    for parents, status in (((), "settled"), (("manual",), "consistent"), (("drawing",), "consistent")):
+    for parents, status in (((), "settled"), (("drawing",), "consistent")):
         documents = Documents.of(
             [
                 Document("drawing", "a drawing", "a maker"),
