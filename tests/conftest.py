@@ -46,6 +46,7 @@ LONGEST_FILES = (
     "test_command_line.py",
 )
 ROOT = Path(__file__).resolve().parents[1]
+ALL_LONG = re.compile(r"^pytestmark = (\[\s*)?pytest\.mark\.long\b", re.MULTILINE)
 
 settings.register_profile("no test asserts on time", deadline=None)
 settings.load_profile("no test asserts on time")
@@ -64,6 +65,13 @@ def pytest_runtestloop() -> None:
 
 def pytest_unconfigure() -> None:
     gc.unfreeze()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """The fast set does not import modules whose tests are all long: some load peers for seconds."""
+    if config.getoption("markexpr") != "not long" or collection_path.suffix != ".py":
+        return None
+    return True if ALL_LONG.search(collection_path.read_text(encoding="utf-8")) else None
 
 
 @pytest.hookimpl(wrapper=True)

@@ -113,7 +113,7 @@ def test_quill_that_slides_down_meets_the_floor_where_it_says():
 
 
 @pytest.mark.long
-@settings(max_examples=8)
+@settings(max_examples=3)
 @given(robot=chains(2, 7), seed=st.integers(0, 1 << 32))
 def test_distances_are_those_of_coal(robot, seed):
     random = np.random.default_rng(seed)
@@ -135,7 +135,7 @@ def test_distances_are_those_of_coal(robot, seed):
 
 
 @pytest.mark.long
-@settings(max_examples=8)
+@settings(max_examples=3)
 @given(robot=chains(2, 7), seed=st.integers(0, 1 << 32))
 def test_what_never_meets_does_not(robot, seed):
     random = np.random.default_rng(seed)
@@ -159,7 +159,7 @@ def test_what_never_meets_does_not(robot, seed):
 
 
 @pytest.mark.long
-@settings(max_examples=8)
+@settings(max_examples=3)
 @given(robot=chains(2, 6), seed=st.integers(0, 1 << 32))
 def test_moves_that_are_proven_free_touch_nothing_in_between(robot, seed):
     random = np.random.default_rng(seed)
