@@ -17,7 +17,7 @@ XACRO = Path(str(find_spec("rtbdata").origin)).parent / "xacro"
 ARMS = {
     "ur5": (SHARED / "ur_description/urdf/ur5_robot.urdf", 0.1),
     "panda": (SHARED / "panda_description/urdf/panda.urdf", 0.5),
-    "so101": (SHARED / "so_arm_description/urdf/so101.urdf", 0.3),
+    "z1": (SHARED / "z1_description/urdf/z1.urdf", 0.5),
     "irb140": (XACRO / "abb_irb140_description/urdf/irb140.urdf", 0.3),
     "kr210": (XACRO / "kuka_description/kuka_kr210/urdf/kr210l150.urdf", 0.3),
     "iiwa": (XACRO / "kuka_description/kuka_lbr_iiwa/urdf/lbr_iiwa_14_r820.urdf", 0.5),
