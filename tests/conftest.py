@@ -33,15 +33,19 @@ ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 ROBOT = "er3_600"  # the one of those tests for which one is enough
 LONGEST_S = 900
 LONGEST_FILES = (
-    "integration/test_pipeline.py",
     "integration/test_wheel.py",
+    "integration/test_pipeline.py",
+    "viewing/test_article.py",
     "identifiability/test_evidence.py",
-    "stages/test_workspace.py",
-    "stages/test_trajectory.py",
     "kinematics/test_by_class.py",
-    "stages/test_validation.py",
-    "workspace/test_general.py",
     "integration/test_killed_run.py",
+    "stages/test_workspace.py",
+    "workspace/test_sliding_first.py",
+    "identifiability/test_oracle.py",
+    "stages/test_trajectory.py",
+    "workspace/test_general.py",
+    "calibration/test_points.py",
+    "test_recipes.py",
     "integration/test_offices.py",
     "test_command_line.py",
 )
