@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import er3a
 from er3a.calibration.observations import Measurement
 from er3a.calibration.outcomes import NotToldApart
-from er3a.calibration.terms import JointErrors, JointTerm
+from er3a.calibration.terms import JointErrors, JointTerm, candidates
 from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
 from er3a.files.robot_library import load_robot
@@ -109,6 +109,11 @@ TERMS = [
     (JointTerm("twice", 2), [1.5e-3, 0.0]),
     (JointTerm("sag", 2), [3e-3]),
 ]
+
+
+def test_a_joint_that_slides_has_no_turns_but_may_sag():
+    kinds = {joint: {term.kind for term in candidates(sliding_arm()) if term.joint == joint} for joint in (2, 3)}
+    assert kinds == {2: {"ratio", "once", "twice", "sag"}, 3: {"ratio", "sag"}}
 
 
 @pytest.mark.long
