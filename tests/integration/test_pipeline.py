@@ -103,11 +103,6 @@ def test_a_page_s_foot_names_inputs_with_grades_and_the_command_that_makes_it_ag
     assert re.findall(r"^Job \d+: (.+)$", planned, flags=re.MULTILINE) == ["er3_600: report validation"]
 
 
-def test_a_second_run_does_nothing(small_study):
-    done = small_study.make_run()
-    assert "Nothing to be done" in done.stdout + done.stderr
-
-
 def test_a_stage_that_is_asked_for_by_name_computes_no_other(small_study):
     (robot, *_) = with_inverse(small_study)
     with edited(small_study.folder / "config/small.yaml", "seed: 20261120", "seed: 20261121"):
