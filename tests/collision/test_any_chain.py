@@ -104,12 +104,16 @@ def test_quill_that_slides_down_meets_the_floor_where_it_says():
         sliding=sliding,
         envelopes=(Envelope(4, (0.0, 0.0, 0.0), (0.0, 0.0, 0.05), 0.02),),
     )
-    bodies = Bodies(robot, Scene("floor", (Plane("floor", np.array([0.0, 0.0, 1.0]), 0.1),)))
+    sheet, floor = (Plane(name, np.array([0.0, 0.0, 1.0]), z) for name, z in (("sheet", 0.05), ("floor", 0.1)))
+    bodies = Bodies(robot, Scene("floor", (floor,)))
     down = np.array([[0.3, -0.4, z, 1.0] for z in (0.0, 0.1, 0.2299, 0.2301, 0.3)])
     assert np.allclose(bodies.least(down)[0], 0.4 - down[:, 2] - 0.05 - 0.02 - 0.1, atol=1e-12)
     assert bodies.free(down).tolist() == [True, True, True, False, False]
     assert free_between(bodies.layout, down[0], down[2], 1e-5, 3000)[0] == FREE
     assert free_between(bodies.layout, down[0], down[4], 1e-5, 3000)[0] != FREE
+    both = Bodies(robot, Scene("floor on a sheet", (sheet, floor)))
+    (least,), (pair,) = both.least(down[4:])
+    assert (both.pairs[pair].solid, round(least, 9)) == ("floor", -0.07), "the deepest is named"
 
 
 @pytest.mark.long
