@@ -83,7 +83,7 @@ def article(study, tmp_path_factory) -> TrajectoryResults:
     content["paths"] = [path for path in content["paths"] if path["name"].startswith("article_")]
     file.write_text(yaml.safe_dump(content), encoding="utf-8")
     entry = study.entry(name).model_copy(update={"paths": str(file)})
-    return compute(with_settings(study, avoidance="stop").model_copy(update={"robots": {name: entry}}), name)
+    return compute(study.model_copy(update={"robots": {name: entry}}), name)
 
 
 def by_name(results: TrajectoryResults) -> dict[str, PathSummary]:
