@@ -201,7 +201,7 @@ def test_solutions_reach_their_poses_within_the_limits(make, random):
 
 def test_a_scara_serves_the_boxes_it_is_said_to(random):
     robot = scara()
-    done = tool_capability(robot, CapabilitySettings(directions=12, rolls=2, proof_poses=20_000), 0.05)
+    done = tool_capability(robot, CapabilitySettings(directions=12), 0.05)
     assert isinstance(done.placement, PlacementSummary)
     assert done.placement.places
     for place in done.placement.places[:3]:
