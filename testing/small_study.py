@@ -16,12 +16,12 @@ PARTS = ("Snakefile", "workflow", "er3a", "config", "data", "profiles")
 
 
 def fresh(folder: Path, project: Path = ROOT) -> Path:
-    """A copy of the project without results."""
+    """A copy of the project without results; modules that are compiled already stay so."""
     folder.mkdir(parents=True)
     for part in PARTS:
         source = project / part
         if source.is_dir():
-            shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("*.pyc.*"))
         else:
             shutil.copy2(source, folder / part)
     return folder

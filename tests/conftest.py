@@ -33,19 +33,24 @@ ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 ROBOT = "er3_600"  # the one of those tests for which one is enough
 LONGEST_S = 900
 LONGEST_FILES = (
-    "integration/test_pipeline.py",
     "integration/test_wheel.py",
+    "integration/test_pipeline.py",
+    "viewing/test_article.py",
     "identifiability/test_evidence.py",
-    "stages/test_workspace.py",
-    "stages/test_trajectory.py",
     "kinematics/test_by_class.py",
-    "stages/test_validation.py",
-    "workspace/test_general.py",
     "integration/test_killed_run.py",
+    "stages/test_workspace.py",
+    "workspace/test_sliding_first.py",
+    "identifiability/test_oracle.py",
+    "stages/test_trajectory.py",
+    "workspace/test_general.py",
+    "calibration/test_points.py",
+    "test_recipes.py",
     "integration/test_offices.py",
     "test_command_line.py",
 )
 ROOT = Path(__file__).resolve().parents[1]
+ALL_LONG = re.compile(r"^pytestmark = (\[\s*)?pytest\.mark\.long\b", re.MULTILINE)
 
 settings.register_profile("no test asserts on time", deadline=None)
 settings.load_profile("no test asserts on time")
@@ -64,6 +69,13 @@ def pytest_runtestloop() -> None:
 
 def pytest_unconfigure() -> None:
     gc.unfreeze()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """The fast set does not import modules whose tests are all long: some load peers for seconds."""
+    if config.getoption("markexpr") != "not long" or collection_path.suffix != ".py":
+        return None
+    return True if ALL_LONG.search(collection_path.read_text(encoding="utf-8")) else None
 
 
 @pytest.hookimpl(wrapper=True)

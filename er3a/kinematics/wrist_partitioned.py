@@ -317,7 +317,7 @@ def solve_slots(
         return _slots_of_parallel_axes(robot, parallel, T, q_ref)
     shape = T.shape[0], SLOTS
     q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
-    T, q_ref = for_kernel(T), np.ascontiguousarray(row_values(robot, q_ref))
+    T, q_ref = for_kernel(T), for_kernel(row_values(robot, q_ref))
     solve(_constants(robot), (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap))
     if robot.coupling is not None:
         q = wrap_to_pi(q @ np.round(np.linalg.inv(robot.coupling)).T)

@@ -136,10 +136,11 @@ def general_arm(robot: Robot, thickness: tuple[Reals, float] | None = None) -> t
         v_lower, v_upper = np.append(v_lower, 0.0), np.append(v_upper, length)
         combined, to_joints = np.pad(combined, ((0, 0), (0, 1))), np.insert(to_joints, -1, 0.0, axis=1)
     radii, heights = _levers(links, tip, sliding, lower, upper)
-    arm = GeneralArm(
-        links=np.ascontiguousarray(links),
-        tip=np.ascontiguousarray(tip),
-        sliding=np.ascontiguousarray(sliding),
+    links, tip, sliding = (np.array(each, order="C") for each in (links, tip, sliding))
+    arm = GeneralArm(  # kernels are compiled anew for arrays that can't be written to: none of these is one
+        links=links,
+        tip=tip,
+        sliding=sliding,
         lower=lower,
         upper=upper,
         levers=np.where(sliding, 1.0, radii),

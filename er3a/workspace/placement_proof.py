@@ -220,7 +220,7 @@ def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
         serving = np.minimum(np.delete(serving, -1, axis), np.delete(serving, 0, axis))
     bricks = np.argwhere(serving)
     good = np.zeros(len(bricks), dtype=bool)
-    centres = field.origin + (bricks + 0.5) * field.spacing
+    centres = np.ascontiguousarray(field.origin + (bricks + 0.5) * field.spacing)
     if proofs_hold(robot):
         _prove_all(_constants(robot, task, roll), centres, field.spacing / 2, MIXED, _POSES_PER_BRICK, good)
     proven = np.zeros(serving.shape, dtype=bool)

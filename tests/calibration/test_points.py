@@ -4,6 +4,7 @@ what is no noise is said."""
 from __future__ import annotations
 
 import json
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from typer.testing import CliRunner
 import er3a
 from er3a.calibration.observations import Measurement
 from er3a.calibration.outcomes import NotToldApart
-from er3a.calibration.terms import JointErrors, JointTerm
+from er3a.calibration.terms import JointErrors, JointTerm, candidates
 from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
 from er3a.files.robot_library import load_robot
@@ -87,8 +88,7 @@ class Bench:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("noise", [0.01, 0.1, 2.0])
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize(("name", "noise"), list(zip(ARMS, [0.1, 0.01, 2.0], strict=True)))
 def test_base_tool_table_and_deviation_are_found_and_no_term_that_is_not_there(name, noise, random):
     bench = Bench(name, random)
     out = (3, 77, 150)
@@ -111,9 +111,13 @@ TERMS = [
 ]
 
 
+def test_a_joint_that_slides_has_no_turns_but_may_sag():
+    kinds = {joint: {term.kind for term in candidates(sliding_arm()) if term.joint == joint} for joint in (2, 3)}
+    assert kinds == {2: {"ratio", "once", "twice", "sag"}, 3: {"ratio", "sag"}}
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("term", range(len(TERMS)))
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize(("name", "term"), list(zip(cycle(ARMS), range(len(TERMS)))))
 def test_a_term_that_is_there_is_found_and_no_other(name, term, random):
     own, coefficients = TERMS[term]
     bench = Bench(name, random, {own: coefficients})

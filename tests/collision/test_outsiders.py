@@ -41,7 +41,7 @@ def test_distances_are_those_of_coal_and_fcl(kind, random):
 @pytest.mark.long
 def test_ball_in_a_cylinder_is_as_deep_as_plain_geometry_has_it(random):
     met = 0
-    while met < 20:
+    while met < 8:
         ball, cylinder = Outsider("sphere", random), Outsider("cylinder", random)
         found, inside = own_distance(ball.own, cylinder.own)
         x, y, z = cylinder.R.T @ (ball.t - cylinder.t)

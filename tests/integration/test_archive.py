@@ -17,6 +17,8 @@ from er3a.errors import ResultError
 from er3a.pipeline.archive import archive
 from testing.small_study import stages_of
 
+pytestmark = pytest.mark.long  # of the small study
+
 
 @pytest.fixture
 def pack(small_study, tmp_path, monkeypatch):
@@ -47,7 +49,6 @@ def test_archive_holds_pages_recordings_results_and_inputs(pack, small_study):
     assert {"reports/index.html", "config/small.yaml"} <= names
 
 
-@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # the validator's, of the libraries that it uses
 def test_a_validator_accepts_it(pack, tmp_path, monkeypatch):
     crate = tmp_path / "crate"

@@ -44,9 +44,7 @@ def _server_pid() -> int:
     return found
 
 
-@pytest.mark.parametrize(
-    "words", [("compute", "inverse", "no_arm"), ("report", "--help"), ("teach", "er3_600", "--what")]
-)
+@pytest.mark.parametrize("words", [("compute", "inverse", "no_arm"), ("report", "--help")])
 def test_a_job_ends_as_without_a_server(server, words, tmp_path):
     own = {key: value for key, value in server.items() if key != job_server.ADDRESS}
     (alone, forked) = (_job(each, *words, cwd=ROOT) for each in (own, server))

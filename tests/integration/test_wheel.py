@@ -166,12 +166,11 @@ def lines_on_a_finished_study() -> set[tuple[str, ...]]:
     ("given", "name", "validated"),
     [(("--dh", "table.csv"), "table", False), (("--robot", "er3_600"), "er3_600", True)],
 )
-def test_a_study_from_a_table_or_a_robot_of_the_package_runs(er3a, new_cell, given, name, validated):
+def test_a_study_from_a_table_or_a_robot_of_the_package_computes(er3a, new_cell, given, name, validated):
     cell = new_cell(*given)
-    summary = cell / f"results/{name}/validation/summary.json"
-    done = er3a(cell, "run", "--cores", "2", summary.relative_to(cell))
+    done = er3a(cell, "compute", "validation", name)
     assert done.returncode == 0, done.stderr
-    status = json.loads(summary.read_bytes())["verdict"]["status"]
+    status = json.loads((cell / f"results/{name}/validation/summary.json").read_bytes())["verdict"]["status"]
     assert (status != "no_reference") == validated
 
 

@@ -84,7 +84,7 @@ def test_random_arms_are_solved(data, robot):
         assert solution.within_limits[found].all()
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(data=st.data(), robot=arms(orthogonal_wrist=True))
 def test_each_branch_finds_all_branches_again(data, robot):
     """With an orthogonal wrist, a shoulder branch has all four roots or none."""
@@ -157,7 +157,7 @@ def test_rows_outside_use_the_turn_nearest_to_the_range():
     assert below[3] == pytest.approx(215)
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(data=st.data(), robot=arms())
 def test_nearest_equivalents_are_the_best_of_all_turns(data, robot):
     q, q_ref = data.draw(joints_within(robot)), data.draw(joints_within(robot))

@@ -29,7 +29,7 @@ def test_determinant_is_a_constant_times_the_three_factors(robot, random):
     np.testing.assert_allclose(determinant, sign * constant * product_of_factors(robot, q), rtol=0, atol=1e-14)
 
 
-@settings(max_examples=80)
+@settings(max_examples=40)
 @given(data=st.data(), robot=arms())
 def test_determinant_of_random_arms_is_a_constant_times_the_three_factors(data, robot):
     q = np.stack([data.draw(joints_within(robot)) for _ in range(2)])

@@ -295,9 +295,9 @@ def test_motions_that_are_repeated_count_once(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("suffix", [".src", ".script", ".pgm"])
-def test_a_program_of_100_000_lines_has_a_verdict_for_each(suffix, tmp_path):
-    angle = np.linspace(0, 60 * np.pi, 100_000)
+@pytest.mark.parametrize(("suffix", "count"), [(".src", 20_000), (".script", 20_000), (".pgm", 100_000)])
+def test_a_long_program_has_a_verdict_for_each_line(suffix, count, tmp_path):
+    angle = np.linspace(0, 60 * np.pi, count)
     x, y = 400 + 30 * np.cos(angle), 30 * np.sin(angle)
     x[-2] = 5000.0
     if suffix == ".src":
@@ -310,10 +310,10 @@ def test_a_program_of_100_000_lines_has_a_verdict_for_each(suffix, tmp_path):
         joints = [f"POINTJ({a:.4f},-10,-10,0,-70,0)" for a in x - 400]
         text = "\n".join(["", *(f"MJOINT({point}, v50perc, fine, tool0);" for point in joints)])
     (tmp_path / f"a{suffix}").write_text(text)
-    check = check_program(read_program(tmp_path / f"a{suffix}"), ROBOT, CheckOptions(start=HOME))
-    assert len(check.verdicts) == 100_000
+    check = check_program(read_program(tmp_path / f"a{suffix}"), ROBOT, CheckOptions(start=HOME, most_motions=50))
+    assert len(check.verdicts) == count
     assert {"target_out_of_reach", "above_limit"} & {
-        each.finding.code for each in check.findings if each.place.line > 99_000
+        each.finding.code for each in check.findings if each.place.line > 0.99 * count
     }
 
 

@@ -51,7 +51,7 @@ from er3a.planning.intervals import AboveLimit
 from testing.on_demand import OnDemand
 from testing.readme import README, answer
 
-ROBOTS = ("er3a_c60", *(pytest.param(name, marks=pytest.mark.long) for name in ("er3a_c60_article", "er3_600")))
+ROBOTS = ("er3a_c60", pytest.param("er3_600", marks=pytest.mark.long))
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +73,17 @@ def stored(folders) -> dict[str, Stored[TrajectoryResults]]:
 @pytest.fixture(scope="module")
 def results(stored) -> dict[str, TrajectoryResults]:
     return OnDemand(lambda name: stored[name].results)
+
+
+@pytest.fixture(scope="module")
+def article(study, tmp_path_factory) -> TrajectoryResults:
+    """What the article's own two moves come to; the small study leaves this stage out for its arm."""
+    name, file = "er3a_c60_article", tmp_path_factory.mktemp("article") / "paths.yaml"
+    content = yaml.safe_load(Path(f"data/paths/{name}.yaml").read_text(encoding="utf-8"))
+    content["paths"] = [path for path in content["paths"] if path["name"].startswith("article_")]
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    entry = study.entry(name).model_copy(update={"paths": str(file)})
+    return compute(study.model_copy(update={"robots": {name: entry}}), name)
 
 
 def by_name(results: TrajectoryResults) -> dict[str, PathSummary]:
@@ -132,10 +143,9 @@ def test_collisions_are_told_with_what_is_met_and_where(results, name):
     (meeting,) = path.collisions
     assert 0 < meeting.t0_s < meeting.t1_s <= path.duration_s
     assert 0 < meeting.s0_m < meeting.s1_m
-    met = "wall" if name == "er3a_c60_article" else "post"
-    assert met in {pair.solid for pair in meeting.cause.pairs if isinstance(pair, LinkAndSolid)}
+    assert "post" in {pair.solid for pair in meeting.cause.pairs if isinstance(pair, LinkAndSolid)}
     assert meeting.cause.depth_mm == -path.clearance.least_mm
-    assert f"{met} overlap from t = {meeting.t0_s:.4g} s, up to" in path_text(path)
+    assert f"post overlap from t = {meeting.t0_s:.4g} s, up to" in path_text(path)
     rows = results[name].clearance.take(results[name].clearance.path == "line_collides")
     assert path.clearance.least_mm == rows.clearance_mm.min() < 0
     assert path.clearance.between.label == rows.between[np.argmin(rows.clearance_mm)]
@@ -162,8 +172,8 @@ def test_velocities_in_the_table_are_those_of_the_angles(results, name):
 
 
 @pytest.mark.long
-def test_the_articles_line_starts_at_a_singular_pose_and_meets_a_second(results):
-    path = by_name(results["er3a_c60_article"])["article_line"]
+def test_the_articles_line_starts_at_a_singular_pose_and_meets_a_second(article):
+    path = by_name(article)["article_line"]
     assert path.verdict == "singular"
     assert [event.type for event in path.singularities] == ["wrist", "wrist"]
     assert all(event.crossing for event in path.singularities)
@@ -286,10 +296,10 @@ def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(result
 
 
 @pytest.mark.long
-def test_articles_moves_are_those_of_robotics_toolbox(study, results):
+def test_articles_moves_are_those_of_robotics_toolbox(study, article):
     """jtraj and ctraj at the article's 50 samples of 5 s, ctraj on our law of time."""
     rtb, sm = pytest.importorskip("roboticstoolbox"), pytest.importorskip("spatialmath")
-    samples = results["er3a_c60_article"].samples
+    samples = article.samples
     joint = samples.take(samples.path == "article_joint")
     t = np.linspace(0, 5, 50)
     theirs = rtb.jtraj(np.zeros(6), np.radians([45, 30, -22.5, 60, -45, 90]), t)

@@ -12,7 +12,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError, ResultError
-from er3a.files.robot_library import ROBOTS, load_robot
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import NoWristCentre
@@ -59,12 +59,11 @@ def test_results_do_not_depend_on_the_parts(tmp_path):
         "summary.json",
         "SHA256SUMS",
     }
-    for parts in (1, 3):
-        paths = [tmp_path / f"{parts}-{part}.npz" for part in range(1, parts + 1)]
-        for part, path in enumerate(paths, start=1):
-            sample(study, "er3_600", part, parts, path)
-        run.compute("workspace", study, "er3_600", tmp_path / str(parts), paths[::-1])
-        assert files_of(tmp_path / str(parts)) == expected
+    paths = [tmp_path / f"{part}.npz" for part in (1, 2, 3)]
+    for part, path in enumerate(paths, start=1):
+        sample(study, "er3_600", part, 3, path)
+    run.compute("workspace", study, "er3_600", tmp_path / "parts", paths[::-1])
+    assert files_of(tmp_path / "parts") == expected
 
 
 @pytest.fixture(scope="module")
@@ -98,11 +97,9 @@ def test_the_border_that_is_compared_has_no_chords(found):
 
 
 @pytest.mark.parametrize(("name", "drawn"), [("er3_600", True), ("er3a_c60", False)])
-def test_no_page_speaks_of_a_drawing_that_there_is_not(found, name, drawn, tmp_path):
-    study = make_study({name: ROBOTS / f"{name}.yaml"})
-    results = found if name == "er3_600" else compute(study, name)
-    write_results(tmp_path / "results", study, name, STAGES["workspace"], results)
-    report(study, read_stage(tmp_path / "results", STAGES["workspace"]), tmp_path / "page.html")
+def test_no_page_speaks_of_a_drawing_that_there_is_not(small_results, name, drawn, tmp_path):
+    study = load_study("config/small.yaml")
+    report(study, read_stage(small_results("workspace", name, study), STAGES["workspace"]), tmp_path / "page.html")
     page = html.unescape((tmp_path / "page.html").read_text(encoding="utf-8"))
     assert ("Against the manufacturer's drawing" in page) == drawn
     assert ("The arm's plane from the side" in page) != drawn
@@ -121,10 +118,11 @@ def test_what_is_read_is_what_was_computed(found, tmp_path):
         assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / f"{name}.parquet").read_bytes(), name
 
 
-def test_void_centres_have_no_inverse_solution(random):
+def test_void_centres_have_no_inverse_solution(small_results, random):
     """The closed form, over random orientations, is an independent witness of what the samples left out."""
-    study = make_study({"er3a_c60_article": ROBOTS / "er3a_c60_article.yaml"}, samples=4_000_000, cells_across=48)
-    summary, robot = compute(study, "er3a_c60_article").summary, study.robot("er3a_c60_article")
+    study, name = load_study("config/small.yaml"), "er3a_c60_article"
+    summary = read_stage(small_results("workspace", name, study), STAGES["workspace"]).results.summary
+    robot = study.robot(name)
     assert isinstance(summary.verdict.finding, VoidUnexpected)
     assert summary.verdict.status == "caution"
     (void,) = (void for void in summary.enclosed_voids if not void.holds_shoulder)
@@ -154,14 +152,13 @@ def test_full_turn_of_joint_1_gives_a_symmetric_cloud():
     [
         ({1: 0, 2: 0, 3: 0, 4: 0, 5: 0, 6: 90}, "workspace.flat"),
         ({1: 10, 4: 0, 6: 0}, "workspace.on_surface"),
-        ({3: 20}, None),
     ],
 )
 def test_locked_joints_run_through_all_three_verbs(tmp_path, locked, code):
     study = make_study({"locked": locked_file(tmp_path, locked)}, samples=5000)
     run.compute("workspace", study, "locked", tmp_path / "results")
     verdict = read_stage(tmp_path / "results", STAGES["workspace"]).results.summary.verdict
-    assert code in (None, verdict.finding.code)
+    assert code == verdict.finding.code
     for verb, output in (("report", "workspace.html"), ("record", "workspace.rrd")):
         run.show(verb, "workspace", study, "locked", tmp_path / "results", tmp_path / output)
     assert say(verdict.finding) in html.unescape((tmp_path / "workspace.html").read_text(encoding="utf-8"))

@@ -181,7 +181,7 @@ slides = st.tuples(st.just(False), *[st.booleans()] * 5)
 
 
 @pytest.mark.long
-@settings(max_examples=4, phases=[Phase.generate])
+@settings(max_examples=2, phases=[Phase.generate])
 @given(
     lengths,
     lengths,

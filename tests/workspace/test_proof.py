@@ -120,6 +120,7 @@ def test_bracket_narrows_and_holds_the_estimate(proven):
     assert guess.undecided < 40
 
 
+@pytest.mark.long
 def test_intervals_of_the_estimate_hold_a_volume_known_exactly():
     """A shell of radii 0.1 and 0.9 m."""
     arm, exact = section_arm(two_links(0.1)), 4 / 3 * np.pi * (0.9**3 - 0.1**3)

@@ -143,7 +143,7 @@ def test_tilts_are_those_that_least_squares_find(random):
     x, _, up = frame.R
     point = frame.points(np.array(rho), np.array(0.0), np.array(z))
     tilts = 2 * np.pi * np.arange(TILTS) / TILTS
-    share = np.mean([reached(robot, pointing(point, np.cos(t) * up + np.sin(t) * x), random, 30) for t in tilts])
+    share = np.mean([reached(robot, pointing(point, np.cos(t) * up + np.sin(t) * x), random, 12) for t in tilts])
     assert 0.1 < share < 1.0
     assert found.reachability[0, 0] == pytest.approx(share)
 

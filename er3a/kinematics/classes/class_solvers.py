@@ -21,7 +21,7 @@ from er3a.kinematics.classes.scara import Gantry, Scara, solve_gantry, solve_sca
 from er3a.kinematics.classes.self_motion import PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, RowsFound
 from er3a.kinematics.closed_form import BOUNDARY_M, REACHED, ArmConstants, solve
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 
 ArmClassCode = Literal[
     "spherical_wrist",
@@ -173,8 +173,8 @@ class SphericalWristSolver(WithoutParameters):
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         shape = len(T), 8
         q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
-        plain = np.ones(6), np.zeros(6)
-        solve(self.constants, plain, np.ascontiguousarray(T), np.zeros((len(T), 6)), True, True, (q, fault, gap))
+        plain = for_kernel(np.ones(6)), for_kernel(np.zeros(6))
+        solve(self.constants, plain, for_kernel(T), for_kernel(np.zeros((len(T), 6))), True, True, (q, fault, gap))
         q[fault != REACHED] = np.nan
         singular = _branches_meet(q, ((4, 0), (2, 2), (1, 4))) | (self._beside_axis_1(T) < NEAR_SINGULAR)
         return q, np.where(singular, CONTINUUM, CERTAIN)
