@@ -224,7 +224,7 @@ class SeenImages:
 
 
 class HandEyeFile(StrictModel):
-    """A calibration set.
+    """A calibration set. ``simulated``: no camera took it, which verdicts then say.
 
     ``camera_standard_deviation`` is that of T_camera_board by the camera's axes; without it, it is estimated.
     ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points that the camera placed
@@ -236,6 +236,7 @@ class HandEyeFile(StrictModel):
     title: Text
     title_zh: Text | None = None
     source: Text
+    simulated: bool = False
     setup: Literal["eye_in_hand", "eye_to_hand"]
     samples: Text | None = None
     streams: StreamsEntry | None = None

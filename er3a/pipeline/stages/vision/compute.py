@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 
@@ -50,7 +49,6 @@ from er3a.pipeline.stages.vision.model import (
     TouchContradicts,
     TouchedPoint,
     TouchResult,
-    UnsureGrasp,
     ViewToAdd,
     VisionResults,
     VisionSummary,
@@ -84,7 +82,7 @@ from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spre
 from er3a.vision.next_view import FieldOfView, NextView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table
-from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, OtherReading
+from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
 MARGIN = 0.25  # of the objects' extent
 LEAST_HALF = 0.2  # m, to each side of the objects' middle
@@ -231,6 +229,7 @@ def calibration_result(
         found,
         title=head.title,
         source=head.source,
+        simulated=head.simulated,
         setup=found.samples.setup,
         samples=len(found.samples),
         used=found.used.sum(),
@@ -334,7 +333,6 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> CornerRows:
 STAGE = "vision"
 VIEW_STREAM = 0
 CONTRADICTED = 1e-3
-MUCH_SCATTER = 3.0
 LEG_ROWS = 13
 
 Found = (
@@ -387,7 +385,7 @@ def compute(study: Study, name: str) -> VisionResults:
         limits = (limits_of(robot, motions), study.seed)
         planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
-    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects, settings)
+    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects)
     summary = VisionSummary(
         verdict=judged.without(bodies_of(robot, scene).unexamined),
         figures=_figures(calibration, objects),
@@ -430,13 +428,7 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
 
 def _doubt(found: CalibrationResult) -> CalibrationDoubtful | DirectionContradicted | TouchContradicts | None:
     """Why no grasp may rest on a calibration; None if nothing speaks against it."""
-    grave = (NoMajority, BoardScale, *get_args(OtherReading))
-    doubts = tuple(
-        each
-        for each in found.warnings
-        if isinstance(each, grave) or (isinstance(each, MoreScatter) and each.scatter > MUCH_SCATTER)
-    )
-    if doubts:
+    if doubts := grave_warnings(found.warnings):
         return CalibrationDoubtful(doubts)
     given = found.directions[0]
     best = next(each for each in found.directions if each.status == "best")
@@ -468,6 +460,7 @@ def _planned(
         float(np.radians(settings.least_limit_margin_deg)),
         settings.least_singular_value,
         tuple(map(float, tolerance)),  # type: ignore[arg-type]
+        settings.least_success,
     )
     bodies = Bodies(robot, scene)
     speed = settings.line_speed_mm_s / 1000
@@ -530,25 +523,18 @@ def _grasp(chosen: ChosenGrasp) -> GraspResult:
     )
 
 
-def _verdict(
-    calibration: CalibrationResult, objects: tuple[ObjectResult, ...], settings: VisionSettings
-) -> Verdict[Found]:
+def _verdict(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) -> Verdict[Found]:
     if unmet := unmet_expectations(objects):
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
     missed = tuple(NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
-    unsure = tuple(
-        UnsureGrasp(each.name, each.grasp.probability)
-        for each in asked
-        if each.grasp and each.grasp.probability < settings.least_success
-    )
     left_out = tuple(each.sample for each in calibration.suspects if each.code != "repeated_pose")
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
-    counts = GraspCounts(len(asked), len(asked) - len(missed), missed, unsure, left_out, worst, shown)
+    counts = GraspCounts(len(asked), len(asked) - len(missed), missed, left_out, worst, shown, calibration.simulated)
     if asked and len(missed) == len(asked):
         return Verdict("fail", counts)
-    return Verdict("caution" if missed or unsure or calibration.warnings else "pass", counts)
+    return Verdict("caution" if missed or calibration.warnings else "pass", counts)
 
 
 def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) -> tuple[Figure, ...]:

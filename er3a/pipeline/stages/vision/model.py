@@ -67,15 +67,6 @@ class NotGraspedObject:
 
 
 @dataclass(frozen=True)
-class UnsureGrasp:
-    """A grasp that holds less often than asked."""
-
-    name: str
-    probability: float
-    code: Literal["unsure_grasp"] = "unsure_grasp"
-
-
-@dataclass(frozen=True)
 class GraspCounts:
     """What came of the objects that are to be grasped.
 
@@ -84,15 +75,16 @@ class GraspCounts:
     objects, grasped : of those that are asked for
     left_out : samples that the calibration does not rest on
     point_mm : 95 % of errors at the worst grasp stay below; None where nothing is grasped
+    simulated : whether no camera took the samples
     """
 
     objects: int
     grasped: int
     missed: tuple[NotGraspedObject, ...]
-    unsure: tuple[UnsureGrasp, ...]
     left_out: tuple[str, ...]
     point_mm: float | None
     demonstrations: tuple[Demonstration, ...]
+    simulated: bool
     code: Literal["grasp_counts"] = "grasp_counts"
 
 
@@ -208,6 +200,7 @@ class CalibrationResult:
     Attributes
     ----------
     hand_eye : T_flange_camera (camera on the flange) or T_base_camera (fixed); board : T_base_board or T_flange_board
+    simulated : whether no camera took the samples
     stated : whether the camera's standard deviations are stated; else they are estimated
     scatter : root mean square of the residuals in stated standard deviations
     camera_mm, camera_deg : the camera's standard deviation by axis, root mean square of the three
@@ -219,6 +212,7 @@ class CalibrationResult:
 
     title: str
     source: str
+    simulated: bool
     setup: Setup
     samples: int
     used: int
