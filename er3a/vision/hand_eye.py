@@ -41,7 +41,7 @@ from er3a.vision.calibration_set import (
     transposed,
 )
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
-from er3a.vision.likelihood import PoseObservations, Refined, refine, residuals
+from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, refine, residuals, whitening
 from er3a.vision.vision_findings import (
     READINGS,
     AllSamplesEqual,
@@ -487,13 +487,14 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     warnings: list[CalibrationWarning] = [angles.warning] if angles.warning else []
     directions = directions_tried(kept, refined)
     warnings += _warnings(kept, refined, greatest, apart, directions)
-    half_width = scipy.special.stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(refined.covariance))
+    covariance = refined.covariance + _shared_covariance(kept, refined)
+    half_width = scipy.special.stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(covariance))
     found = HandEye(
         samples=samples,
         used=used,
         X=refined.X,
         Y=refined.Y,
-        covariance=refined.covariance,
+        covariance=covariance,
         half_width=half_width,
         residual=residuals(samples.hand, samples.target, refined.X, refined.Y)[0],
         scatter=float(refined.scatter),
@@ -544,6 +545,21 @@ def _fitted(samples: CalibrationSet) -> Refined:
     if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():
         raise HandEyeError(NothingFits())
     return found
+
+
+def _shared_covariance(samples: CalibrationSet, refined: Refined) -> Reals:
+    """What errors that all samples share add to the covariance of the two poses, (12, 12)."""
+    if samples.shared is None:
+        return np.zeros((UNKNOWNS, UNKNOWNS))
+    seen = PoseObservations(
+        samples.setup, samples.hand, samples.target, samples.camera_covariance, samples.flange_covariance
+    )
+    sigma = np.broadcast_to(np.repeat(refined.deviations, 3), (len(samples), 6))
+    W = whitening(seen, sigma, refined.X, refined.Y)
+    J = W @ residuals(samples.hand, samples.target, refined.X, refined.Y)[1]
+    moves = np.linalg.solve(np.einsum("nki,nkj->ij", J, J), np.einsum("nki,nkj->ij", J, W @ samples.shared))
+    added: Reals = moves @ moves.T
+    return added
 
 
 def _check_determined(samples: CalibrationSet) -> tuple[float, float]:
