@@ -126,6 +126,12 @@ LeftOutSubject = Literal[
     "torque_peaks",
     "program_torques",
     "drive_behaviour",
+    "real_camera",
+    "boardless_images",
+    "left_out_samples",
+    "touched_points",
+    "detections",
+    "gripped_parts",
 ]
 
 

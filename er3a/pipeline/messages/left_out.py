@@ -38,6 +38,12 @@ TEXTS = texts(
         "left_out.drive_behaviour": (
             "what changes with speed, heat and wear in motors, gears and brakes, and what elasticity adds"
         ),
+        "left_out.real_camera": "what a real camera sees: the samples are simulated",
+        "left_out.boardless_images": "images in which no board was found",
+        "left_out.left_out_samples": "samples that contradict the others: the calibration does not rest on them",
+        "left_out.touched_points": "where the arm really touches what the camera sees: no touched points are given",
+        "left_out.detections": "whether detected objects are where the detector says, within the deviations stated",
+        "left_out.gripped_parts": "collisions of the objects themselves and of a part in the gripper",
     }
 )
 

@@ -160,6 +160,7 @@ TEXTS = texts(
             "{sample}: the flat board is seen almost head-on, or too small: the mirrored tilt fits with only "
             "{ratio:.2g} times the error. Take the image from nearer, or tilt the board by 30 deg"
         ),
+        "boardless_image": "{sample}: {corners} corners of the board are found in {image}; the sample is left out",
         "no_majority": (
             "flange and board rotate by different angles in {pairs} of {of} pairs of samples ({median_deg:.3g} deg in "
             "the median): the robot's table, the order of the samples, or the orientations of one stream are wrong"

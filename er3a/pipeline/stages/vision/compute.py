@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
 from er3a.files.scene_file import load_scene
@@ -22,9 +23,10 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.si_units import from_si, stated
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision.entry import VisionSettings
 from er3a.pipeline.stages.vision.model import (
@@ -76,7 +78,7 @@ from er3a.robots.joint_limits import joint_columns, shown
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import TimeOffset, inverted, quaternion_of
-from er3a.vision.grasp_motion import PARTS, GraspLeg
+from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spread_of
 from er3a.vision.next_view import FieldOfView, NextView, in_sight, next_view
@@ -362,7 +364,8 @@ def compute(study: Study, name: str) -> VisionResults:
         found = calibrate_hand_eye(samples)
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", CalibrationImpossible(error.finding))
-        summary = VisionSummary(verdict, (), task_file.title, title, None, ())
+        level = study.section(VisionSettings).least_success
+        summary = VisionSummary(verdict, (), task_file.title, title, level, None, ())
         empty = (SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty(), GraspPrograms.empty(), CornerRows.empty())
         return VisionResults(summary, *empty)
     picture = None if head.setup == "eye_to_hand" else np.radians(task_file.picture_deg or [])
@@ -376,7 +379,12 @@ def compute(study: Study, name: str) -> VisionResults:
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table)
     if images is not None:
-        calibration = replace(calibration, open_tilts=ambiguous_tilts(images.views, samples.names))
+        calibration = replace(
+            calibration,
+            open_tilts=ambiguous_tilts(images.views, samples.names),
+            boardless=images.boardless,
+            intrinsics_estimated=images.views.shared is not None,
+        )
     doubt = _doubt(calibration)
     settings = study.section(VisionSettings)
     motions = study.section(TrajectorySettings)
@@ -386,13 +394,25 @@ def compute(study: Study, name: str) -> VisionResults:
         planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
     judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects)
+    bodies = bodies_of(robot, scene)
+    least = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
+    near = {each: None if clear is None else clear / 1000 for each, clear in least.items()}
+    shapes = shapes_assumed(robot, motions.assumed_margin_mm / 1000, near) if planned else None
     summary = VisionSummary(
-        verdict=judged.without(bodies_of(robot, scene).unexamined),
+        verdict=judged.without(bodies.unexamined).resting_on(shapes),
         figures=_figures(calibration, objects),
         title=task_file.title,
         scene=title,
+        least_success=settings.least_success,
         calibration=calibration,
         objects=objects,
+        not_examined=(
+            *_left_out(calibration),
+            *(left_out_of_collisions(bodies, scene, 1000 * DEPTH) if planned else ()),
+            *left_out_of_rates(np.isfinite(robot.speed), limits_of(robot, motions).jerk is not None),
+            LeftOut("gripped_parts"),
+            LeftOut("torques"),
+        ),
     )
     map_task = MapTask(
         robot=robot,
@@ -418,6 +438,19 @@ def compute(study: Study, name: str) -> VisionResults:
         ),
         corner_rows(found, images),
     )
+
+
+def _left_out(found: CalibrationResult) -> Iterator[LeftOut]:
+    """What the calibration does not rest on, and what nothing checks it against."""
+    if found.simulated:
+        yield LeftOut("real_camera")
+    if found.boardless:
+        yield LeftOut("boardless_images", tuple(each.sample for each in found.boardless))
+    if samples := tuple(each.sample for each in found.suspects if each.code != "repeated_pose"):
+        yield LeftOut("left_out_samples", samples)
+    if found.touch is None:
+        yield LeftOut("touched_points")
+    yield LeftOut("detections")
 
 
 def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:

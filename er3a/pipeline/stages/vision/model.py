@@ -12,7 +12,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
-from er3a.vision.boards import AmbiguousTilt
+from er3a.vision.boards import AmbiguousTilt, BoardlessImage
 from er3a.vision.calibration_set import Setup
 from er3a.vision.classic_methods import MethodName
 from er3a.vision.grasping import GraspRefusal
@@ -207,7 +207,8 @@ class CalibrationResult:
     spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
     moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
     table : corrections to the arm's table, where the set asks for them
-    open_tilts : images that leave open which way the board is tilted
+    open_tilts : images that leave open which way the board is tilted; boardless : images left out, without a board
+    intrinsics_estimated : from the same images; the intervals include their errors
     """
 
     title: str
@@ -237,6 +238,8 @@ class CalibrationResult:
     time_offset: OffsetResult | None
     table: TableResult | NoCorrections | None
     open_tilts: tuple[AmbiguousTilt, ...] = ()
+    boardless: tuple[BoardlessImage, ...] = ()
+    intrinsics_estimated: bool = False
 
 
 @dataclass(frozen=True)
@@ -309,7 +312,10 @@ class ObjectResult:
 
 @dataclass(frozen=True)
 class VisionSummary(Summary):
-    """What the stage found; ``calibration`` is None where the samples determine none."""
+    """What the stage found; ``calibration`` is None where the samples determine none.
+
+    ``least_success``: the probability of success below which an object is not graspable.
+    """
 
     verdict: Verdict[
         CalibrationImpossible
@@ -321,6 +327,7 @@ class VisionSummary(Summary):
     ]
     title: str
     scene: str | None
+    least_success: float
     calibration: CalibrationResult | None
     objects: tuple[ObjectResult, ...]
 
