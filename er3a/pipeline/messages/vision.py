@@ -246,7 +246,7 @@ def _(found: DirectionContradicted) -> str:
 
 @say.register
 def _(found: GraspCounts) -> str:
-    grasped = say_as(found, "grasped", count=found.objects + len(found.demonstrations))
+    grasped = say_as(found, "grasped", count=found.objects)
     error = say_as(found, "error") if found.point_mm is not None else ""
     left = say_as(found, "left_out") if found.left_out else ""
     sentences = [

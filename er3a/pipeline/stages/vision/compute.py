@@ -579,7 +579,7 @@ def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) 
         Figure("samples_used", calibration.used, "", of=calibration.samples),
         Figure("position_half_width", max(calibration.hand_eye.half_width_mm), "mm"),
         Figure("rotation_half_width", max(calibration.hand_eye.half_width_deg), "deg"),
-        *((Figure("objects_grasped", grasped, "", of=len(objects)),) if objects else ()),
+        *((Figure("objects_grasped", grasped, "", of=len(asked)),) if asked else ()),
         *((Figure("worst_error", worst, "mm"),) if worst is not None else ()),
         *((Figure("least_success", 100 * least, "%"),) if least is not None else ()),
     )
