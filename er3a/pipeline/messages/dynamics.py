@@ -101,7 +101,8 @@ TEXTS = texts(
         ),
         "dynamics.inferred": "Masses are inferred: the results are orders of magnitude only.",
         "dynamics.graded": (
-            "The masses are of grade {grade}: nobody weighed them, and all torques are as uncertain as that grade."
+            "The masses are of grade {grade}, neither measured nor given by the manufacturer: all torques are as "
+            "uncertain as that grade."
         ),
         "dynamics.not_run": Plural(
             "count",

@@ -276,7 +276,7 @@ def _not_run(path: PathLoad) -> list[str]:
 def _nodes(summary: DynamicsSummary) -> list[list[str]]:
     """Shortest times under torques by the number of nodes, and the time that no motion undercuts."""
     return [
-        [path.name, number(each.nodes), fixed(each.time_s, 3), fixed(each.least_s, 3)]
+        [path.name, number(each.nodes), fixed(each.time_s, 4), fixed(each.least_s, 4)]
         for path in summary.paths
         for each in (path.torque_times if path.counts else ())
     ]
