@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import ShapesAssumed
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
@@ -222,6 +223,7 @@ def calibration_result(
     view: NextView | None,
     offset: TimeOffset | None,
     table: TableCorrections | NoCorrections | None,
+    images: SeenImages | None,
 ) -> CalibrationResult:
     """All that the summary says of a calibration."""
     spread, turned = spread_of(found)
@@ -249,6 +251,9 @@ def calibration_result(
         next_view=stated(ViewToAdd, view) if view else None,
         time_offset=stated(OffsetResult, offset) if offset else None,
         table=_table_result(table) if isinstance(table, TableCorrections) else table,
+        open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
+        boardless=images.boardless if images else (),
+        intrinsics_estimated=images is not None and images.views.shared is not None,
     )
 
 
@@ -377,14 +382,7 @@ def compute(study: Study, name: str) -> VisionResults:
         middle = np.mean([each.pose()[:3, 3] for each in task_file.objects], axis=0)
         to_add = next_view(robot, found, view, middle, scene, study.seed + VIEW_STREAM)
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
-    calibration = calibration_result(head, found, to_add, offset, table)
-    if images is not None:
-        calibration = replace(
-            calibration,
-            open_tilts=ambiguous_tilts(images.views, samples.names),
-            boardless=images.boardless,
-            intrinsics_estimated=images.views.shared is not None,
-        )
+    calibration = calibration_result(head, found, to_add, offset, table, images)
     doubt = _doubt(calibration)
     settings = study.section(VisionSettings)
     motions = study.section(TrajectorySettings)
@@ -395,11 +393,8 @@ def compute(study: Study, name: str) -> VisionResults:
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
     judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects)
     bodies = bodies_of(robot, scene)
-    least = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
-    near = {each: None if clear is None else clear / 1000 for each, clear in least.items()}
-    shapes = shapes_assumed(robot, motions.assumed_margin_mm / 1000, near) if planned else None
     summary = VisionSummary(
-        verdict=judged.without(bodies.unexamined).resting_on(shapes),
+        verdict=judged.without(bodies.unexamined).resting_on(_shapes(robot, objects, motions)),
         figures=_figures(calibration, objects),
         title=task_file.title,
         scene=title,
@@ -408,9 +403,8 @@ def compute(study: Study, name: str) -> VisionResults:
         objects=objects,
         not_examined=(
             *_left_out(calibration),
-            *(left_out_of_collisions(bodies, scene, 1000 * DEPTH) if planned else ()),
-            *left_out_of_rates(np.isfinite(robot.speed), limits_of(robot, motions).jerk is not None),
-            LeftOut("gripped_parts"),
+            *left_out_of_collisions(bodies, scene, 1000 * DEPTH),
+            *left_out_of_rates(np.isfinite(robot.speed), motions.jerk_deg_s3 is not None),
             LeftOut("torques"),
         ),
     )
@@ -451,6 +445,14 @@ def _left_out(found: CalibrationResult) -> Iterator[LeftOut]:
     if found.touch is None:
         yield LeftOut("touched_points")
     yield LeftOut("detections")
+    yield LeftOut("gripped_parts")
+
+
+def _shapes(robot: Robot, objects: tuple[ObjectResult, ...], motions: TrajectorySettings) -> ShapesAssumed | None:
+    """What assumed shapes of the arm leave open of the grasps; None without any grasp."""
+    clear = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
+    near = {name: None if least is None else least / 1000 for name, least in clear.items()}
+    return shapes_assumed(robot, motions.assumed_margin_mm / 1000, near) if clear else None
 
 
 def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
@@ -561,7 +563,8 @@ def _verdict(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) 
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
     missed = tuple(NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
-    left_out = tuple(each.sample for each in calibration.suspects if each.code != "repeated_pose")
+    suspects = tuple(each.sample for each in calibration.suspects if each.code != "repeated_pose")
+    left_out = (*suspects, *(each.sample for each in calibration.boardless))
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
     counts = GraspCounts(len(asked), len(asked) - len(missed), missed, left_out, worst, shown, calibration.simulated)
