@@ -130,10 +130,12 @@ def verdict_of(
     findings: tuple[MassFinding, ...],
     unknown: tuple[DataOpen, ...],
     masses: MassesUsed | None,
+    *,
+    skipped: tuple[str, ...] = (),
 ) -> DynamicsVerdict:
     """Fit, marginal, overload; no_reference where there is nothing to compare, or no limit to compare it with.
 
-    It fits only if nothing that the files leave open could change that.
+    It fits only if nothing that the files leave open could change that. ``skipped``: paths that can't be followed.
     """
     missing = tuple(found.link for found in findings if isinstance(found, MissingLink))
     doubts = len(findings) - len(missing)
@@ -145,7 +147,7 @@ def verdict_of(
     beyond = sum(use.ratio > 1 for use in uses)
     unsettled = sum(use.ratio <= 1 and use.upper > use.allowed for use in uses)
     needs = tuple(each.what for each in unknown)
-    not_run = tuple(path.summary.name for path in paths if path.asked and not path.summary.counts)
+    not_run = (*skipped, *(path.summary.name for path in paths if path.asked and not path.summary.counts))
     guessed = masses is not None and masses.grade == "inferred"
     open_ = unsettled or doubts or needs or not_run or guessed
     kind = Overload if beyond else Marginal if open_ else AllWithin
@@ -444,7 +446,7 @@ def compute(study: Study, name: str) -> DynamicsResults:
     grade = "inferred" if robot is not given else _links_grade(given)
     moving = any(each.link > 0 for each in robot.masses.links)
     arm = _loaded_arm(study, robot, load, (grade, load_grade), settings)
-    paths = _paths(study, name, arm, settings) if moving else []
+    paths, skipped = _paths(study, name, arm, settings) if moving else ([], ())
     holding = _holding(arm) if moving else ()
     motors = _motors(robot, paths, holding) if any(path.summary.counts for path in paths) else ()
     summaries = tuple(path.summary for path in paths)
@@ -458,7 +460,7 @@ def compute(study: Study, name: str) -> DynamicsResults:
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = DynamicsSummary(
-        verdict=verdict_of(paths, holding, uses, findings, unknown, masses),
+        verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped),
         figures=_figures(summaries, holding, uses, imbalances, masses),
         gravity_m_s2=settings.gravity_m_s2,
         masses=masses,
@@ -471,7 +473,7 @@ def compute(study: Study, name: str) -> DynamicsResults:
         motors=motors,
         uses=uses,
         power_imbalance=max(imbalances, default=None),
-        not_examined=_left_out(robot, summaries, unknown, settings.samples) if holding or uses else (),
+        not_examined=_left_out(robot, summaries, skipped, unknown, settings.samples) if holding or uses else (),
     )
     followed = [path.rows for path in paths if path.demand]
     rows = TorqueRows.stacked(followed) if followed else TorqueRows.empty()
@@ -519,7 +521,7 @@ def _loaded_arm(
 
 
 def _left_out(
-    robot: Robot, paths: tuple[PathLoad, ...], unknown: tuple[DataOpen, ...], samples: int
+    robot: Robot, paths: tuple[PathLoad, ...], skipped: tuple[str, ...], unknown: tuple[DataOpen, ...], samples: int
 ) -> tuple[LeftOut, ...]:
     """What the files leave open, paths that count for nothing, and what the model and its samples can't see."""
     subjects: dict[Need, LeftOutSubject] = {
@@ -542,12 +544,15 @@ def _left_out(
         LeftOut(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
         for subject, numbers in names.items()
     ]
-    if not_run := tuple(path.name for path in paths if not path.counts):
+    if not_run := (*skipped, *(path.name for path in paths if not path.counts)):
         found.append(LeftOut("paths_not_run", not_run))
     return (*found, LeftOut("torque_peaks", amount=samples), LeftOut("program_torques"), LeftOut("drive_behaviour"))
 
 
-def _paths(study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings) -> list[PathTorques]:
+def _paths(
+    study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings
+) -> tuple[list[PathTorques], tuple[str, ...]]:
+    """The paths, and the names of those that an arm of its class can't be made to follow."""
     joints, trajectory = arm.robot.joints, study.section(TrajectorySettings)
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
@@ -555,8 +560,13 @@ def _paths(study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings) 
     bodies = Bodies(study.robot(name), load_scene(scene) if scene else None)
     surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
     judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
-    motions = [each.motion for each in study_motions(study, name, trajectory.checks_per_sample)]
-    return [path_torques(arm, motion, judge_of.judged(motion), settings.samples, wrist) for motion in motions if motion]
+    found, skipped = [], []
+    for each in study_motions(study, name, trajectory.checks_per_sample):
+        if each.motion is None:
+            skipped.append(each.name)
+        else:
+            found.append(path_torques(arm, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
+    return found, tuple(skipped)
 
 
 def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:
