@@ -1,10 +1,15 @@
-"""The fastest time law along a way in joint space under the drives' torques and the joints' speeds, by TOPP-RA [1]_.
+"""The shortest time along a path in joint space under the drives' torques and the joints' speeds, by TOPP-RA [1]_.
 
-Along a way q(s) torques are ``a s'' + b s'^2 + c``; so peak torques bound s'' and s'^2 linearly. Viscous friction
-goes with s', the root of s'^2. Where it costs torque its tangent at the s' of a motion known counts, which is nowhere
-below it; where it helps, the chord up to the greatest s' that the joints' speeds allow, which is nowhere above. So each
-motion found keeps the limits and is no slower than the one before; they are repeated until they gain nothing. Without
-viscous friction the motion is the fastest one. Between nodes constraints are interpolated.
+Along a path q(s) torques are ``a s'' + b s'^2 + c``, so peak torques bound s'' and s'^2 linearly: the rows are those of
+toppra's own constraint of joint torques. s is the arc length with each joint measured in its greatest speed, which is
+smooth wherever the path is; so the time falls as nodes are added, and what more nodes would gain can be seen.
+
+Viscous friction goes with s', the root of s'^2, and is no row. It is enclosed. Let Y be a speed that no motion
+exceeds. Where friction costs torque it is at least its chord up to Y and at most its tangent anywhere; where it helps,
+at most its tangent at Y and at least its chord. With the first of each TOPP-RA gives a speed that no motion exceeds,
+which is the next Y: no motion on these nodes is shorter than the time of that relaxed problem. With the second it gives
+a motion that keeps the limits. Both are repeated until they gain nothing; they meet, because chord and tangent are
+exact at Y.
 
 References
 ----------
@@ -22,7 +27,7 @@ import numpy as np
 import scipy
 
 from er3a.dynamics.arm_model import ArmModel, drives_of
-from er3a.dynamics.torques import direction_of, holding_torques, known, torque_parts
+from er3a.dynamics.torques import AT_REST, direction_of, holding_torques, known, torque_parts
 from er3a.numerics.arrays import Reals
 from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.timing import (
@@ -39,16 +44,23 @@ from er3a.planning.timing import (
 )
 
 MOST_ROUNDS = 30
-GAIN = 1e-3
+GAIN = 1e-4
 SLOWEST = 1e-3
+SLACK = 1e-3  # by which a speed that no motion exceeds is kept above the one found, because TOPP-RA's is rounded
 
 
 @dataclass(frozen=True, eq=False)
 class TimedTorques:
-    """A motion and the torques (N, n) that it takes; at rest friction acts as just after or before."""
+    """A motion and the torques (N, n) that it takes; at rest friction acts as just after or before.
+
+    Attributes
+    ----------
+    least : s, that no motion under the same limits at the same nodes takes less than
+    """
 
     timed: Timed
     torques: Reals
+    least: float
 
 
 def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) -> TimedTorques:
@@ -64,39 +76,23 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
     TimingError
         if there is no such time law
     """
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0) / speed).max(axis=1))])
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0) / speed, axis=1))])
     kept = np.flatnonzero(np.concatenate([[True], np.diff(way) > SAME_NODE]))
     if len(kept) < 2:
         timed = standing(q[-1], 0.0)
-        return TimedTorques(timed, holding_torques(model, timed.q))
+        return TimedTorques(timed, holding_torques(model, timed.q), 0.0)
     kept[-1] = len(way) - 1
     q, way = q[kept], way[kept]
     if len(way) == 2:
         q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
     spline = scipy.interpolate.CubicSpline(way, q)
-    pace, t = _fastest_pace(model, way, spline, speed, peak)
+    along = TorquesAlong.along(model, way, spline, speed, peak)
+    least, ceiling = along.least_time()
+    pace, t = along.fastest(ceiling)
     timed = Timed(polynomial_motion(run_along(way, spline, pace, t), t, SPLINE_DEGREE))
     dry = known(drives_of(model.robot).coulomb) * (direction_of(spline(way, 1)) - direction_of(timed.velocity))
-    return TimedTorques(timed, torque_parts(model, timed.q, timed.velocity, timed.acceleration).total + dry)
-
-
-def _fastest_pace(
-    model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
-) -> tuple[Reals, Reals]:
-    """Speeds along the way and times (N,) at its nodes."""
-    rows = TorquesAlong.along(model, way, spline, speed, peak)
-    around = rows.slow
-    for _ in range(MOST_ROUNDS if rows.viscous.any() else 1):
-        pace = _toppra(way, spline, speed, rows.constraints(around))
-        between = (pace[:-1] + pace[1:]) / 2
-        if (between <= 0).any():
-            raise TimingError(MustStandStill())
-        t = np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
-        gained = bool((pace > around * (1 + GAIN)).any())
-        around = np.maximum(pace, rows.slow * SLOWEST)
-        if not gained:
-            break
-    return pace, t
+    torques = torque_parts(model, timed.q, timed.velocity, timed.acceleration).total + dry
+    return TimedTorques(timed, torques, min(least, timed.duration))
 
 
 Rows = tuple[Reals, Reals, Reals, Reals, Reals]
@@ -108,80 +104,156 @@ class TorquesAlong:
 
     Attributes
     ----------
-    fastest : (N,), greatest s' under the joints' speeds
-    slow : (N,), s' whose viscous friction takes half of what gravity and dry friction leave, at most ``fastest``
+    way : (N,), s at the nodes; spline : the joints (n,) along it; speed : (n,), greatest
+    greatest : (N,), s' under the joints' speeds
+    slow : (N,), s' whose viscous friction takes half of what gravity and dry friction leave, at most ``greatest``
     """
 
+    way: Reals
+    spline: scipy.interpolate.CubicSpline
+    speed: Reals
     a: Reals
     b: Reals
     c: Reals
     viscous: Reals
     peak: Reals
-    fastest: Reals
+    greatest: Reals
     slow: Reals
 
     @classmethod
     def along(
         cls, model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, peak: Reals
     ) -> TorquesAlong:
-        """The torques along a way."""
-        q, slope, bend = (np.ascontiguousarray(spline(way, order)) for order in range(3))
-        rest, bound, drives = np.zeros_like(q), np.isfinite(peak), drives_of(model.robot)
-        held = model.rigid_torques(q, rest, rest)
-        armature = known(drives.armature)
-        a = model.rigid_torques(q, rest, slope) - held + armature * slope
-        b = model.rigid_torques(q, slope, bend) - held + armature * bend
-        c = held + model.tool_torques(q) + known(drives.coulomb) * direction_of(slope)
+        """The torques along a path."""
+        bound, drives = np.isfinite(peak), drives_of(model.robot)
+        a, b, c = _torque_rows(model, way, spline, peak)
+        slope = spline(way, 1)
         viscous = known(drives.viscous) * slope
         with np.errstate(divide="ignore", invalid="ignore"):
-            fastest = (speed / np.abs(slope)).min(axis=1)
+            greatest = (speed / np.abs(slope)).min(axis=1)
             room = np.maximum(peak - np.abs(c), SLOWEST * peak) / (2 * np.abs(viscous))
-        slow = np.minimum(fastest, np.where(np.isfinite(room), room, np.inf).min(axis=1))
-        return cls(a[:, bound], b[:, bound], c[:, bound], viscous[:, bound], peak[bound], fastest, slow)
+        slow = np.minimum(greatest, np.where(np.isfinite(room), room, np.inf).min(axis=1))
+        rows = a[:, bound], b[:, bound], c[:, bound], viscous[:, bound]
+        return cls(way, spline, speed, *rows, peak[bound], greatest, slow)
 
-    def constraints(self, around: Reals) -> Rows:
+    def least_time(self) -> tuple[float, Reals]:
+        """A time (s) that no motion undercuts, and s' at the nodes (N,) that none exceeds."""
+        ceiling, least = self.greatest, 0.0
+        for _ in range(MOST_ROUNDS):
+            pace, t = self._solved(self._relaxed(ceiling), ceiling)
+            gained, least = t[-1] > least * (1 + GAIN), max(least, float(t[-1]))
+            ceiling = np.clip(pace * (1 + SLACK), SLOWEST * self.greatest, ceiling)
+            if not (gained and self.viscous.any()):
+                break
+        return least, ceiling
+
+    def fastest(self, ceiling: Reals) -> tuple[Reals, Reals]:
+        """Speeds s' and times (s) at the nodes (N,) of a motion that keeps the limits; ``ceiling`` of all motions."""
+        around, best = self.slow, np.inf
+        for _ in range(MOST_ROUNDS):
+            pace, t = self._solved(self._kept(around, ceiling), ceiling)
+            gained, best = t[-1] < best * (1 - GAIN), float(t[-1])
+            around = np.maximum(pace, SLOWEST * self.slow)
+            if not (gained and self.viscous.any()):
+                break
+        return pace, t
+
+    def _relaxed(self, ceiling: Reals) -> Rows:
+        """Rows that every motion keeps which is nowhere faster than ``ceiling`` (N,)."""
+        return self._rows(0.0, 1 / ceiling, ceiling / 2, 1 / (2 * ceiling))
+
+    def _kept(self, around: Reals, ceiling: Reals) -> Rows:
+        """Rows that keep the limits up to ``ceiling`` (N,); exact at ``around`` (N,) where friction costs torque."""
+        return self._rows(around / 2, 1 / (2 * around), 0.0, 1 / ceiling)
+
+    def _rows(self, cost: Reals | float, per_cost: Reals, help_: Reals | float, per_help: Reals) -> Rows:
         """``F (a s'' + b s'^2 + c) <= g`` with a, b, c, g (N, 2k), F the unit matrix: upper ends first, then lower.
 
-        ``around`` (N,): s' at which viscous friction counts as it is.
+        s' counts as ``cost + per_cost s'^2`` where friction costs torque, as ``help_ + per_help s'^2`` where it helps.
         """
-        around, viscous = around[:, None], np.concatenate([self.viscous, -self.viscous], axis=1)
+        viscous = np.concatenate([self.viscous, -self.viscous], axis=1)
         costs, helps = np.maximum(viscous, 0.0), np.minimum(viscous, 0.0)
         a, b, c = (np.concatenate([part, -part], axis=1) for part in (self.a, self.b, self.c))
-        b = b + costs / (2 * around) + helps / self.fastest[:, None]
-        g = np.tile(self.peak, 2) - costs * around / 2
+        b = b + costs * per_cost[:, None] + helps * per_help[:, None]
+        constant = costs * np.reshape(cost, (-1, 1)) + helps * np.reshape(help_, (-1, 1))
         F = np.broadcast_to(np.eye(a.shape[1]), (len(a), a.shape[1], a.shape[1])).copy()
-        return a, b, c, F, g
+        return a, b, c, F, np.tile(self.peak, 2) - constant
+
+    def _solved(self, rows: Rows, ceiling: Reals) -> tuple[Reals, Reals]:
+        """Speeds s', at most ``ceiling``, and times (s) at the nodes (N,); rows hold at both ends of each step."""
+        toppra, way = _library(), self.way
+
+        class Torques(toppra.constraint.LinearConstraint):  # type: ignore[misc, name-defined]
+            def get_dof(self) -> int:
+                return count
+
+            def compute_constraint_params(self, path: Any, gridpoints: Any) -> Any:
+                collocated = toppra.constraint.linear_constraint.canlinear_colloc_to_interpolate
+                squares = np.stack([np.zeros(len(way)), ceiling**2], axis=1)
+                return collocated(*rows, None, squares, gridpoints, identical=False)
+
+        count = len(self.speed)
+        speeds = toppra.constraint.JointVelocityConstraint(np.stack([-self.speed, self.speed], axis=1))
+        path = _path(way, self.spline)
+        solver = toppra.algorithm.TOPPRA([speeds, Torques()], path, gridpoints=way, solver_wrapper="seidel")
+        _, pace, _ = solver.compute_parameterization(0, 0)
+        if pace is None or not np.isfinite(pace).all():
+            raise TimingError(NoTimeLawFound())
+        between = (pace[:-1] + pace[1:]) / 2
+        if (between <= 0).any():
+            raise TimingError(MustStandStill())
+        return np.asarray(pace, float), np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
 
 
-def _toppra(way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, rows: Rows) -> Reals:
-    """Speed along the way at its nodes (N,)."""
-    try:
-        with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
-            warnings.simplefilter("ignore")
-            from toppra.algorithm import TOPPRA
-            from toppra.constraint import JointVelocityConstraint, LinearConstraint
-            from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
-            from toppra.interpolator import AbstractGeometricPath
-    except ModuleNotFoundError:
-        raise TimingError(ToppraMissing()) from None
+def _torque_rows(
+    model: ArmModel, way: Reals, spline: scipy.interpolate.CubicSpline, peak: Reals
+) -> tuple[Reals, Reals, Reals]:
+    """Torques ``a s'' + b s'^2 + c`` at the nodes, (N, n) each, by toppra's constraint of joint torques."""
+    drives = drives_of(model.robot)
+    armature = known(drives.armature)
 
-    class TorqueWay(AbstractGeometricPath):  # type: ignore[misc]
-        dof, waypoints = len(speed), None
+    def torques(q: Reals, qd: Reals, qdd: Reals) -> Reals:
+        rigid = model.rigid_torques(q[None], qd[None], qdd[None])
+        whole: Reals = (rigid + model.tool_torques(q[None]))[0] + armature * qdd
+        return whole
+
+    constraint = _library().constraint.JointTorqueConstraint(
+        torques, np.stack([-peak, peak], axis=1), known(drives.coulomb)
+    )
+    a, b, c = constraint.compute_constraint_params(_path(way, spline), way)[:3]
+    return a, b, c
+
+
+def _path(way: Reals, spline: scipy.interpolate.CubicSpline) -> Any:
+    """The path as toppra takes it; a joint whose slope is rounding alone is at rest and has no friction."""
+    count: int = spline.c.shape[-1]
+
+    class Path(_library().interpolator.AbstractGeometricPath):  # type: ignore[misc]
+        dof, waypoints = count, None
         path_interval = np.array([way[0], way[-1]])
 
         def __call__(self, at: Reals, order: int = 0) -> Any:
-            return spline(at, order)
+            values = spline(at, order)
+            return np.where(np.abs(values) > AT_REST, values, 0.0) if order == 1 else values
 
-    class PeakTorques(LinearConstraint):  # type: ignore[misc]
-        def get_dof(self) -> int:
-            return len(speed)
+    return Path()
 
-        def compute_constraint_params(self, path: Any, gridpoints: Any) -> Any:
-            return canlinear_colloc_to_interpolate(*rows, None, None, gridpoints, identical=False)
 
-    constraints = [JointVelocityConstraint(np.stack([-speed, speed], axis=1)), PeakTorques()]
-    solver = TOPPRA(constraints, TorqueWay(), gridpoints=way, solver_wrapper="seidel")
-    _, pace, _ = solver.compute_parameterization(0, 0)
-    if pace is None or not np.isfinite(pace).all():
-        raise TimingError(NoTimeLawFound())
-    return np.asarray(pace, float)
+def _library() -> Any:
+    """The module ``toppra``.
+
+    Raises
+    ------
+    TimingError
+        if it is not installed
+    """
+    try:
+        with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
+            warnings.simplefilter("ignore")
+            import toppra
+            import toppra.algorithm
+            import toppra.constraint.linear_constraint
+            import toppra.interpolator
+    except ModuleNotFoundError:
+        raise TimingError(ToppraMissing()) from None
+    return toppra

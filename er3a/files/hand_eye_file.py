@@ -34,7 +34,7 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.robot import Robot
-from er3a.vision.boards import Board, BoardNotFoundError, BoardViews, Camera, board_views
+from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
 from er3a.vision.calibration_set import CalibrationSet, Stream, TimeOffset, exp_rotation, paired, posed, time_offset
 
 FORMS: dict[str, tuple[str, ...]] = {
@@ -217,14 +217,15 @@ class StreamsEntry(StrictModel):
 
 @dataclass(frozen=True, eq=False)
 class SeenImages:
-    """Image files as the table names them, and what was found in each."""
+    """Image files that show the board, as the table names them, what was found in each, and those without it."""
 
     names: tuple[str, ...]
     views: BoardViews
+    boardless: tuple[BoardlessImage, ...]
 
 
 class HandEyeFile(StrictModel):
-    """A calibration set.
+    """A calibration set. ``simulated``: no camera took it, which verdicts then say.
 
     ``camera_standard_deviation`` is that of T_camera_board by the camera's axes; without it, it is estimated.
     ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points that the camera placed
@@ -236,6 +237,7 @@ class HandEyeFile(StrictModel):
     title: Text
     title_zh: Text | None = None
     source: Text
+    simulated: bool = False
     setup: Literal["eye_in_hand", "eye_to_hand"]
     samples: Text | None = None
     streams: StreamsEntry | None = None
@@ -280,6 +282,7 @@ def read_calibration(
     images: SeenImages | None = None
     covariance = head.camera_standard_deviation
     per_sample: Reals | None = None
+    shared: Reals | None = None
     if head.streams is not None:
         hand = _stream(path.parent / head.streams.flange, "flange", robot)
         eye = _stream(path.parent / head.streams.target, "target", robot)
@@ -292,8 +295,11 @@ def read_calibration(
         flange, q = _flange(table, rows, header, robot)
         names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
         if head.images is not None:
-            images = _targets_of_images(table, rows, head.images, table.parent)
-            target, per_sample = images.views.target, images.views.covariance
+            images = _targets_of_images(table, rows, names, head.images)
+            target, per_sample, shared = images.views.target, images.views.covariance, images.views.shared
+            kept = list(images.views.numbers)
+            flange, names = flange[kept], tuple(names[number] for number in kept)
+            q = None if q is None else q[kept]
         else:
             target = poses_of(table, rows, "target", _form(table, header, "target"))
     if covariance is not None:
@@ -308,6 +314,7 @@ def read_calibration(
         q=q,
         touched=_touched(path.parent / head.touched) if head.touched else None,
         touch_deviation=head.touch_standard_deviation_mm / 1000,
+        shared=shared,
     )
     return samples, offset, images
 
@@ -412,7 +419,9 @@ def _touched(table: Path) -> Reals:
     return found
 
 
-def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntry, folder: Path) -> SeenImages:
+def _targets_of_images(
+    table: Path, rows: list[dict[str, Any]], names: tuple[str, ...], entry: ImageEntry
+) -> SeenImages:
     for row in rows:
         if not row.get("image"):
             raise InputError(table, f"row {row['row']}, column image", "no image is named", "Name its file")
@@ -421,7 +430,7 @@ def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntr
         own = entry.intrinsics
         K = np.array([[own.fx, 0, own.cx], [0, own.fy, own.cy], [0, 0, 1.0]])
         camera = Camera(K, np.array(own.distortion))
-    files = [folder / row["image"] for row in rows]
+    files = [table.parent / row["image"] for row in rows]
     images = [grey_image(file) for file in files]
     for row, file, image in zip(rows, files, images):
         if image.shape != images[0].shape:
@@ -433,11 +442,14 @@ def _targets_of_images(table: Path, rows: list[dict[str, Any]], entry: ImageEntr
         views = board_views(images, entry.board.board(), camera, entry.pixel_standard_deviation)
     except BoardNotFoundError as error:
         x, y = entry.board.squares
-        problem = f"{error.corners} corners of a {entry.board.pattern} board of {x} x {y} found"
-        remedy = "Check squares, dictionary and the image; or remove the sample"
-        where = f"sample {rows[error.image].get('name') or error.image + 1}"
-        raise InputError(files[error.image], where, problem, remedy) from None
-    return SeenImages(tuple(str(row["image"]) for row in rows), views)
+        found = f"{error.corners} corners in the best of {len(files)} images, sample {names[error.image]}"
+        problem = f"no image shows a {entry.board.pattern} board of {x} x {y}: {found}"
+        raise InputError(
+            table, "column image", problem, "Check pattern, squares and dictionary, or the images"
+        ) from None
+    shown = tuple(str(rows[number]["image"]) for number in views.numbers)
+    boardless = tuple(BoardlessImage(names[k], str(rows[k]["image"]), corners) for k, corners in views.without)
+    return SeenImages(shown, views, boardless)
 
 
 def grey_image(file: Path) -> NDArray[np.uint8]:

@@ -115,6 +115,23 @@ LeftOutSubject = Literal[
     "controller_ramps",
     "joint_vectors",
     "lost_cells",
+    "link_masses",
+    "peak_torques",
+    "rated_torques",
+    "rotor_inertias",
+    "friction",
+    "wrist_limits",
+    "load",
+    "paths_not_run",
+    "torque_peaks",
+    "program_torques",
+    "drive_behaviour",
+    "real_camera",
+    "boardless_images",
+    "left_out_samples",
+    "touched_points",
+    "detections",
+    "gripped_parts",
 ]
 
 

@@ -18,3 +18,5 @@ PathVerdict = Literal[
 ]
 PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
 """The gravest first."""
+NOT_TO_BE_RUN: tuple[PathVerdict, ...] = (*PATH_VERDICTS[:5], "too fast for the assumed limits")
+"""Of paths that no arm should run as they are; others may cross singular poses, or leave something open."""

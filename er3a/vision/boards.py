@@ -3,7 +3,8 @@
 Corners scatter by a stated standard deviation in pixels. With J the derivatives of the projected corners by the pose,
 the pose's covariance is that deviation squared times (J^T J)^-1; the refinement over all poses with these covariances
 has, to first order, the same maximum as one over all pixels. Where the camera's intrinsics are estimated from the same
-images, their standard deviations are carried into each pose; that all images share that error is left out of account.
+images, all images share their errors. Their covariance is that of the bundle of all corners, with the poses eliminated
+by Schur's complement, and each pose says how far a standard deviation of each of them moves it.
 
 Frames as OpenCV has them: the camera looks along z, x to the right and y down; the board's z axis leaves x and y by
 the right hand, from the first inner corner (chessboard, ChArUco) or the first tag's first corner (grid of tags). Which
@@ -13,7 +14,7 @@ end of a chessboard is the first can't be told from a picture; samples turned so
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal
 
@@ -72,14 +73,10 @@ class Board:
 
 @dataclass(frozen=True, eq=False)
 class Camera(ByValue):
-    """Intrinsics: matrix (3, 3) in pixels, distortion (k,) as OpenCV has it, and their standard deviations.
-
-    ``deviations`` : (4 + k,), of fx, fy, cx, cy and the distortion; zeros where they are given
-    """
+    """Intrinsics: matrix (3, 3) in pixels, distortion (k,) as OpenCV has it."""
 
     matrix: Reals
     distortion: Reals
-    deviations: Reals | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,14 +85,20 @@ class BoardViews(ByValue):
 
     Attributes
     ----------
+    numbers : (N,), of the images that show the board, from 0; without : numbers of the others, and corners in each
     target : (N, 4, 4), T_camera_board; covariance : (N, 6, 6), m and rad by the camera's axes
+    shared : (N, 6, k), m and rad: how one standard deviation of each of k independent errors, which all images share,
+        moves the poses: of intrinsics that are estimated from them; None where they are given
     corners, reprojected : N arrays (k, 2), pixels; points : N arrays (k, 3), m, on the board
     ambiguous : (N,), the ratio of the reprojection errors of the other pose of a flat board to this one's
     camera : with the intrinsics used
     """
 
+    numbers: tuple[int, ...]
+    without: tuple[tuple[int, int], ...]
     target: Reals
     covariance: Reals
+    shared: Reals | None
     points: tuple[Reals, ...]
     corners: tuple[Reals, ...]
     reprojected: tuple[Reals, ...]
@@ -112,12 +115,24 @@ class AmbiguousTilt:
     code: Literal["ambiguous_tilt"] = "ambiguous_tilt"
 
 
+@dataclass(frozen=True)
+class BoardlessImage:
+    """An image shows too few corners of the board, and its sample is left out."""
+
+    sample: str
+    image: str
+    corners: int
+    code: Literal["boardless_image"] = "boardless_image"
+
+
 class BoardNotFoundError(Er3aError):
-    """An image (by number, from 0) shows no such board."""
+    """No image shows such a board; ``corners``: the most that one of them (by number, from 0) shows."""
 
     def __init__(self, image: int, corners: int):
         self.image, self.corners = image, corners
-        super().__init__(f"image {image + 1} shows {corners} corners of the board; {LEAST_CORNERS} are needed")
+        super().__init__(
+            f"no image shows the board; most corners are in image {image + 1}, {corners}; {LEAST_CORNERS} are needed"
+        )
 
 
 def board_views(
@@ -132,30 +147,64 @@ def board_views(
     Raises
     ------
     BoardNotFoundError
-        for the first image without the board
+        if none shows the board; single ones are left out
     Er3aError
         if OpenCV is missing, or too few images are to give intrinsics too
     """
     find = _detector(board)
-    points, corners = [], []
-    for number, image in enumerate(images):
-        on_board, in_image = find(image)
-        if len(in_image) < LEAST_CORNERS:
-            raise BoardNotFoundError(number, len(in_image))
-        points.append(on_board)
-        corners.append(in_image)
-    if camera is None:
-        camera = estimated_camera(points, corners, (images[0].shape[1], images[0].shape[0]))
+    found = [find(image) for image in images]
+    counts = [len(in_image) for _, in_image in found]
+    numbers = tuple(number for number, count in enumerate(counts) if count >= LEAST_CORNERS)
+    if not numbers:
+        most = int(np.argmax(counts))
+        raise BoardNotFoundError(most, counts[most])
+    without = tuple((number, count) for number, count in enumerate(counts) if count < LEAST_CORNERS)
+    size = images[0].shape[1], images[0].shape[0]
+    points, corners = zip(*(found[number] for number in numbers))
+    views = views_of_corners(points, corners, size, camera, pixel_deviation)
+    return replace(views, numbers=numbers, without=without)
+
+
+def views_of_corners(
+    points: Sequence[Reals],
+    corners: Sequence[Reals],
+    size: tuple[int, int],
+    camera: Camera | None = None,
+    pixel_deviation: float = 0.3,
+) -> BoardViews:
+    """Poses of a board of corners (k, 3), m, that were found at (k, 2) pixels; otherwise as :func:`board_views`."""
+    estimated = camera is None
+    camera = estimated_camera(points, corners, size) if camera is None else camera
     found = [_pose(P, c, camera, pixel_deviation) for P, c in zip(points, corners)]
+    shared: Reals | None = None
+    if estimated:
+        deviations = np.linalg.cholesky(intrinsics_covariance(found, corners))
+        shared = np.array([each.by_camera for each in found]) @ deviations
     return BoardViews(
-        target=np.array([each[0] for each in found]),
-        covariance=np.array([each[1] for each in found]),
+        numbers=tuple(range(len(found))),
+        without=(),
+        target=np.array([each.T for each in found]),
+        covariance=np.array([each.covariance for each in found]),
+        shared=shared,
         points=tuple(points),
         corners=tuple(corners),
-        reprojected=tuple(each[2] for each in found),
-        ambiguous=np.array([each[3] for each in found]),
+        reprojected=tuple(each.pixels for each in found),
+        ambiguous=np.array([each.ratio for each in found]),
         camera=camera,
     )
+
+
+def intrinsics_covariance(found: Sequence[_Pose], corners: Sequence[Reals]) -> Reals:
+    """Covariance (k, k) of intrinsics that are estimated from all corners: of fx, fy, cx, cy and the distortion."""
+    k = found[0].by_camera.shape[1]
+    information, squares = np.zeros((k, k)), 0.0
+    for each, seen in zip(found, corners):
+        own = each.J_camera - each.J_pose @ np.linalg.lstsq(each.J_pose, each.J_camera)[0]
+        information += own.T @ own
+        squares += float(((each.pixels - seen) ** 2).sum())
+    free = sum(2 * len(seen) - 6 for seen in corners) - k
+    covariance: Reals = squares / max(free, 1) * np.linalg.inv(information)
+    return covariance
 
 
 def ambiguous_tilts(views: BoardViews, names: Sequence[str]) -> tuple[AmbiguousTilt, ...]:
@@ -165,16 +214,15 @@ def ambiguous_tilts(views: BoardViews, names: Sequence[str]) -> tuple[AmbiguousT
 
 
 def estimated_camera(points: Sequence[Reals], corners: Sequence[Reals], size: tuple[int, int]) -> Camera:
-    """Intrinsics with standard deviations, after Zhang, from corners of at least five images of (width, height)."""
+    """Intrinsics, after Zhang, from corners of at least five images of (width, height)."""
     if len(points) < LEAST_IMAGES:
         raise Er3aError(
             f"{len(points)} images can't give the camera's intrinsics too; take {LEAST_IMAGES}, or give them"
         )
     cv2 = opencv()
     on_board, in_image = ([part.astype(np.float32) for part in parts] for parts in (points, corners))
-    found = cv2.calibrateCameraExtended(on_board, in_image, size, None, None)
-    distortion = found[2].ravel()
-    return Camera(found[1], distortion, found[5].ravel()[: 4 + len(distortion)])
+    found = cv2.calibrateCamera(on_board, in_image, size, None, None)
+    return Camera(found[1], found[2].ravel())
 
 
 def projected(points: Reals, T_camera_board: Reals, camera: Camera) -> Reals:
@@ -253,8 +301,28 @@ def _detector(board: Board) -> Any:
 _NOTHING: tuple[Reals, Reals] = (np.empty((0, 3)), np.empty((0, 2)))
 
 
-def _pose(points: Reals, corners: Reals, camera: Camera, deviation: float) -> tuple[Reals, Reals, Reals, float]:
-    """Pose (4, 4), its covariance (6, 6), the corners reprojected (k, 2), and how much worse the other pose fits."""
+@dataclass(frozen=True, eq=False)
+class _Pose:
+    """A board in an image.
+
+    Attributes
+    ----------
+    T : (4, 4); covariance : (6, 6); pixels : (k, 2), the corners reprojected
+    ratio : how much worse the flat board's other pose fits
+    J_pose, J_camera : (2k, 6) and (2k, c), derivatives of the pixels
+    by_camera : (6, c), derivatives of the pose by the intrinsics
+    """
+
+    T: Reals
+    covariance: Reals
+    pixels: Reals
+    ratio: float
+    J_pose: Reals
+    J_camera: Reals
+    by_camera: Reals
+
+
+def _pose(points: Reals, corners: Reals, camera: Camera, deviation: float) -> _Pose:
     cv2 = opencv()
     K, distortion = camera.matrix, camera.distortion
     _, turns, shifts, errors = cv2.solvePnPGeneric(points, corners, K, distortion, flags=cv2.SOLVEPNP_IPPE)
@@ -263,12 +331,16 @@ def _pose(points: Reals, corners: Reals, camera: Camera, deviation: float) -> tu
     turn, shift = cv2.solvePnPRefineLM(points, corners, K, distortion, turns[0], shifts[0])
     pixels, J = cv2.projectPoints(points, turn, shift, K, distortion)
     inverse = np.linalg.inv(J[:, :6].T @ J[:, :6])
-    covariance = deviation**2 * inverse
-    if camera.deviations is not None:
-        by_camera = inverse @ J[:, :6].T @ J[:, 6 : 6 + len(camera.deviations)]
-        covariance = covariance + (by_camera * camera.deviations**2) @ by_camera.T
+    J_camera = J[:, 6 : 10 + len(distortion)]
     left = np.linalg.inv(inverse_right_jacobian(-turn.ravel()))
     carry = np.zeros((6, 6))  # from rotation vector and position to position and turns about the camera's axes
     carry[:3, 3:], carry[3:, :3] = np.eye(3), left
-    T = posed(exp_rotation(turn.ravel()), shift.ravel())
-    return T, carry @ covariance @ carry.T, pixels.reshape(-1, 2), ratio
+    return _Pose(
+        T=posed(exp_rotation(turn.ravel()), shift.ravel()),
+        covariance=deviation**2 * carry @ inverse @ carry.T,
+        pixels=pixels.reshape(-1, 2),
+        ratio=ratio,
+        J_pose=J[:, :6],
+        J_camera=J_camera,
+        by_camera=-carry @ inverse @ J[:, :6].T @ J_camera,
+    )

@@ -114,6 +114,8 @@ class CalibrationSet(ByValue, Displayed):
     names : N, what a person calls the samples
     camera_covariance : (N, 6, 6) of T_camera_board: position (m) and rotation vector (rad) by the camera's axes; None
         where nobody states it, then it is estimated
+    shared : (N, 6, k), m and rad by the camera's axes: how one standard deviation of each of k independent errors that
+        all samples share (intrinsics estimated from their images) moves T_camera_board; None where there are none
     flange_covariance : (6, 6) of T_base_flange, likewise by the base's axes
     q : (N, n), rad, joint angles, where they were recorded
     touched : (M, 2, 3), m: points in the camera (a fixed one) or on the board (a fixed one), and where the robot
@@ -135,6 +137,7 @@ class CalibrationSet(ByValue, Displayed):
     q: Reals | None = None
     touched: Reals | None = None
     touch_deviation: float = 0.0
+    shared: Reals | None = None
 
     def __post_init__(self) -> None:
         for name in ("flange", "target"):
@@ -173,6 +176,7 @@ class CalibrationSet(ByValue, Displayed):
             names=tuple(self.names[row] for row in rows),
             camera_covariance=None if covariance is None else covariance[rows],
             q=None if self.q is None else self.q[rows],
+            shared=None if self.shared is None else self.shared[rows],
         )
 
 

@@ -35,6 +35,7 @@ MethodName = Literal["park", "horaud", "tsai", "andreff", "daniilidis", "shah", 
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
 
 TSAI_LEAST = 0.3  # of twice the sine of half the turn: 17 deg
+HALF_TURN = 0.1  # of the cosine of half the turn: 169 deg, beyond which errors decide the sign of a quaternion
 Unknowns = tuple[Reals, Reals]
 
 
@@ -92,7 +93,14 @@ def _quaternions(R: Reals) -> Reals:
     return q
 
 
+def _below_half_turns(A: Reals, C: Reals) -> tuple[Reals, Reals]:
+    """The motions whose quaternions have a sure sign, alike for hand and eye; all if those are few."""
+    sure = np.minimum(*(_quaternions(T[:, :3, :3])[:, 0] for T in (A, C))) > HALF_TURN
+    return (A[sure], C[sure]) if sure.sum() >= 2 else (A, C)
+
+
 def _horaud(A: Reals, C: Reals) -> Reals:
+    A, C = _below_half_turns(A, C)
     a, c = _quaternions(A[:, :3, :3]), _quaternions(C[:, :3, :3])
     K = _left_product(a) - _right_product(c)
     q = np.linalg.eigh(np.einsum("pki,pkj->ij", K, K))[1][:, 0]
@@ -117,11 +125,12 @@ def _right_product(q: Reals) -> Reals:
 
 
 def _tsai(A: Reals, C: Reals) -> Reals:
-    """From motions that turn far enough alone, as the authors advise and OpenCV does; from all if those are few."""
+    """From motions that turn far enough alone, as the authors advise and OpenCV does; from half of all at least."""
+    A, C = _below_half_turns(A, C)
     a, c = (2 * _quaternions(T[:, :3, :3])[:, 1:] for T in (A, C))
-    far = np.minimum(np.linalg.norm(a, axis=1), np.linalg.norm(c, axis=1)) > TSAI_LEAST
-    if far.sum() >= 2:
-        A, C, a, c = A[far], C[far], a[far], c[far]
+    size = np.minimum(np.linalg.norm(a, axis=1), np.linalg.norm(c, axis=1))
+    far = size >= min(TSAI_LEAST, float(np.median(size)))
+    A, C, a, c = A[far], C[far], a[far], c[far]
     p = np.linalg.lstsq(skew(a + c).reshape(-1, 3), (c - a).ravel())[0]
     p = 2 * p / np.sqrt(1 + p @ p)
     R = (1 - p @ p / 2) * np.eye(3) + (np.outer(p, p) + np.sqrt(4 - p @ p) * skew(p)) / 2
@@ -145,6 +154,7 @@ def _scaled_pose(solution: Reals) -> Reals:
 
 
 def _daniilidis(A: Reals, C: Reals) -> Reals:
+    A, C = _below_half_turns(A, C)
     a, c = _quaternions(A[:, :3, :3]), _quaternions(C[:, :3, :3])
     a_dual, c_dual = _dual_part(a, A[:, :3, 3]), _dual_part(c, C[:, :3, 3])
 

@@ -79,12 +79,14 @@ class GraspNeeds:
     ----------
     clearance : m; limit_margin : rad; singular_value : least singular value of the scaled Jacobian
     tolerance : errors that the gripper forgives, m along and rad about the tool's x, y and z
+    probability : with which the tolerance is kept
     """
 
     clearance: float
     limit_margin: float
     singular_value: float
     tolerance: tuple[float, float, float, float, float, float]
+    probability: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -162,6 +164,15 @@ class NoTransfer:
     code: Literal["no_transfer"] = "no_transfer"
 
 
+@dataclass(frozen=True)
+class GraspUnlikely:
+    """The gripper's tolerance is kept less often than asked; of the grasp that keeps it most often."""
+
+    probability: float
+    needed: float
+    code: Literal["grasp_unlikely"] = "grasp_unlikely"
+
+
 GraspRefusal = (
     GraspOutOfReach
     | GraspNearLimits
@@ -171,6 +182,7 @@ GraspRefusal = (
     | LineUnproven
     | WayCollides
     | NoTransfer
+    | GraspUnlikely
 )
 _FAR: tuple[type, ...] = get_args(GraspRefusal)
 
@@ -268,16 +280,19 @@ def plan_grasp(
     followed = left[:FOLLOWED]
     plans = [_followed(task, each, target) for each in followed]
     good = [plan for plan in plans if isinstance(plan, ChosenGrasp)]
-    if good:
-        best = max(good, key=lambda plan: plan.margin)
+    counts, likeliest = (len(poses), len(candidates), len(followed)), 0.0
+    for best in sorted(good, key=lambda plan: -plan.margin):
         probability = success_probability(best, target, T_base_object, covariance_at(best.q), task.needs)
-        deviation = float(np.sqrt(probability * (1 - probability) / len(draws(np.eye(6)))))
-        best = replace(best, probability=probability, deviation=deviation)
-        return GraspPlan(best, None, len(poses), len(candidates), len(followed))
+        if probability >= task.needs.probability:
+            deviation = float(np.sqrt(probability * (1 - probability) / len(draws(np.eye(6)))))
+            return GraspPlan(replace(best, probability=probability, deviation=deviation), None, *counts)
+        likeliest = max(likeliest, probability)
+    if good:
+        return GraspPlan(None, GraspUnlikely(likeliest, task.needs.probability), *counts)
     refusals = [plan for plan in plans if not isinstance(plan, ChosenGrasp)]
     if refusals:
         refusal = max(refusals, key=lambda why: _FAR.index(type(why)))
-    return GraspPlan(None, refusal, len(poses), len(candidates), len(followed))
+    return GraspPlan(None, refusal, *counts)
 
 
 def _poses(target: DetectedObject, T_base_object: Reals) -> list[tuple[str, float, Reals]]:

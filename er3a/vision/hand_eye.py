@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import permutations
+from itertools import permutations, product
 
 import numpy as np
 import scipy
@@ -41,8 +41,9 @@ from er3a.vision.calibration_set import (
     transposed,
 )
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
-from er3a.vision.likelihood import PoseObservations, Refined, refine, residuals
+from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, refine, residuals, whitening
 from er3a.vision.vision_findings import (
+    READINGS,
     AllSamplesEqual,
     AngleOrder,
     BoardScale,
@@ -59,14 +60,18 @@ from er3a.vision.vision_findings import (
     OtherDirection,
     OtherReading,
     ParallelTurns,
+    PositionAxes,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
+    RotationReading,
     Streams,
     Suspect,
     SuspectKind,
     TooFewSamples,
     TransposedRotations,
+    UnexplainedResiduals,
+    grave_warnings,
 )
 
 DEVIATIONS = 6.0  # of the angle between two samples; beyond, a pair is in conflict
@@ -244,10 +249,12 @@ def other_reading(samples: CalibrationSet, residual: Reals) -> OtherReading | No
     ----------
     residual : (N, 6), m and rad, of the fit as the samples are read
     """
+    if axes := position_axes(samples):
+        return axes
     given, turned = _misfit(residual)
     if given < 1:
         return None
-    best: tuple[float, OtherReading] | None = None
+    best: tuple[float, RotationReading] | None = None
     for again, finding in _readings(samples, turned):
         mismatch = np.abs(angles_between(again.flange[:, :3, :3]) - angles_between(transposed(again.target)[:, :3, :3]))
         if np.median(mismatch) > MOST_DEVIATION:
@@ -262,13 +269,58 @@ def other_reading(samples: CalibrationSet, residual: Reals) -> OtherReading | No
     return best[1] if best else None
 
 
+SIGNED_AXES: dict[str, Reals] = {
+    ", ".join("-" * (sign < 0) + "xyz"[axis] for sign, axis in zip(signs, order)): np.diag(signs) @ np.eye(3)[[*order]]
+    for order in permutations(range(3))
+    for signs in product((1.0, -1.0), repeat=3)
+}
+"""What axes may be taken for x, y, z, first as they are: matrices (3, 3) by name."""
+LEAST_MISREAD = 3e-3  # m; residuals below are no wrong axes
+
+
+def position_axes(samples: CalibrationSet) -> PositionAxes | None:
+    """Axes negated or swapped in the positions of a stream, by which the samples fit much better; None if by none.
+
+    Turning angles and orientations don't show that. With the rotation that the orientations alone give, positions of
+    camera and board are linear in all, so that each of the 47 readings of a stream is one least-squares fit.
+    """
+    try:
+        R = solved_by("park", samples.hand, samples.target)[0][:3, :3]
+    except np.linalg.LinAlgError:
+        return None
+    if not np.isfinite(R).all():
+        return None
+    hand, seen, read = samples.hand[:, :3, :3], samples.target[:, :3, 3], np.array([*SIGNED_AXES.values()])
+    flange = samples.flange[:, :3, 3]
+    moves = np.concatenate([hand, np.broadcast_to(-np.eye(3), hand.shape)], axis=2).reshape(-1, 6)
+
+    def misfit(seen: Reals, flange: Reals) -> Reals:
+        """Root mean squares (k,) in m of positions (k, N, 3) that are read in k ways."""
+        at = flange if samples.setup == "eye_in_hand" else -np.einsum("nij,knj->kni", hand, flange)
+        right = -(at + np.einsum("nij,jl,knl->kni", hand, R, seen)).reshape(len(at), -1).T
+        left = right - moves @ np.linalg.lstsq(moves, right)[0]
+        rms: Reals = np.sqrt((left**2).mean(axis=0))
+        return rms
+
+    whole = np.broadcast_to(flange, (len(read), *flange.shape))
+    streams: dict[Streams, Reals] = {
+        "target": misfit(np.einsum("kij,nj->kni", read, seen), whole),
+        "flange": misfit(np.broadcast_to(seen, whole.shape), np.einsum("kij,nj->kni", read, flange)),
+    }
+    best: Streams = min(streams, key=lambda stream: round(float(streams[stream].min()), 9))
+    given, k = float(streams[best][0]), int(streams[best].argmin())
+    if given < LEAST_MISREAD or streams[best][k] > given / MUCH_BETTER:
+        return None
+    return PositionAxes(best, [*SIGNED_AXES][k], 1000 * given, 1000 * float(streams[best][k]))
+
+
 def _misfit(residual: Reals) -> tuple[float, float]:
     """Residuals (N, 6) in what a camera of any use keeps, both parts added; and root mean square of the turns, deg."""
     distance, turn = (float(np.sqrt((residual[:, part] ** 2).mean())) for part in (slice(3), slice(3, 6)))
     return distance / MUCH_DISTANCE + turn / MUCH_ROTATION, float(np.degrees(turn))
 
 
-def _readings(samples: CalibrationSet, given: float) -> Iterator[tuple[CalibrationSet, OtherReading]]:
+def _readings(samples: CalibrationSet, given: float) -> Iterator[tuple[CalibrationSet, RotationReading]]:
     for stream in STREAMS:
         for shift in (0, 2):  # x, y, z, w taken for w, x, y, z, and the other way round
             yield _with(samples, stream, partial(_rolled, shift=shift)), QuaternionOrder(stream, given, given)
@@ -435,13 +487,14 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     warnings: list[CalibrationWarning] = [angles.warning] if angles.warning else []
     directions = directions_tried(kept, refined)
     warnings += _warnings(kept, refined, greatest, apart, directions)
-    half_width = scipy.special.stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(refined.covariance))
+    covariance = refined.covariance + _shared_covariance(kept, refined)
+    half_width = scipy.special.stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(covariance))
     found = HandEye(
         samples=samples,
         used=used,
         X=refined.X,
         Y=refined.Y,
-        covariance=refined.covariance,
+        covariance=covariance,
         half_width=half_width,
         residual=residuals(samples.hand, samples.target, refined.X, refined.Y)[0],
         scatter=float(refined.scatter),
@@ -494,6 +547,21 @@ def _fitted(samples: CalibrationSet) -> Refined:
     return found
 
 
+def _shared_covariance(samples: CalibrationSet, refined: Refined) -> Reals:
+    """What errors that all samples share add to the covariance of the two poses, (12, 12)."""
+    if samples.shared is None:
+        return np.zeros((UNKNOWNS, UNKNOWNS))
+    seen = PoseObservations(
+        samples.setup, samples.hand, samples.target, samples.camera_covariance, samples.flange_covariance
+    )
+    sigma = np.broadcast_to(np.repeat(refined.deviations, 3), (len(samples), 6))
+    W = whitening(seen, sigma, refined.X, refined.Y)
+    J = W @ residuals(samples.hand, samples.target, refined.X, refined.Y)[1]
+    moves = np.linalg.solve(np.einsum("nki,nkj->ij", J, J), np.einsum("nki,nkj->ij", J, W @ samples.shared))
+    added: Reals = moves @ moves.T
+    return added
+
+
 def _check_determined(samples: CalibrationSet) -> tuple[float, float]:
     """The greatest turn between two samples and how far the rotation axes leave one direction, rad."""
     if len(samples) < LEAST_SAMPLES:
@@ -537,6 +605,10 @@ def _warnings(
     factor, half_width = board_scale(samples, refined)
     if abs(factor - 1) > max(2 * half_width, LEAST_SCALE_ERROR) and factor > SURE_SCALE * half_width:
         found.append(BoardScale(factor, half_width))
+    size, turn = _misfit(refined.residual)
+    if size > 1 and not grave_warnings(found):
+        distance = float(1000 * np.sqrt((refined.residual[:, :3] ** 2).mean()))
+        found.append(UnexplainedResiduals(distance, turn, READINGS))
     return found
 
 

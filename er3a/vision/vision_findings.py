@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from er3a.errors import Er3aError
 
@@ -92,6 +93,31 @@ class TransposedRotations:
 
 
 @dataclass(frozen=True)
+class PositionAxes:
+    """The samples fit if the positions of a stream are read as ``axes``: -x, z, y is x negated, y and z swapped."""
+
+    stream: Streams
+    axes: str
+    rms_given_mm: float
+    rms_other_mm: float
+    code: Literal["position_axes"] = "position_axes"
+
+
+ReadingKind = Literal["quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction"]
+READINGS: tuple[ReadingKind, ...] = get_args(ReadingKind)
+
+
+@dataclass(frozen=True)
+class UnexplainedResiduals:
+    """The residuals are larger than those of a camera of any use, and none of the causes ``tried`` explains them."""
+
+    rms_mm: float
+    rms_deg: float
+    tried: tuple[ReadingKind, ...]
+    code: Literal["unexplained_residuals"] = "unexplained_residuals"
+
+
+@dataclass(frozen=True)
 class OtherDirection:
     """The samples exclude the direction in which they are given; with these streams inverted they fit."""
 
@@ -127,17 +153,33 @@ class MoreScatter:
     code: Literal["more_scatter"] = "more_scatter"
 
 
-OtherReading = QuaternionOrder | AngleOrder | TransposedRotations
+RotationReading = QuaternionOrder | AngleOrder | TransposedRotations
+OtherReading = RotationReading | PositionAxes
 CalibrationWarning = (
     NoMajority
     | QuaternionOrder
     | AngleOrder
     | TransposedRotations
+    | PositionAxes
+    | UnexplainedResiduals
     | OtherDirection
     | BoardScale
     | LittleMotion
     | MoreScatter
 )
+
+
+MUCH_SCATTER = 3.0
+_GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, *get_args(OtherReading))
+
+
+def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationWarning, ...]:
+    """Those with which no calibration can be used; samples that exclude their direction are judged by that."""
+    return tuple(
+        each
+        for each in warnings
+        if isinstance(each, _GRAVE) or (isinstance(each, MoreScatter) and each.scatter > MUCH_SCATTER)
+    )
 
 
 @dataclass(frozen=True)

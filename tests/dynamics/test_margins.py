@@ -279,7 +279,8 @@ def test_times_under_torques_keep_the_limits_and_use_them(arm, viscous):
     assert np.abs(speed - between)[5:-5].max() < 0.02
 
 
-def test_times_under_torques_are_those_of_toppras_own_constraint(arm):
+def toppras_own(arm: Robot, nodes: np.ndarray) -> float:
+    """The shortest time without viscous friction, by toppra's spline, times and torque constraint."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from toppra import SplineInterpolator
@@ -288,7 +289,6 @@ def test_times_under_torques_are_those_of_toppras_own_constraint(arm):
     drives = replace(arm.masses.drives, viscous=np.zeros(6))
     arm = arm.replace(masses=replace(arm.masses, drives=drives))
     bare = arm.replace(masses=replace(arm.masses, drives=replace(drives, coulomb=np.zeros(6))))
-    nodes = path()
     torque = JointTorqueConstraint(
         lambda *row: er3a.torques(bare, *row), np.stack([-PEAK, PEAK], axis=1), known(drives.coulomb)
     )
@@ -296,9 +296,35 @@ def test_times_under_torques_are_those_of_toppras_own_constraint(arm):
     speed = JointVelocityConstraint(np.array([[-4.0, 4.0]] * 6))
     way = np.linspace(0, 1, len(nodes))
     solver = TOPPRA([torque, speed], SplineInterpolator(way, nodes), gridpoints=way, solver_wrapper="seidel")
-    other = solver.compute_trajectory(0, 0).duration
-    found = fastest_under_torques(arm_model(arm), nodes, np.full(6, 4.0), PEAK).timed.duration
-    assert found == pytest.approx(other, rel=2e-3)
+    return float(solver.compute_trajectory(0, 0).duration)
+
+
+def test_times_under_torques_are_those_of_toppras_own_constraint(arm):
+    own = arm.replace(masses=replace(arm.masses, drives=replace(arm.masses.drives, viscous=np.zeros(6))))
+    found = fastest_under_torques(arm_model(own), path(), np.full(6, 4.0), PEAK)
+    assert found.timed.duration == pytest.approx(toppras_own(arm, path()), rel=2e-3)
+    assert found.least == found.timed.duration
+
+
+@pytest.mark.parametrize("viscous", [0.0, 1.0])
+def test_the_shortest_time_falls_to_the_optimum_as_nodes_are_added(arm, viscous):
+    """A path on which the joint that is hardest pressed changes again and again, against toppra's own spline."""
+    through = np.random.default_rng(2).uniform(-1, 1, (6, 6))
+    curve = scipy.interpolate.CubicSpline(np.linspace(0, 1, 6), through)
+    drives = replace(arm.masses.drives, viscous=np.full(6, viscous))
+    own = arm.replace(masses=replace(arm.masses, drives=drives))
+    runs = [
+        fastest_under_torques(arm_model(own), curve(np.linspace(0, 1, count)), np.full(6, 4.0), PEAK)
+        for count in (101, 201, 401, 801)
+    ]
+    times = np.array([each.timed.duration for each in runs])
+    least = np.array([each.least for each in runs])
+    assert (np.diff(times) < 0).all()
+    assert (-np.diff(times)[1:] < -np.diff(times)[:-1] / 2).all()
+    assert (least <= times).all()
+    assert (times <= least * 1.002).all()
+    if not viscous:
+        assert times[-1] == pytest.approx(toppras_own(arm, curve(np.linspace(0, 1, 801))), rel=5e-4)
 
 
 def test_demands_of_a_drive_in_closed_form():
@@ -321,7 +347,9 @@ def test_times_under_torques_are_those_of_full_thrust_and_full_braking(viscous):
         name="one", title="one", convention="standard", a=[0.5], alpha=[0.0], d=[0.0], direction=[1.0], offset=[0.0],
         lower=[-3.0], upper=[3.0], masses=Masses((LinkMass(1, body),), drives),
     )  # fmt: skip
-    found = fastest_under_torques(arm_model(one), np.array([[0.0], [angle]]), np.array([1e3]), np.array([peak]))
+    found = fastest_under_torques(
+        arm_model(one), np.linspace(0, angle, 401)[:, None], np.array([1e2]), np.array([peak])
+    )
     up, down = (peak - dry) / inertia, (peak + dry) / inertia
 
     def halves(top: float) -> tuple[float, float]:
@@ -335,7 +363,8 @@ def test_times_under_torques_are_those_of_full_thrust_and_full_braking(viscous):
     highest = up * inertia / viscous * (1 - 1e-12) if viscous else 100.0
     shortest = halves(scipy.optimize.brentq(lambda top: halves(top)[0] - angle, 1e-6, highest))[1]
     assert np.abs(found.torques).max() <= peak * (1 + 1e-3)
-    assert shortest * (1 - 1e-6) <= found.timed.duration <= shortest * (1.1 if viscous else 1.001)
+    assert shortest * (1 - 1e-6) <= found.timed.duration <= shortest * 1.01
+    assert found.least <= found.timed.duration <= found.least * 1.005
 
 
 @pytest.mark.long

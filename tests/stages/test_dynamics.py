@@ -63,7 +63,7 @@ def a_study(folder: Path, robot: Change = lambda content: None, **changes: Any) 
     robot(content)
     (folder / "er3a_c60.yaml").write_text(yaml.safe_dump(content))
     paths = yaml.safe_load(Path("data/paths/er3a_c60.yaml").read_text(encoding="utf-8"))
-    kept = ("joint_move", "line_clean", "line_out")
+    kept = ("joint_move", "line_clean", "line_shoulder", "line_out")
     paths["paths"] = [path for path in paths["paths"] if path["name"] in kept]
     (folder / "paths.yaml").write_text(yaml.safe_dump(paths))
     study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
@@ -124,11 +124,13 @@ def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     verdict = summary.verdict.finding
     assert (bare.status, type(verdict)) == ("no_reference", NoLimits)
     assert verdict.missing_links == (6,)
-    assert not verdict.inferred
+    assert verdict.grade == "export"
+    assert "of grade export, neither measured nor given" in say(verdict)
     assert summary.findings == (MissingLink(6, singular=True),)
     assert {each.what for each in summary.unknown} >= {"masses", "peak", "rated", "friction", "wrist_moment", "load"}
     assert summary.uses == ()
-    assert all(path.payload is path.speed_scale is path.torque_timed_s is None for path in summary.paths)
+    assert all(path.payload is path.speed_scale is None for path in summary.paths)
+    assert not any(path.torque_times for path in summary.paths)
     assert summary.power_imbalance < 1e-6
     assert [path.name for path in summary.paths if not path.complete] == ["line_out"]
 
@@ -157,12 +159,63 @@ def test_within_the_limits_it_fits(full):
     path = next(path for path in summary.paths if path.name == "joint_move")
     assert path.payload.value > 0.5
     assert path.speed_scale.value > 1
-    assert 0 < path.torque_timed_s < path.duration_s
+    times = [each.time_s for each in path.torque_times]
+    assert 0 < times[-1] < times[0] < path.duration_s
+    assert all(0.998 * each.time_s < each.least_s <= each.time_s for each in path.torque_times)
     motor = summary.motors[1]
-    assert motor.peak == max(load.peak for path in summary.paths for load in path.joints if load.joint == 2)
+    peaks = {path.name: load.peak for path in summary.paths for load in path.joints if load.joint == 2}
+    assert motor.peak == max(peaks["joint_move"], peaks["line_clean"]) < peaks["line_shoulder"]
     assert motor.motor_torque == pytest.approx(motor.peak / 100)
     assert motor.motor_rpm == pytest.approx(motor.speed / 360 * 60 * 100)
     assert motor.inertia_ratio == pytest.approx(motor.inertia_high / 0.05)
+
+
+def test_paths_that_may_not_be_run_count_for_nothing(full, tmp_path):
+    study, found = full
+    summary = found.results.summary
+    counts = {path.name: (path.verdict, path.counts) for path in summary.paths}
+    assert counts == {
+        "joint_move": ("safe", True),
+        "line_clean": ("safe", True),
+        "line_shoulder": ("too fast for the assumed limits", False),
+        "line_out": ("unreachable", False),
+    }
+    assert {use.path for use in summary.uses} == {None, "joint_move", "line_clean"}
+    report(study, found, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    own = page[page.index("why it may not be run") :]
+    assert own.index("line_shoulder") < own.index("line_out") < own.index("Path playback")
+
+
+def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
+    left = {each.subject: each for each in bare.results.summary.not_examined}
+    assert left["link_masses"].names == ("6",)
+    assert left["friction"].names == left["peak_torques"].names == tuple(f"J{j}" for j in range(1, 7))
+    assert left["load"].names == ()
+    assert left["paths_not_run"].names == ("line_shoulder", "line_out")
+    assert left["torque_peaks"].amount == 101
+    named = {each.subject for each in full[1].results.summary.not_examined}
+    assert named == {"paths_not_run", "torque_peaks", "program_torques", "drive_behaviour"}
+
+    def change(content: dict[str, Any]) -> None:
+        limited(1.0)(content)
+        del content["drives"]["rows"][3]["coulomb_n_m"], content["drives"]["rows"][3]["viscous_n_m_s_rad"]
+
+    found = computed(tmp_path, a_study(tmp_path, change, entry={"payload": CLAIM | {"body": LOAD}}))
+    verdict = found.results.summary.verdict.finding
+    assert (found.status, type(verdict), verdict.unknown) == ("caution", Marginal, ("friction",))
+    assert "not everything was examined" in say(verdict)
+    assert "friction of the joints" in say(verdict)
+
+
+def test_a_path_that_is_to_be_run_and_may_not_be_is_no_pass(tmp_path):
+    study = a_study(tmp_path, limited(1.0), entry={"payload": CLAIM | {"body": LOAD}})
+    paths = yaml.safe_load((tmp_path / "paths.yaml").read_text())
+    paths["paths"] = [{**each, "expect": None} for each in paths["paths"] if each["name"] != "line_out"]
+    (tmp_path / "paths.yaml").write_text(yaml.safe_dump(paths))
+    verdict = computed(tmp_path, study).results.summary.verdict
+    assert (verdict.status, verdict.finding.not_run) == ("caution", ("line_shoulder",))
+    assert "1 path may not be run as it is and counts for nothing: line_shoulder" in say(verdict.finding)
 
 
 def test_the_wrist_is_compared_at_rest_and_along_the_paths(full):
@@ -215,7 +268,7 @@ def test_a_guess_is_made_on_request_and_graded_inferred(tmp_path):
 
     found = computed(tmp_path, a_study(tmp_path, change, settings={"capsule_density_kg_m3": 2000.0}))
     summary = found.results.summary
-    assert summary.verdict.finding.inferred
+    assert summary.verdict.finding.grade == "inferred"
     assert summary.masses.grade == "inferred"
     assert [link.link for link in summary.masses.links if link.estimated and link.mass_kg] == [0, 1, 2, 3, 4, 6]
     assert summary.masses.tolerances.mass_percent == 50

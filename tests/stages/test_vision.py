@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from er3a.files.shipped import ROOT
+from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
@@ -39,6 +40,13 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
     assert summary.verdict.status == "pass"
     assert summary.verdict.finding.left_out == ("pose_12",)
+    assert summary.verdict.finding.simulated
+    assert "The camera is simulated" in say(summary.verdict.finding)
+    assert summary.verdict.shapes.near == ()
+    left = {each.subject: each.names for each in summary.not_examined}
+    assert left["left_out_samples"] == ("pose_12",)
+    assert {"real_camera", "detections", "gripped_parts", "shallow_overlaps"} <= left.keys()
+    assert "touched_points" not in left
     assert {each.name: each.outcome for each in summary.objects} == {
         "can": "grasped",
         "box": "grasped",

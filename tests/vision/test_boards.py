@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import sys
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,8 +12,21 @@ import pytest
 from PIL import Image
 
 from er3a.errors import Er3aError, InputError
-from er3a.files.hand_eye_file import load_hand_eye
-from er3a.vision.boards import Board, BoardNotFoundError, Camera, ambiguous_tilts, board_drawing, board_views, opencv
+from er3a.files.hand_eye_file import load_hand_eye, read_calibration
+from er3a.vision.boards import (
+    Board,
+    BoardlessImage,
+    BoardNotFoundError,
+    Camera,
+    _pose,
+    ambiguous_tilts,
+    board_drawing,
+    board_points,
+    board_views,
+    intrinsics_covariance,
+    opencv,
+    views_of_corners,
+)
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
 from testing.hand_eye_sets import off, pose
@@ -82,14 +96,12 @@ def test_rendered_boards_are_found_where_they_are(board):
 def test_covariances_are_those_of_corners_that_scatter():
     """Poses from corners with drawn errors scatter as the covariance says; no image is needed for that."""
     random = np.random.default_rng(2)
-    from er3a.vision.boards import _pose, board_points
-
     points, T = board_points(CHESS), board_places(random, 1)[0]
     exact = cv2.projectPoints(points, cv2.Rodrigues(T[:3, :3])[0], T[:3, 3], K, np.zeros(5))[0].reshape(-1, 2)
     camera = Camera(K, np.zeros(5))
     found = [_pose(points, exact + random.normal(0, 0.3, exact.shape), camera, 0.3) for _ in range(400)]
-    errors = np.array([off(each[0], T) for each in found])
-    white = np.linalg.solve(np.linalg.cholesky(found[0][1]), errors.T)
+    errors = np.array([off(each.T, T) for each in found])
+    white = np.linalg.solve(np.linalg.cholesky(found[0].covariance), errors.T)
     assert np.abs(np.cov(white) - np.eye(6)).max() < 0.25
 
 
@@ -122,10 +134,44 @@ def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     assert np.linalg.norm(off(found.X, X)[3:]) < np.radians(0.2)
     assert np.abs(off(found.Y, Y)[:3]).max() < 2e-3
     Image.fromarray(np.full((960, 1280), 128, np.uint8)).save(tmp_path / "5.png")
-    with pytest.raises(InputError, match="0 corners of a charuco board of 7 x 5") as caught:
-        load_hand_eye(tmp_path / "set.yaml")
-    assert caught.value.file.endswith("5.png")
-    assert caught.value.field == "sample 6"
+    again, _, images = read_calibration(tmp_path / "set.yaml", None)
+    assert images.boardless == (BoardlessImage("row 7", "5.png", 0),)
+    assert again.names == tuple(name for name in samples.names if name != "row 7")
+    np.testing.assert_array_equal(again.target, np.delete(samples.target, 5, axis=0))
+    np.testing.assert_array_equal(again.flange, np.delete(samples.flange, 5, axis=0))
+
+
+def test_without_any_board_in_the_images_there_is_one_error(tmp_path):
+    for number in range(3):
+        Image.fromarray(np.full((96, 128), 128, np.uint8)).save(tmp_path / f"{number}.png")
+    head = HEAD.format(setup="eye_to_hand") + (
+        "images:\n  board: {pattern: charuco, squares: [7, 5], square_mm: 30, marker_mm: 22}\n"
+    )
+    flange = np.stack([pose([0, 0, k], [0.4, 0, 0.4]) for k in range(3)])
+    table = columns(flange, "flange", "quaternion") | {"image": np.array([f"{n}.png" for n in range(3)])}
+    with pytest.raises(InputError, match="no image shows a charuco board of 7 x 5: 0 corners in the best of 3 images"):
+        load_hand_eye(write(tmp_path, table, head))
+
+
+@pytest.mark.long
+def test_intervals_include_intrinsics_that_are_estimated_from_the_same_images():
+    """Corners with drawn errors: errors of the camera's pose scatter as stated, and OpenCV's deviations agree."""
+    random, points = np.random.default_rng(4), board_points(CHESS)
+    X, Y = pose([120, 5, 30], [0.7, 0.1, 0.6]), pose([3, -4, 20], [0.02, 0.03, 0.05])
+    places = board_places(random, 12)
+    flange = np.array([X @ T @ np.linalg.inv(Y) for T in places])
+    squares, errors = [], []
+    for _ in range(10):
+        views = views_of_corners([points] * 12, seen_corners(random, places), SIZE)
+        samples = CalibrationSet(
+            "eye_to_hand", flange, views.target, camera_covariance=views.covariance, shared=views.shared
+        )
+        found = calibrate_hand_eye(samples)
+        errors.append(off(found.X, X))
+        squares.append(errors[-1] @ np.linalg.solve(found.covariance[:6, :6], errors[-1]) / 6)
+    narrow = calibrate_hand_eye(replace(samples, shared=None)).covariance[:6, :6]
+    assert 0.5 < np.mean(squares) < 1.8
+    assert np.mean([error @ np.linalg.solve(narrow, error) / 6 for error in errors]) > 3
 
 
 def test_an_image_of_another_size_and_squares_in_metres_are_named(tmp_path):
@@ -144,13 +190,22 @@ def test_an_image_of_another_size_and_squares_in_metres_are_named(tmp_path):
         load_hand_eye(write(tmp_path, table, metres))
 
 
-@pytest.mark.long
-def test_intrinsics_estimated_from_the_images_come_with_deviations():
-    random = np.random.default_rng(4)
-    images = [rendered(CHESS, T, random) for T in board_places(random, 8)]
-    camera = board_views(images, CHESS).camera
+def test_intrinsics_estimated_from_corners_come_with_opencvs_deviations():
+    corners = seen_corners(np.random.default_rng(4), board_places(np.random.default_rng(4), 8))
+    points = [board_points(CHESS)] * 8
+    camera = views_of_corners(points, corners, SIZE).camera
     assert (np.abs(camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]] - [1100, 1105, 640, 470]) < 12).all()
-    assert (camera.deviations[:4] > 0).all()
+    single = [np.array(part, np.float32) for part in (points, corners)]
+    deviations = cv2.calibrateCameraExtended([*single[0]], [*single[1]], SIZE, None, None)[5].ravel()[:9]
+    found = [_pose(P, c, camera, 0.3) for P, c in zip(points, corners)]
+    np.testing.assert_allclose(np.sqrt(np.diag(intrinsics_covariance(found, corners))), deviations, rtol=0.05)
+
+
+def seen_corners(random: np.random.Generator, places: list[np.ndarray]) -> list[np.ndarray]:
+    """Corners of the chessboard at places, with drawn errors."""
+    points, none = board_points(CHESS), np.zeros(5)
+    exact = [cv2.projectPoints(points, cv2.Rodrigues(T[:3, :3])[0], T[:3, 3], K, none)[0][:, 0] for T in places]
+    return [each + random.normal(0, 0.3, each.shape) for each in exact]
 
 
 def test_another_board_is_not_found():

@@ -24,7 +24,7 @@ from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import within
 from er3a.vision.calibration_set import moved, step_between
 from er3a.vision.grasp_motion import PARTS
-from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, NoTransfer, plan_grasp
+from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, GraspUnlikely, NoTransfer, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.next_view import board_visible, next_view
 from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error
@@ -104,6 +104,27 @@ def test_repeatability_after_iso_9283_comes_back_from_its_deviation():
     drawn = np.random.default_rng(8).normal(0, accuracy.position_deviation, (1_000_000, 3))
     distance = np.linalg.norm(drawn - drawn.mean(axis=0), axis=1)
     assert distance.mean() + 3 * distance.std() == pytest.approx(1e-4, rel=2e-3)
+
+
+def test_an_object_is_graspable_only_at_the_probability_asked_for(cell):
+    made, robot, _ = cell
+    if made is not FIXED:
+        pytest.skip("one cell shows it")
+    file, task, _ = task_of(made, robot)
+    target = file.objects[0].detected()
+    T = made.X @ target.T_camera_object
+
+    def plan(sigma: float, level: float):
+        own = replace(task, needs=replace(NEEDS, probability=level))
+        return plan_grasp(own, target, T, lambda q: np.eye(6) * sigma**2)
+
+    sure, wide = plan(1e-4, 0.95), plan(2e-2, 0.95)
+    assert sure.chosen.probability > 0.99
+    assert wide.chosen is None
+    assert isinstance(wide.refusal, GraspUnlikely)
+    assert wide.refusal.probability < 0.1
+    assert wide.refusal.needed == 0.95
+    assert plan(2e-2, 0.0).chosen.probability == pytest.approx(wide.refusal.probability, abs=0.05)
 
 
 @pytest.mark.long

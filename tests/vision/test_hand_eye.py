@@ -9,11 +9,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
+from er3a.pipeline.messages.vision import say
 from er3a.vision.calibration_set import CalibrationSet, moved
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
-from er3a.vision.hand_eye import calibrate_hand_eye
+from er3a.vision.hand_eye import calibrate_hand_eye, position_axes
 from er3a.vision.likelihood import flange_to_camera, residuals
 from er3a.vision.vision_findings import (
+    READINGS,
     AllSamplesEqual,
     AngleOrder,
     BoardScale,
@@ -25,11 +27,14 @@ from er3a.vision.vision_findings import (
     OtherDirection,
     OtherReading,
     ParallelTurns,
+    PositionAxes,
     QuaternionOrder,
     RepeatedPose,
     RotationMismatch,
     TooFewSamples,
     TransposedRotations,
+    UnexplainedResiduals,
+    grave_warnings,
 )
 from testing.hand_eye_coverage import pose_coverage
 from testing.hand_eye_sets import X_TRUE, Y_TRUE, covariance, flange_poses, noisy, off, pose, seen
@@ -243,6 +248,51 @@ def test_orientations_read_by_another_convention_are_named(stream, how):
     if kind is AngleOrder:
         products = {"kuka": "Rz(roll) Ry(pitch) Rx(yaw)", "static_xyz": "Rx(roll) Ry(pitch) Rz(yaw)"}
         assert found.product == products[how]
+
+
+@pytest.mark.parametrize("setup", SETUPS)
+@pytest.mark.parametrize("stream", ["target", "flange"])
+@pytest.mark.parametrize("axes", ["x, -y, -z", "y, x, z", "-x, y, z", "z, -x, y"])
+def test_axes_negated_or_swapped_in_positions_are_named(setup, stream, axes):
+    """Orientations fit, so that angles say nothing: the position alone is written by other axes."""
+    samples = a_set(setup, 14)
+    T, given = getattr(samples, stream), getattr(samples, stream)[:, :3, 3].copy()
+    for k, name in enumerate(axes.split(", ")):
+        T[:, "xyz".index(name[-1]), 3] = given[:, k] * (-1 if name[0] == "-" else 1)
+    assert position_axes(a_set(setup, 14)) is None
+    found = calibrate_hand_eye(samples)
+    (named,) = [each for each in found.warnings if isinstance(each, PositionAxes)]
+    assert (named.stream, named.axes) == (stream, axes)
+    assert named.rms_other_mm < 3 < 15 < named.rms_given_mm
+    assert grave_warnings(found.warnings) == (named,)
+
+
+def test_residuals_that_nothing_explains_are_an_error():
+    samples = a_set("eye_in_hand", 14)
+    samples.target[:, :3, 3] += np.random.default_rng(3).normal(0, 0.1, (15, 3))
+    found = calibrate_hand_eye(samples)
+    (grave,) = grave_warnings(found.warnings)
+    assert isinstance(grave, UnexplainedResiduals)
+    assert grave.rms_mm > 30
+    assert set(grave.tried) == set(READINGS)
+    assert "nothing tried explains them" in say(grave)
+
+
+def test_motions_near_half_turns_and_few_wide_ones_spoil_no_closed_form():
+    """Errors decide there which sign a quaternion has; Tsai, Horaud and Daniilidis need the same for hand and eye."""
+    worst = {name: 0.0 for name in METHOD_NAMES}
+    by_cv = dict(worst)
+    for seed, turn in [(seed, turn) for seed in range(12) for turn in (1.5, 0.07)]:
+        random = np.random.default_rng(seed)
+        flange = flange_poses(random, 15, turn=turn)
+        B = noisy(seen("eye_in_hand", flange), random)
+        park = np.linalg.norm(off(solved_by("park", flange, B)[0], X_TRUE)[:3])
+        for name in ("tsai", "horaud", "daniilidis"):
+            for found, X in ((worst, solved_by(name, flange, B)[0]), (by_cv, by_opencv(name, flange, B)[0])):
+                found[name] = max(found[name], np.linalg.norm(off(X, X_TRUE)[:3]) / park)
+    assert worst["tsai"] < 3 < by_cv["tsai"], (worst, by_cv)
+    for name in ("horaud", "daniilidis"):
+        assert worst[name] <= max(3, by_cv[name] * 1.001), (worst, by_cv)
 
 
 @pytest.mark.parametrize("setup", SETUPS)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
 
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import load_hand_eye, read_calibration
@@ -17,6 +18,7 @@ from er3a.files.shipped import ROOT
 from er3a.files.vision_file import load_vision
 from er3a.files.vision_inputs import vision_files
 from er3a.kinematics.forward import forward
+from er3a.pipeline.cli import app
 from testing import camera_cells
 from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
 
@@ -188,3 +190,15 @@ def test_vision_files_name_all_that_they_rest_on(name):
     load_vision(file, load_robot(name))
     assert len(vision_files(file)) == 4
     assert all(each.is_file() for each in vision_files(file))
+
+
+def test_the_command_ends_with_an_error_where_a_calibration_cant_be_used(tmp_path, poses):
+    flange, target = poses
+    table = columns(flange, "flange", "quaternion")
+    sound = write(tmp_path, table | columns(target, "target", "quaternion"))
+    assert CliRunner().invoke(app, ["hand-eye", str(sound)]).exit_code == 0
+    target[:, 1:3, 3] *= -1
+    wrong = write(tmp_path, table | columns(target, "target", "quaternion"))
+    found = CliRunner().invoke(app, ["hand-eye", str(wrong)])
+    assert found.exit_code == 1
+    assert "positions of the board have axes negated or swapped: read as (x, -y, -z)" in " ".join(found.output.split())

@@ -182,7 +182,10 @@ def hand_eye(
     robot: Annotated[str | None, typer.Option(help="whose table turns joint angles into poses: a name or file")] = None,
     as_json: AsJson = False,
 ):
-    """Estimate where a camera is, with 95 % intervals, and name the samples and conventions that can't be right."""
+    """Estimate where a camera is, with 95 % intervals, and name the samples and conventions that can't be right.
+
+    Ends with code 1 if the calibration can't be used.
+    """
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
@@ -191,7 +194,7 @@ def hand_eye(
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
     from er3a.vision.table_corrections import correct_table
-    from er3a.vision.vision_findings import HandEyeError
+    from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
     arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
     with shown_work(f"{file}: the samples are read") as at:
@@ -206,9 +209,12 @@ def hand_eye(
         table = correct_table(found, arm, asked) if arm and asked else None
     if as_json:
         print_json(hand_eye_record(found, offset, table))
-        return
-    told = [f"sample {say(each)}" for each in open_tilts]
-    print("\n".join([hand_eye_lines(found, offset), *told, *(correction_lines(table) if table else [])]))
+    else:
+        left_out = images.boardless if images else ()
+        told = [f"sample {say(each)}" for each in (*open_tilts, *left_out)]
+        print("\n".join([hand_eye_lines(found, offset), *told, *(correction_lines(table) if table else [])]))
+    if grave_warnings(found.warnings) or found.directions[0].status == "excluded":
+        raise typer.Exit(1)
 
 
 @app.command(rich_help_panel=ROBOT_FILES)

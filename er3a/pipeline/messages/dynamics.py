@@ -8,6 +8,7 @@ from er3a.dynamics.plausibility import (
     ImpossibleInertia,
 )
 from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.dynamics.model import (
     AllWithin,
@@ -21,6 +22,7 @@ from er3a.pipeline.stages.dynamics.model import (
     Use,
 )
 from er3a.robots.masses import NoBody
+from er3a.robots.robot import Grade
 
 QUANTITIES: dict[Quantity, str] = {
     "peak": N_("peak torque"),
@@ -42,7 +44,7 @@ NEEDS: dict[Need, str] = {
     "load": N_("mass, centre and inertia of tool and payload"),
 }
 FIGURES = {
-    "paths": N_("Paths computed"),
+    "paths": N_("Paths that count"),
     "mass": N_("Mass of the links"),
     "peak_torque": N_("Greatest torque on a path"),
     "holding_torque": N_("Greatest holding torque found"),
@@ -81,6 +83,9 @@ TEXTS = texts(
             "Marginal: within the limits, but masses are too uncertain or doubtful to rely on it; highest "
             "utilisation: {use}."
         ),
+        "dynamics.marginal#open": (
+            "Within the limits that are known, but not everything was examined; highest utilisation: {use}."
+        ),
         "dynamics.overload": Plural(
             "count",
             "Overload: {beyond} of {count} comparison is beyond its limit; worst: {use}.",
@@ -95,6 +100,15 @@ TEXTS = texts(
             "count", "{count} finding casts doubt on the masses.", "{count} findings cast doubt on the masses."
         ),
         "dynamics.inferred": "Masses are inferred: the results are orders of magnitude only.",
+        "dynamics.graded": (
+            "The masses are of grade {grade}, neither measured nor given by the manufacturer: all torques are as "
+            "uncertain as that grade."
+        ),
+        "dynamics.not_run": Plural(
+            "count",
+            "{count} path may not be run as it is and counts for nothing: {names}.",
+            "{count} paths may not be run as they are and count for nothing: {names}.",
+        ),
         "dynamics.unknown#joints": "{what}: J{numbers}",
         "dynamics.unknown#links": "{what}: link {numbers}",
         "missing_link": by(
@@ -174,14 +188,16 @@ def _(found: Compared) -> str:
     if isinstance(found, AllWithin):
         verdict = sentence("dynamics.fits", use=tightest)
     elif isinstance(found, Marginal):
-        verdict = sentence("dynamics.marginal", use=tightest)
+        masses = found.unsettled or found.doubts or found.grade == "inferred"
+        verdict = sentence("dynamics.marginal" if masses else "dynamics.marginal#open", use=tightest)
     else:
         verdict = sentence("dynamics.overload", count=found.compared, beyond=found.beyond, use=tightest)
-    open_ = ""
-    if found.unlimited:
-        what = joined(map(need_word, found.unlimited), ", ")
-        open_ = sentence("dynamics.unlimited", what=what)
-    return joined([verdict, open_, *_reservations(found)], " ")
+    open_ = not_run = ""
+    if found.unknown:
+        open_ = sentence("dynamics.unlimited", what=joined(map(need_word, found.unknown), ", "))
+    if found.not_run:
+        not_run = sentence("dynamics.not_run", count=len(found.not_run), names=joined(found.not_run, ", "))
+    return joined([verdict, open_, not_run, *_reservations(found)], " ")
 
 
 def _reservations(found: Compared | NoLimits) -> list[str]:
@@ -189,8 +205,16 @@ def _reservations(found: Compared | NoLimits) -> list[str]:
     return [
         sentence("dynamics.massless", count=len(found.missing_links), links=missing) if missing else "",
         sentence("dynamics.doubts", count=found.doubts) if found.doubts else "",
-        sentence("dynamics.inferred") if found.inferred else "",
+        _graded(found.grade),
     ]
+
+
+def _graded(grade: Grade | None) -> str:
+    if grade is None:
+        return ""
+    if grade == "inferred":
+        return sentence("dynamics.inferred")
+    return sentence("dynamics.graded", grade=word("grade", GRADE_NAMES, grade))
 
 
 @say.register

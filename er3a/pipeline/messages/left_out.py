@@ -25,6 +25,25 @@ TEXTS = texts(
         "left_out.controller_ramps": "the controller's own ramps and blends, which decide times and corners",
         "left_out.joint_vectors": "joint vectors other than {amount:,.0f} random ones: shares are estimates",
         "left_out.lost_cells": "whether {amount:,.0f} cells in which no clear arm was found are really blocked",
+        "left_out.link_masses": "what links without mass add to the torques; they count as massless",
+        "left_out.peak_torques": "peak torques of drives whose limit no document gives",
+        "left_out.rated_torques": "RMS and holding torques of drives whose rated torque no document gives",
+        "left_out.rotor_inertias": "what rotors add to the torques: their inertias are not known",
+        "left_out.friction": "what friction adds to the torques: it is not known",
+        "left_out.wrist_limits": "payload, moments and inertias that the wrist allows, where no document gives them",
+        "left_out.load": "tool and payload: the study gives no mass for them",
+        "left_out.paths_not_run": "paths that may not be run as they are: motors and limits don't count them",
+        "left_out.torque_peaks": "torques of paths between the {amount:,.0f} times computed",
+        "left_out.program_torques": "torques of programs that are not among the paths",
+        "left_out.drive_behaviour": (
+            "what changes with speed, heat and wear in motors, gears and brakes, and what elasticity adds"
+        ),
+        "left_out.real_camera": "what a real camera sees: the samples are simulated",
+        "left_out.boardless_images": "images in which no board was found",
+        "left_out.left_out_samples": "samples that contradict the others: the calibration does not rest on them",
+        "left_out.touched_points": "where the arm really touches what the camera sees: no touched points are given",
+        "left_out.detections": "whether detected objects are where the detector says, within the deviations stated",
+        "left_out.gripped_parts": "collisions of the objects themselves and of a part in the gripper",
     }
 )
 

@@ -14,11 +14,11 @@ from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, 
 from er3a.pipeline.stages.vision.model import (
     DirectionContradicted,
     GraspCounts,
-    UnsureGrasp,
 )
 from er3a.vision.calibration_set import TimeOffset, quaternion_of
 from er3a.vision.grasping import (
     GraspCollides,
+    GraspUnlikely,
     LineLeaves,
     LineUnproven,
     WayCollides,
@@ -30,9 +30,12 @@ from er3a.vision.vision_findings import (
     DirectionTried,
     OtherDirection,
     ParallelTurns,
+    PositionAxes,
     QuaternionOrder,
+    ReadingKind,
     RotationMismatch,
     TransposedRotations,
+    UnexplainedResiduals,
 )
 
 PARTS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
@@ -45,6 +48,13 @@ MENDING = {
     "rotation": N_("no typical detector error explains it"),
 }
 STREAMS = {"flange": N_("flange"), "target": N_("board"), "both": N_("flange and board")}
+READING_WORDS: dict[ReadingKind, str] = {
+    "quaternion_order": N_("order of quaternions"),
+    "angle_order": N_("order of angles"),
+    "transposed_rotations": N_("transposed rotations"),
+    "position_axes": N_("axes of positions negated or swapped"),
+    "other_direction": N_("inverted poses"),
+}
 POSES = {
     "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
     "eye_to_hand": (N_("camera in the base (T_base_camera)"), N_("board on the flange (T_flange_board)")),
@@ -122,9 +132,11 @@ TEXTS = texts(
             "count", "{grasped} of {count} object can be grasped", "{grasped} of {count} objects can be grasped"
         ),
         "grasp_counts#error": "at the worst grasp 95 % of errors stay below {point_mm:.2g} mm",
-        "grasp_counts#uncertain": "uncertain: {unsure:, }",
+        "grasp_counts#simulated": "The camera is simulated: no real one took the samples.",
         "grasp_counts#left_out": "calibrated without {left_out:, }",
-        "unsure_grasp": "{name} ({p:.3g} %)",
+        "grasp_unlikely": (
+            "the gripper's tolerance is kept with a probability of {p:.3g} % at best, and {level:.3g} % is required"
+        ),
         "grasp_collides#apart": (
             "at the grasp {pair} are at most {clearance_mm:.1f} mm apart; {needed_mm:g} mm are required"
         ),
@@ -148,6 +160,7 @@ TEXTS = texts(
             "{sample}: the flat board is seen almost head-on, or too small: the mirrored tilt fits with only "
             "{ratio:.2g} times the error. Take the image from nearer, or tilt the board by 30 deg"
         ),
+        "boardless_image": "{sample}: {corners} corners of the board are found in {image}; the sample is left out",
         "no_majority": (
             "flange and board rotate by different angles in {pairs} of {of} pairs of samples ({median_deg:.3g} deg in "
             "the median): the robot's table, the order of the samples, or the orientations of one stream are wrong"
@@ -191,6 +204,14 @@ TEXTS = texts(
             "the rotations of the {stream} are transposed, its positions are right: read that way the residuals are "
             "{rms_other_deg:.2g} deg, as given {rms_given_deg:.3g} deg; write matrices row by row"
         ),
+        "position_axes": (
+            "the positions of the {stream} have axes negated or swapped: read as ({axes}) the residuals are "
+            "{rms_other_mm:.2g} mm, as given {rms_given_mm:.3g} mm"
+        ),
+        "unexplained_residuals": (
+            "the residuals are {rms_mm:.3g} mm and {rms_deg:.2g} deg, and nothing tried explains them ({causes}): "
+            "check the order of the samples, the board's size, and which tool and which base the poses belong to"
+        ),
         "other_direction#one": (
             "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other "
             "one, or the flange poses are those of the base in the flange's frame (T_flange_base), or the board poses "
@@ -225,24 +246,23 @@ def _(found: DirectionContradicted) -> str:
 
 @say.register
 def _(found: GraspCounts) -> str:
-    grasped = say_as(found, "grasped", count=found.objects + len(found.demonstrations))
+    grasped = say_as(found, "grasped", count=found.objects)
     error = say_as(found, "error") if found.point_mm is not None else ""
-    unsure = say_as(found, "uncertain") if found.unsure else ""
     left = say_as(found, "left_out") if found.left_out else ""
     sentences = [
         grasped if found.objects else "",
         error,
         *listed(found.missed),
-        unsure,
         left,
         demonstrated(found.demonstrations),
     ]
-    return sentence("finding", finding=joined(sentences))
+    simulated = say_as(found, "simulated") if found.simulated else ""
+    return joined([sentence("finding", finding=joined(sentences)), simulated], " ")
 
 
 @say.register
-def _(found: UnsureGrasp) -> str:
-    return say_as(found, p=100 * found.probability)
+def _(found: GraspUnlikely) -> str:
+    return say_as(found, p=100 * found.probability, level=100 * found.needed)
 
 
 @say.register
@@ -287,6 +307,17 @@ def _(found: AngleOrder) -> str:
 @say.register
 def _(found: TransposedRotations) -> str:
     return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
+
+
+@say.register
+def _(found: PositionAxes) -> str:
+    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
+
+
+@say.register
+def _(found: UnexplainedResiduals) -> str:
+    causes = [word("vision.reading", READING_WORDS, kind) for kind in found.tried]
+    return say_as(found, causes=joined(causes, ", "))
 
 
 @say.register

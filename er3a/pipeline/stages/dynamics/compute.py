@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
 from er3a.dynamics.margins import (
     ASSUMED,
@@ -24,8 +25,10 @@ from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.dynamics.wrist import load_diagram, wrist_use
 from er3a.files.robot_library import load_of
+from er3a.files.scene_file import load_scene
+from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.dynamics.model import (
@@ -46,14 +49,18 @@ from er3a.pipeline.stages.dynamics.model import (
     NoLimits,
     Overload,
     PathLoad,
+    ShortestTime,
     TolerancesUsed,
     TorqueRows,
     Use,
     WristMoment,
     hardest_held,
 )
-from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, study_motions
+from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
+from er3a.pipeline.stages.trajectory.judgement import verdict_of as verdict_of_motion
+from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, near_singular, study_motions
 from er3a.pipeline.study import Study
+from er3a.planning.path_verdicts import NOT_TO_BE_RUN, PathVerdict
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
@@ -63,10 +70,10 @@ DynamicsVerdict = Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
 
 
 def drive_uses(robot: Robot, paths: tuple[PathLoad, ...], holding: tuple[HoldingTorque, ...]) -> tuple[Use, ...]:
-    """Peak and effective torques of the paths against peak and rated ones, holding torques against rated ones."""
+    """Peak and effective torques of the paths that count against the drives', holding torques against rated ones."""
     drives, found = drives_of(robot), []
     for path in paths:
-        for load in path.joints:
+        for load in path.joints if path.counts else ():
             peak, rated = (float(limit[load.joint - 1]) for limit in (drives.peak, drives.rated))
             if np.isfinite(peak):
                 upper = load.peak + load.tolerance
@@ -113,46 +120,55 @@ def _open(values: np.ndarray) -> tuple[int, ...]:
     return tuple((np.flatnonzero(np.isnan(values)) + 1).tolist())
 
 
+DOCUMENTED: tuple[Grade, ...] = ("official", "measured")
+
+
 def verdict_of(
-    paths: tuple[PathLoad, ...],
+    paths: list[PathTorques],
     holding: tuple[HoldingTorque, ...],
     uses: tuple[Use, ...],
     findings: tuple[MassFinding, ...],
     unknown: tuple[DataOpen, ...],
     masses: MassesUsed | None,
+    *,
+    skipped: tuple[str, ...] = (),
 ) -> DynamicsVerdict:
-    """Fit, marginal, overload; no_reference where there is nothing to compare, or no limit to compare it with."""
+    """Fit, marginal, overload; no_reference where there is nothing to compare, or no limit to compare it with.
+
+    It fits only if nothing that the files leave open could change that. ``skipped``: paths that can't be followed.
+    """
     missing = tuple(found.link for found in findings if isinstance(found, MissingLink))
     doubts = len(findings) - len(missing)
-    inferred = masses is not None and masses.grade == "inferred"
+    shown = missing, doubts, None if masses is None or masses.grade in DOCUMENTED else masses.grade
     if not uses:
         if not holding:
             return Verdict("no_reference", NoData(unknown))
-        return Verdict("no_reference", _no_limits(paths, holding, missing, doubts, inferred))
+        return Verdict("no_reference", _no_limits([path.summary for path in paths], holding, *shown))
     beyond = sum(use.ratio > 1 for use in uses)
-    unlimited: tuple[Need, ...] = tuple(
-        each.what for each in unknown if each.what in ("peak", "rated", "wrist_moment", "wrist_inertia", "payload")
-    )
-    at_limit = any(use.upper > use.allowed for use in uses)
-    kind = Overload if beyond else Marginal if at_limit or doubts else AllWithin
-    status: Status = "fail" if beyond else "caution" if at_limit or doubts else "pass"
-    return Verdict(status, kind(len(uses), beyond, uses[0], unlimited, missing, doubts, inferred))
+    unsettled = sum(use.ratio <= 1 and use.upper > use.allowed for use in uses)
+    needs = tuple(each.what for each in unknown)
+    not_run = (*skipped, *(path.summary.name for path in paths if path.asked and not path.summary.counts))
+    guessed = masses is not None and masses.grade == "inferred"
+    open_ = unsettled or doubts or needs or not_run or guessed
+    kind = Overload if beyond else Marginal if open_ else AllWithin
+    status: Status = "fail" if beyond else "caution" if open_ else "pass"
+    return Verdict(status, kind(len(uses), beyond, uses[0], unsettled, needs, not_run, *shown))
 
 
 def _no_limits(
-    paths: tuple[PathLoad, ...],
+    paths: list[PathLoad],
     holding: tuple[HoldingTorque, ...],
     missing: tuple[int, ...],
     doubts: int,
-    inferred: bool,
+    grade: Grade | None,
 ) -> NoLimits:
-    followed = [path for path in paths if path.complete]
-    if followed:
-        path = max(followed, key=lambda path: path.hardest.peak)
-        load, shown = path.hardest, (missing, doubts, inferred)
-        return NoLimits(len(followed), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
+    counted, shown = [path for path in paths if path.counts], (missing, doubts, grade)
+    if counted:
+        path = max(counted, key=lambda path: path.hardest.peak)
+        load = path.hardest
+        return NoLimits(len(counted), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
     held = hardest_held(holding)
-    return NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, missing, doubts, inferred)
+    return NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, *shown)
 
 
 @dataclass(frozen=True)
@@ -198,39 +214,75 @@ class LoadedArm:
 
 @dataclass(frozen=True, eq=False)
 class PathTorques:
-    """A path with its torques; ``inertia`` (n, 2): least and greatest that each joint moves, without rotor."""
+    """A path with its torques.
+
+    Attributes
+    ----------
+    asked : whether the path is to be run, not to show a fault
+    demand, imbalance : None where the arm can't follow it
+    inertia : (n, 2), least and greatest that each joint moves, without rotor
+    """
 
     summary: PathLoad
+    asked: bool
     rows: TorqueRows
     demand: Demand | None
     inertia: Reals
     imbalance: float | None
 
 
-def path_torques(arm: LoadedArm, motion: Motion, samples: int, wrist: tuple[int, ...]) -> PathTorques:
-    """Torques of a path at evenly spread times; ``wrist``: joints whose moments by the load are wanted."""
-    entry, n = motion.entry, arm.robot.joints
+@dataclass(frozen=True, eq=False)
+class PathJudge:
+    """Says which paths may be run, as the trajectory stage does."""
+
+    robot: Robot
+    surroundings: Surroundings
+    near: NearSingular
+    limits: JointLimits
+
+    def judged(self, motion: Motion) -> tuple[PathVerdict, bool]:
+        """The verdict on a motion, and whether it may be run."""
+        found = judge(self.robot, motion, self.near, self.limits)
+        verdict = verdict_of_motion(found, measured(self.surroundings, motion))
+        return verdict, verdict not in NOT_TO_BE_RUN and found.speed_bounded
+
+
+def path_torques(
+    arm: LoadedArm, motion: Motion, judged: tuple[PathVerdict, bool], samples: int, wrist: tuple[int, ...]
+) -> PathTorques:
+    """Torques of a path at evenly spread times.
+
+    Parameters
+    ----------
+    judged : its verdict, and whether it may be run
+    wrist : joints whose moments by the load are wanted
+    """
+    entry, n, (verdict, runs) = motion.entry, arm.robot.joints, judged
+    asked = entry.expect in (None, "safe")
     t = np.linspace(0.0, motion.built.duration, samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
-        absent = PathLoad(entry.name, entry.title, False, float(t[-1]), (), (), None, None, None, None, None)
-        return PathTorques(absent, TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
+        nothing = (float(t[-1]), (), (), None, None, (), None, None)
+        absent = PathLoad(entry.name, entry.title, verdict, False, False, *nothing)
+        return PathTorques(absent, asked, TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
     parts = torque_parts(arm.model, q, qd, qdd)
     tau, tolerance = parts.total, arm.tolerance(q, qd, qdd)
-    asked = demand(t, qd, tau)
+    needed = demand(t, qd, tau)
     own = np.diagonal(arm.model.mass_matrix(q), axis1=1, axis2=2)
     payload, scale = _margins(arm, parts, t, q, qd, qdd)
     timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
     summary = PathLoad(
         name=entry.name,
         title=entry.title,
+        verdict=verdict,
+        counts=runs,
         complete=True,
         duration_s=float(t[-1]),
-        joints=_joint_loads(arm.robot, t, parts, tolerance, asked),
+        joints=_joint_loads(arm.robot, t, parts, tolerance, needed),
         wrist=_wrist_moments(arm, t, q, qd, qdd, wrist),
         payload=_bound(payload, t),
         speed_scale=_bound(scale, t),
-        torque_timed_s=timed,
+        torque_times=timed,
         kinematic_s=kinematic,
         no_law=no_law,
     )
@@ -244,7 +296,7 @@ def path_torques(arm: LoadedArm, motion: Motion, samples: int, wrist: tuple[int,
         power_w=tau * qd,
     )
     inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
-    return PathTorques(summary, rows, asked, inertia, power_imbalance(arm.model, parts, q, qd, qdd))
+    return PathTorques(summary, asked, rows, needed, inertia, power_imbalance(arm.model, parts, q, qd, qdd))
 
 
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
@@ -288,19 +340,26 @@ def _margins(
     )
 
 
+HALVINGS = 2
+
+
 def _timings(
     arm: LoadedArm, joints: Callable[[Reals], Reals], t: Reals, q: Reals
-) -> tuple[float | None, float | None, NoTimeLaw | None]:
-    """Shortest times under torques and under assumed accelerations; None where peak torques are unknown."""
-    peak = drives_of(arm.robot).peak
+) -> tuple[tuple[ShortestTime, ...], float | None, NoTimeLaw | None]:
+    """Shortest times under torques, each with the steps before halved, and the one under assumed accelerations."""
+    peak, found = drives_of(arm.robot).peak, []
     if not np.isfinite(peak).any():
-        return None, None, None
-    _, nodes = nodes_along(joints, t[::20], q[::20], arm.limits)
+        return (), None, None
+    t, nodes = nodes_along(joints, t[::20], q[::20], arm.limits)
     try:
         kinematic = fastest(nodes, arm.limits).duration
-        return fastest_under_torques(arm.model, nodes, arm.limits.speed, peak).timed.duration, kinematic, None
+        for _ in range(HALVINGS + 1):
+            shortest = fastest_under_torques(arm.model, joints(t), arm.limits.speed, peak)
+            found.append(ShortestTime(len(t), shortest.timed.duration, shortest.least))
+            t = np.sort(np.concatenate([t, (t[1:] + t[:-1]) / 2]))
+        return tuple(found), kinematic, None
     except TimingError as error:
-        return None, None, error.finding
+        return (), None, error.finding
 
 
 def _wrist_moments(
@@ -342,7 +401,7 @@ def wrist_uses(
     ]
     allowed = dict(wrist.moment)
     for path in paths:
-        for moment in path.wrist:
+        for moment in path.wrist if path.counts else ():
             asked = moment.moment_n_m
             if moment.joint in allowed:
                 upper, limit = asked + moment.tolerance, allowed[moment.joint]
@@ -373,7 +432,6 @@ def diagram_rows(robot: Robot, load: Load | None, gravity: float) -> DiagramRows
     )
 
 
-CHECKS_PER_SAMPLE = 1
 WRIST_JOINTS = 3
 NO_FIGURE = Figure("holding_torque", None, "")
 
@@ -388,9 +446,9 @@ def compute(study: Study, name: str) -> DynamicsResults:
     grade = "inferred" if robot is not given else _links_grade(given)
     moving = any(each.link > 0 for each in robot.masses.links)
     arm = _loaded_arm(study, robot, load, (grade, load_grade), settings)
-    paths = _paths(study, name, arm, settings) if moving else []
+    paths, skipped = _paths(study, name, arm, settings) if moving else ([], ())
     holding = _holding(arm) if moving else ()
-    motors = _motors(robot, paths, holding) if any(path.demand for path in paths) else ()
+    motors = _motors(robot, paths, holding) if any(path.summary.counts for path in paths) else ()
     summaries = tuple(path.summary for path in paths)
     uses = (
         *drive_uses(robot, summaries, holding),
@@ -402,7 +460,7 @@ def compute(study: Study, name: str) -> DynamicsResults:
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = DynamicsSummary(
-        verdict=verdict_of(summaries, holding, uses, findings, unknown, masses),
+        verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped),
         figures=_figures(summaries, holding, uses, imbalances, masses),
         gravity_m_s2=settings.gravity_m_s2,
         masses=masses,
@@ -415,8 +473,10 @@ def compute(study: Study, name: str) -> DynamicsResults:
         motors=motors,
         uses=uses,
         power_imbalance=max(imbalances, default=None),
+        not_examined=_left_out(robot, summaries, skipped, unknown, settings.samples) if holding or uses else (),
     )
-    rows = TorqueRows.stacked([path.rows for path in paths if path.demand]) if motors else TorqueRows.empty()
+    followed = [path.rows for path in paths if path.demand]
+    rows = TorqueRows.stacked(followed) if followed else TorqueRows.empty()
     return DynamicsResults(summary, rows, diagram_rows(robot, load, settings.gravity_m_s2))
 
 
@@ -460,12 +520,53 @@ def _loaded_arm(
     )
 
 
-def _paths(study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings) -> list[PathTorques]:
-    joints = arm.robot.joints
+def _left_out(
+    robot: Robot, paths: tuple[PathLoad, ...], skipped: tuple[str, ...], unknown: tuple[DataOpen, ...], samples: int
+) -> tuple[LeftOut, ...]:
+    """What the files leave open, paths that count for nothing, and what the model and its samples can't see."""
+    subjects: dict[Need, LeftOutSubject] = {
+        "masses": "link_masses",
+        "peak": "peak_torques",
+        "rated": "rated_torques",
+        "armature": "rotor_inertias",
+        "friction": "friction",
+        "wrist_moment": "wrist_limits",
+        "wrist_inertia": "wrist_limits",
+        "payload": "wrist_limits",
+        "load": "load",
+    }
+    names: dict[LeftOutSubject, set[int]] = {}
+    for each in unknown:
+        everything = range(1, (robot.rows if each.what == "masses" else robot.joints) + 1)
+        whole = each.what in ("load", "payload")
+        names.setdefault(subjects[each.what], set()).update(() if whole else each.numbers or everything)
+    found = [
+        LeftOut(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
+        for subject, numbers in names.items()
+    ]
+    if not_run := (*skipped, *(path.name for path in paths if not path.counts)):
+        found.append(LeftOut("paths_not_run", not_run))
+    return (*found, LeftOut("torque_peaks", amount=samples), LeftOut("program_torques"), LeftOut("drive_behaviour"))
+
+
+def _paths(
+    study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings
+) -> tuple[list[PathTorques], tuple[str, ...]]:
+    """The paths, and the names of those that an arm of its class can't be made to follow."""
+    joints, trajectory = arm.robot.joints, study.section(TrajectorySettings)
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
-    motions = study_motions(study, name, CHECKS_PER_SAMPLE)
-    return [path_torques(arm, each.motion, settings.samples, wrist) for each in motions if each.motion]
+    scene = study.scene(name, "trajectory")
+    bodies = Bodies(study.robot(name), load_scene(scene) if scene else None)
+    surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
+    judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
+    found, skipped = [], []
+    for each in study_motions(study, name, trajectory.checks_per_sample):
+        if each.motion is None:
+            skipped.append(each.name)
+        else:
+            found.append(path_torques(arm, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
+    return found, tuple(skipped)
 
 
 def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:
@@ -487,6 +588,7 @@ def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:
 
 
 def _motors(robot: Robot, paths: list[PathTorques], holding: tuple[HoldingTorque, ...]) -> tuple[MotorNeed, ...]:
+    paths = [path for path in paths if path.summary.counts]
     asked = [path.demand for path in paths if path.demand]
     drives = drives_of(robot)
     low = np.nanmin([path.inertia[:, 0] for path in paths], axis=0)
@@ -549,14 +651,14 @@ def _masses_used(
 
 
 def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]:
-    loads = [load for path in summaries for load in path.joints]
+    loads = [load for path in summaries for load in path.joints if path.counts]
     turning = [load for load in loads if load.unit == "N m"]
     peak = max(turning, key=lambda load: load.peak, default=None)
     held = hardest_held(holding) if holding else None
-    energy = [sum(load.work_j for load in path.joints) for path in summaries if path.complete]
+    energy = [sum(load.work_j for load in path.joints) for path in summaries if path.counts]
     total = sum(link.mass_kg or 0.0 for link in masses.links) if masses else None
     figures = (
-        Figure("paths", sum(path.complete for path in summaries), "", of=len(summaries)),
+        Figure("paths", sum(path.counts for path in summaries), "", of=len(summaries)),
         Figure("mass", total, "kg"),
         Figure("peak_torque", peak.peak if peak else None, "N m", peak.tolerance if peak else None),
         Figure("holding_torque", abs(held.torque), held.unit, held.tolerance) if held else NO_FIGURE,

@@ -16,6 +16,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, per_joint
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import NoTimeLaw
 from er3a.robots.robot import Grade
 
@@ -72,10 +73,11 @@ class NoLimits:
 
     Attributes
     ----------
+    paths : that may be run, and count
     path : None where it is the holding torque
     missing_links : without mass, which count as massless
     doubts : findings on the masses besides
-    inferred : whether masses are guessed
+    grade : of the masses, where no document or scale gives them; None where one does
     """
 
     paths: int
@@ -86,21 +88,31 @@ class NoLimits:
     path: str | None
     missing_links: tuple[int, ...]
     doubts: int
-    inferred: bool
+    grade: Grade | None
     code: Literal["dynamics.no_limits"] = "dynamics.no_limits"
 
 
 @dataclass(frozen=True)
 class Compared:
-    """So much was compared with limits; ``tightest`` is what is nearest to its limit, or farthest beyond it."""
+    """So much was compared with limits; ``tightest`` is what is nearest to its limit, or farthest beyond it.
+
+    Attributes
+    ----------
+    unsettled : what is within its limit, and not with the tolerances of the masses
+    unknown : what the files leave open, wholly or in part; torques and limits that rest on it were not examined
+    not_run : paths that are to be run, and may not be: they count for nothing
+    missing_links, doubts, grade : as of :class:`NoLimits`
+    """
 
     compared: int
     beyond: int
     tightest: Use
-    unlimited: tuple[Need, ...]
+    unsettled: int
+    unknown: tuple[Need, ...]
+    not_run: tuple[str, ...]
     missing_links: tuple[int, ...]
     doubts: int
-    inferred: bool
+    grade: Grade | None
 
 
 @dataclass(frozen=True)
@@ -112,7 +124,7 @@ class AllWithin(Compared):
 
 @dataclass(frozen=True)
 class Marginal(Compared):
-    """All is within its limits, but not with the tolerances of the masses, or the masses are doubtful."""
+    """All is within the limits that are known: not with the tolerances of the masses, or not all was examined."""
 
     code: Literal["dynamics.marginal"] = "dynamics.marginal"
 
@@ -236,26 +248,42 @@ class WristMoment:
 
 
 @dataclass(frozen=True)
+class ShortestTime:
+    """The shortest time under peak torques and joint speeds by TOPP-RA at so many nodes.
+
+    ``least_s``: no motion at these nodes takes less; less than ``time_s`` only where viscous friction is known.
+    """
+
+    nodes: int
+    time_s: float
+    least_s: float
+
+
+@dataclass(frozen=True)
 class PathLoad:
     """A path's loads.
 
     Attributes
     ----------
+    verdict : of the trajectory stage's checks
+    counts : whether it may be run; motors, limits and key figures rest on such paths alone
     complete : whether the arm can follow it all along; nothing else is known of one that it can't
     payload, speed_scale : None where no torque limit is known
-    torque_timed_s : shortest time under peak torques and joint speeds; None without peak torques, or by ``no_law``
+    torque_times : at more and more nodes; empty without peak torques, or by ``no_law``
     kinematic_s : shortest time under joint speeds and assumed accelerations
     """
 
     name: str
     title: str
+    verdict: PathVerdict
+    counts: bool
     complete: bool
     duration_s: float
     joints: tuple[JointLoad, ...]
     wrist: tuple[WristMoment, ...]
     payload: BindingLimit | None
     speed_scale: BindingLimit | None
-    torque_timed_s: float | None
+    torque_times: tuple[ShortestTime, ...]
     kinematic_s: float | None
     no_law: NoTimeLaw | None
 
@@ -267,7 +295,7 @@ class PathLoad:
 
 @dataclass(frozen=True)
 class MotorNeed:
-    """What each drive must give over all paths, and at rest in the worst pose.
+    """What each drive must give over all paths that may be run, and at rest in the worst pose.
 
     Attributes
     ----------

@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.pipeline.messages.dynamics import BINDING, FIGURES, quantity_word
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player
@@ -175,8 +176,10 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         uses=[_use(use) for use in summary.uses[:MOST_USES]],
         more_uses=max(0, len(summary.uses) - MOST_USES),
         motors=[_motor(motor) for motor in summary.motors],
-        paths=[_path(path) for path in summary.paths],
-        margins=any(path.payload or path.speed_scale or path.torque_timed_s for path in summary.paths),
+        paths=[_path(path) for path in summary.paths if path.counts],
+        not_run=[_not_run(path) for path in summary.paths if not path.counts],
+        nodes=_nodes(summary),
+        margins=any(path.payload or path.speed_scale or path.torque_times for path in summary.paths),
         figures=figures,
         player=player(robot, _motions(robot, results)),
         drawing_head=drawing_head(),
@@ -262,12 +265,27 @@ def _motor(motor: MotorNeed) -> list[str]:
     ]
 
 
-def _path(path: PathLoad) -> list[str]:
+def _not_run(path: PathLoad) -> list[str]:
     if not path.complete:
-        return [path.name, tr("not followed to its end"), *[NONE] * 6]
+        return [path.name, outcome_word(path.verdict), tr("not followed to its end")]
+    worst = path.hardest
+    peak = f"{number(worst.peak, 3)} ± {number(worst.tolerance, 2)} {worst.unit} (J{worst.joint})"
+    return [Markup('<a href="#{0}">{0}</a>').format(path.name), outcome_word(path.verdict), peak]
+
+
+def _nodes(summary: DynamicsSummary) -> list[list[str]]:
+    """Shortest times under torques by the number of nodes, and the time that no motion undercuts."""
+    return [
+        [path.name, number(each.nodes), fixed(each.time_s, 4), fixed(each.least_s, 4)]
+        for path in summary.paths
+        for each in (path.torque_times if path.counts else ())
+    ]
+
+
+def _path(path: PathLoad) -> list[str]:
     worst = path.hardest
     energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
-    timed = NONE if path.torque_timed_s is None else fixed(path.torque_timed_s, 2)
+    timed = fixed(path.torque_times[-1].time_s, 2) if path.torque_times else NONE
     if path.no_law:
         timed = say(path.no_law)
     return [

@@ -34,6 +34,7 @@ from er3a.pipeline.stages.trajectory.judgement import (
     judge,
     least_clearance,
     measured,
+    verdict_of,
 )
 from er3a.pipeline.stages.trajectory.model import (
     FASTEST,
@@ -66,7 +67,7 @@ from er3a.planning.avoidance.singular_segment import SingularSegment, singular_s
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.intervals import Interval
-from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
+from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
@@ -304,12 +305,11 @@ def path_summary(
     labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
     contacts = collisions(along)
-    verdicts: list[PathVerdict] = [found.verdict, "collides"] if contacts else [found.verdict]
     return PathSummary(
         name=entry.name,
         title=entry.title,
         kind=entry.kind,
-        verdict=min(verdicts, key=PATH_VERDICTS.index),
+        verdict=verdict_of(found, along),
         expect=entry.expect,
         in_joint_space=followed is None,
         duration_s=float(motion.built.duration),

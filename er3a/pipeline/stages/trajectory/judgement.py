@@ -34,7 +34,7 @@ from er3a.planning.intervals import (
     rates_exceeded,
     unreachable,
 )
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.polynomial_checks import GreatestRates, LimitCheck, RateCheck, SingularCheck
 from er3a.planning.singular_events import SingularEvent, singular_events
@@ -242,6 +242,12 @@ def collisions(along: ClearanceAlong) -> list[Interval[BodiesOverlap]]:
         )
         for contact in along.contacts
     ]
+
+
+def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
+    """The gravest verdict on a motion, collisions included."""
+    verdicts: list[PathVerdict] = [found.verdict, "collides"] if along.contacts else [found.verdict]
+    return min(verdicts, key=PATH_VERDICTS.index)
 
 
 def least_clearance(along: ClearanceAlong) -> LeastClearance | None:

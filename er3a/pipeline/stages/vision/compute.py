@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import ShapesAssumed
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
 from er3a.files.scene_file import load_scene
@@ -23,9 +24,10 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.si_units import from_si, stated
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision.entry import VisionSettings
 from er3a.pipeline.stages.vision.model import (
@@ -50,7 +52,6 @@ from er3a.pipeline.stages.vision.model import (
     TouchContradicts,
     TouchedPoint,
     TouchResult,
-    UnsureGrasp,
     ViewToAdd,
     VisionResults,
     VisionSummary,
@@ -78,13 +79,13 @@ from er3a.robots.joint_limits import joint_columns, shown
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import TimeOffset, inverted, quaternion_of
-from er3a.vision.grasp_motion import PARTS, GraspLeg
+from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spread_of
 from er3a.vision.next_view import FieldOfView, NextView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table
-from er3a.vision.vision_findings import BoardScale, HandEyeError, MoreScatter, NoMajority, OtherReading
+from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
 MARGIN = 0.25  # of the objects' extent
 LEAST_HALF = 0.2  # m, to each side of the objects' middle
@@ -222,6 +223,7 @@ def calibration_result(
     view: NextView | None,
     offset: TimeOffset | None,
     table: TableCorrections | NoCorrections | None,
+    images: SeenImages | None,
 ) -> CalibrationResult:
     """All that the summary says of a calibration."""
     spread, turned = spread_of(found)
@@ -231,6 +233,7 @@ def calibration_result(
         found,
         title=head.title,
         source=head.source,
+        simulated=head.simulated,
         setup=found.samples.setup,
         samples=len(found.samples),
         used=found.used.sum(),
@@ -248,6 +251,9 @@ def calibration_result(
         next_view=stated(ViewToAdd, view) if view else None,
         time_offset=stated(OffsetResult, offset) if offset else None,
         table=_table_result(table) if isinstance(table, TableCorrections) else table,
+        open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
+        boardless=images.boardless if images else (),
+        intrinsics_estimated=images is not None and images.views.shared is not None,
     )
 
 
@@ -334,7 +340,6 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> CornerRows:
 STAGE = "vision"
 VIEW_STREAM = 0
 CONTRADICTED = 1e-3
-MUCH_SCATTER = 3.0
 LEG_ROWS = 13
 
 Found = (
@@ -364,7 +369,8 @@ def compute(study: Study, name: str) -> VisionResults:
         found = calibrate_hand_eye(samples)
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", CalibrationImpossible(error.finding))
-        summary = VisionSummary(verdict, (), task_file.title, title, None, ())
+        level = study.section(VisionSettings).least_success
+        summary = VisionSummary(verdict, (), task_file.title, title, level, None, ())
         empty = (SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty(), GraspPrograms.empty(), CornerRows.empty())
         return VisionResults(summary, *empty)
     picture = None if head.setup == "eye_to_hand" else np.radians(task_file.picture_deg or [])
@@ -376,9 +382,7 @@ def compute(study: Study, name: str) -> VisionResults:
         middle = np.mean([each.pose()[:3, 3] for each in task_file.objects], axis=0)
         to_add = next_view(robot, found, view, middle, scene, study.seed + VIEW_STREAM)
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
-    calibration = calibration_result(head, found, to_add, offset, table)
-    if images is not None:
-        calibration = replace(calibration, open_tilts=ambiguous_tilts(images.views, samples.names))
+    calibration = calibration_result(head, found, to_add, offset, table, images)
     doubt = _doubt(calibration)
     settings = study.section(VisionSettings)
     motions = study.section(TrajectorySettings)
@@ -387,14 +391,22 @@ def compute(study: Study, name: str) -> VisionResults:
         limits = (limits_of(robot, motions), study.seed)
         planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
-    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects, settings)
+    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects)
+    bodies = bodies_of(robot, scene)
     summary = VisionSummary(
-        verdict=judged.without(bodies_of(robot, scene).unexamined),
+        verdict=judged.without(bodies.unexamined).resting_on(_shapes(robot, objects, motions)),
         figures=_figures(calibration, objects),
         title=task_file.title,
         scene=title,
+        least_success=settings.least_success,
         calibration=calibration,
         objects=objects,
+        not_examined=(
+            *_left_out(calibration),
+            *left_out_of_collisions(bodies, scene, 1000 * DEPTH),
+            *left_out_of_rates(np.isfinite(robot.speed), motions.jerk_deg_s3 is not None),
+            LeftOut("torques"),
+        ),
     )
     map_task = MapTask(
         robot=robot,
@@ -422,6 +434,27 @@ def compute(study: Study, name: str) -> VisionResults:
     )
 
 
+def _left_out(found: CalibrationResult) -> Iterator[LeftOut]:
+    """What the calibration does not rest on, and what nothing checks it against."""
+    if found.simulated:
+        yield LeftOut("real_camera")
+    if found.boardless:
+        yield LeftOut("boardless_images", tuple(each.sample for each in found.boardless))
+    if samples := tuple(each.sample for each in found.suspects if each.code != "repeated_pose"):
+        yield LeftOut("left_out_samples", samples)
+    if found.touch is None:
+        yield LeftOut("touched_points")
+    yield LeftOut("detections")
+    yield LeftOut("gripped_parts")
+
+
+def _shapes(robot: Robot, objects: tuple[ObjectResult, ...], motions: TrajectorySettings) -> ShapesAssumed | None:
+    """What assumed shapes of the arm leave open of the grasps; None without any grasp."""
+    clear = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
+    near = {name: None if least is None else least / 1000 for name, least in clear.items()}
+    return shapes_assumed(robot, motions.assumed_margin_mm / 1000, near) if clear else None
+
+
 def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
     """T_base_camera (4, 4) when the objects were seen."""
     placed: Reals = seen_pose(found, np.eye(4), None if picture is None else forward(robot.without_tool(), picture))
@@ -430,13 +463,7 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
 
 def _doubt(found: CalibrationResult) -> CalibrationDoubtful | DirectionContradicted | TouchContradicts | None:
     """Why no grasp may rest on a calibration; None if nothing speaks against it."""
-    grave = (NoMajority, BoardScale, *get_args(OtherReading))
-    doubts = tuple(
-        each
-        for each in found.warnings
-        if isinstance(each, grave) or (isinstance(each, MoreScatter) and each.scatter > MUCH_SCATTER)
-    )
-    if doubts:
+    if doubts := grave_warnings(found.warnings):
         return CalibrationDoubtful(doubts)
     given = found.directions[0]
     best = next(each for each in found.directions if each.status == "best")
@@ -468,6 +495,7 @@ def _planned(
         float(np.radians(settings.least_limit_margin_deg)),
         settings.least_singular_value,
         tuple(map(float, tolerance)),  # type: ignore[arg-type]
+        settings.least_success,
     )
     bodies = Bodies(robot, scene)
     speed = settings.line_speed_mm_s / 1000
@@ -530,25 +558,19 @@ def _grasp(chosen: ChosenGrasp) -> GraspResult:
     )
 
 
-def _verdict(
-    calibration: CalibrationResult, objects: tuple[ObjectResult, ...], settings: VisionSettings
-) -> Verdict[Found]:
+def _verdict(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) -> Verdict[Found]:
     if unmet := unmet_expectations(objects):
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
     missed = tuple(NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
-    unsure = tuple(
-        UnsureGrasp(each.name, each.grasp.probability)
-        for each in asked
-        if each.grasp and each.grasp.probability < settings.least_success
-    )
-    left_out = tuple(each.sample for each in calibration.suspects if each.code != "repeated_pose")
+    suspects = tuple(each.sample for each in calibration.suspects if each.code != "repeated_pose")
+    left_out = (*suspects, *(each.sample for each in calibration.boardless))
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
-    counts = GraspCounts(len(asked), len(asked) - len(missed), missed, unsure, left_out, worst, shown)
+    counts = GraspCounts(len(asked), len(asked) - len(missed), missed, left_out, worst, shown, calibration.simulated)
     if asked and len(missed) == len(asked):
         return Verdict("fail", counts)
-    return Verdict("caution" if missed or unsure or calibration.warnings else "pass", counts)
+    return Verdict("caution" if missed or calibration.warnings else "pass", counts)
 
 
 def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) -> tuple[Figure, ...]:
@@ -560,7 +582,7 @@ def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) 
         Figure("samples_used", calibration.used, "", of=calibration.samples),
         Figure("position_half_width", max(calibration.hand_eye.half_width_mm), "mm"),
         Figure("rotation_half_width", max(calibration.hand_eye.half_width_deg), "deg"),
-        *((Figure("objects_grasped", grasped, "", of=len(objects)),) if objects else ()),
+        *((Figure("objects_grasped", grasped, "", of=len(asked)),) if asked else ()),
         *((Figure("worst_error", worst, "mm"),) if worst is not None else ()),
         *((Figure("least_success", 100 * least, "%"),) if least is not None else ()),
     )

@@ -12,7 +12,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
-from er3a.vision.boards import AmbiguousTilt
+from er3a.vision.boards import AmbiguousTilt, BoardlessImage
 from er3a.vision.calibration_set import Setup
 from er3a.vision.classic_methods import MethodName
 from er3a.vision.grasping import GraspRefusal
@@ -67,15 +67,6 @@ class NotGraspedObject:
 
 
 @dataclass(frozen=True)
-class UnsureGrasp:
-    """A grasp that holds less often than asked."""
-
-    name: str
-    probability: float
-    code: Literal["unsure_grasp"] = "unsure_grasp"
-
-
-@dataclass(frozen=True)
 class GraspCounts:
     """What came of the objects that are to be grasped.
 
@@ -84,15 +75,16 @@ class GraspCounts:
     objects, grasped : of those that are asked for
     left_out : samples that the calibration does not rest on
     point_mm : 95 % of errors at the worst grasp stay below; None where nothing is grasped
+    simulated : whether no camera took the samples
     """
 
     objects: int
     grasped: int
     missed: tuple[NotGraspedObject, ...]
-    unsure: tuple[UnsureGrasp, ...]
     left_out: tuple[str, ...]
     point_mm: float | None
     demonstrations: tuple[Demonstration, ...]
+    simulated: bool
     code: Literal["grasp_counts"] = "grasp_counts"
 
 
@@ -208,17 +200,20 @@ class CalibrationResult:
     Attributes
     ----------
     hand_eye : T_flange_camera (camera on the flange) or T_base_camera (fixed); board : T_base_board or T_flange_board
+    simulated : whether no camera took the samples
     stated : whether the camera's standard deviations are stated; else they are estimated
     scatter : root mean square of the residuals in stated standard deviations
     camera_mm, camera_deg : the camera's standard deviation by axis, root mean square of the three
     spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
     moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
     table : corrections to the arm's table, where the set asks for them
-    open_tilts : images that leave open which way the board is tilted
+    open_tilts : images that leave open which way the board is tilted; boardless : images left out, without a board
+    intrinsics_estimated : from the same images; the intervals include their errors
     """
 
     title: str
     source: str
+    simulated: bool
     setup: Setup
     samples: int
     used: int
@@ -243,6 +238,8 @@ class CalibrationResult:
     time_offset: OffsetResult | None
     table: TableResult | NoCorrections | None
     open_tilts: tuple[AmbiguousTilt, ...] = ()
+    boardless: tuple[BoardlessImage, ...] = ()
+    intrinsics_estimated: bool = False
 
 
 @dataclass(frozen=True)
@@ -315,7 +312,10 @@ class ObjectResult:
 
 @dataclass(frozen=True)
 class VisionSummary(Summary):
-    """What the stage found; ``calibration`` is None where the samples determine none."""
+    """What the stage found; ``calibration`` is None where the samples determine none.
+
+    ``least_success``: the probability of success below which an object is not graspable.
+    """
 
     verdict: Verdict[
         CalibrationImpossible
@@ -327,6 +327,7 @@ class VisionSummary(Summary):
     ]
     title: str
     scene: str | None
+    least_success: float
     calibration: CalibrationResult | None
     objects: tuple[ObjectResult, ...]
 

@@ -209,7 +209,7 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         robot_pages=study.pages(name),
         found=found,
         poses=_poses(found) if found else [],
-        suspects=listed((*found.suspects, *found.open_tilts)) if found else [],
+        suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
         warnings=listed(found.warnings) if found else [],
         methods=_methods(found) if found else [],
         disagreement=_disagreement(found) if found else "",
