@@ -38,7 +38,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import table_types
 
-FORMAT_VERSION = 7
+FORMAT_VERSION = 8
 BESIDE = ("unexamined", "shapes")
 """What a verdict can have beside its finding."""
 SUMMARY = "summary.json"
