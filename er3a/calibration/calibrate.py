@@ -215,13 +215,15 @@ class TermEstimate:
 
     Attributes
     ----------
-    coefficients, standard_errors : one for a ratio and for sag; of sine and cosine once and twice a turn
+    coefficients, standard_errors : one for a ratio and for sag; else of sine and cosine
+    turns : how often a ripple returns in a turn
     """
 
     kind: TermKind
     joint: int
     coefficients: tuple[float, ...]
     standard_errors: tuple[float, ...]
+    turns: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -552,6 +554,7 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
                 term.joint,
                 tuple((1000 * found.coefficients[own]).tolist()),
                 tuple((1000 * error[count:][own]).tolist()),
+                term.turns,
             )
             for term, own in zip(found.terms, places_of(found.terms))
         ),

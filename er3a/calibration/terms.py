@@ -1,7 +1,7 @@
-"""Errors of joints that no table holds: of a gear's ratio, once and twice a turn, and sag under a load.
+"""Errors of joints that no table holds: of a gear's ratio, once, twice and many times a turn, and sag under a load.
 
-A row that is meant to move by x moves by ``x + sum_k c_k s_k``: ``s = x`` for its ratio, ``(sin x, cos x)`` and ``(sin
-2x, cos 2x)`` for what returns with each turn and half turn (eccentric gears, encoders), and ``-dh/dx`` for sag, h the
+A row that is meant to move by x moves by ``x + sum_k c_k s_k``: ``s = x`` for its ratio, ``(sin kx, cos kx)`` for what
+returns k times a turn (eccentric gears and encoders once and twice, teeth many times), and ``-dh/dx`` for sag, h the
 height (m) of the measured point: the torque of a unit weight there, by its Jacobian [1]_. A weight that sinks lowers
 the arm, so the compliance c can't be negative.
 
@@ -25,22 +25,25 @@ from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
-TermKind = Literal["ratio", "once", "twice", "sag"]
+TermKind = Literal["ratio", "once", "twice", "sag", "ripple"]
 KINDS: tuple[TermKind, ...] = get_args(TermKind)
+RIPPLES = range(3, 257)
+"""How many times a turn an error is looked for; strain wave gears have some 200 a turn."""
 TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma
 
 
 @dataclass(frozen=True)
 class JointTerm:
-    """One kind of error of the joint of one row, from 1."""
+    """One kind of error of the joint of one row, from 1; ``turns``: how often a ripple returns in a turn."""
 
     kind: TermKind
     joint: int
+    turns: int = 0
 
     @property
     def count(self) -> int:
         """How many coefficients it has."""
-        return 2 if self.kind in ("once", "twice") else 1
+        return 1 if self.kind in ("ratio", "sag") else 2
 
     def shapes(self, x: Reals, climb: Reals) -> Reals:
         """(P, count), what the coefficients are multiplied by.
@@ -55,17 +58,17 @@ class JointTerm:
             return own[:, None]
         if self.kind == "sag":
             return -climb[:, [self.joint - 1]]
-        turns = 1 if self.kind == "once" else 2
+        turns = {"once": 1, "twice": 2}.get(self.kind, self.turns)
         return np.column_stack([np.sin(turns * own), np.cos(turns * own)])
 
 
 def candidates(robot: Robot) -> tuple[JointTerm, ...]:
-    """The terms that are tried; joints that slide have no turns."""
+    """The terms that are tried beside ripples; joints that slide have no turns."""
     return tuple(
         JointTerm(kind, row + 1)
         for kind in KINDS
         for row in range(robot.rows)
-        if kind in ("ratio", "sag") or not robot.sliding[row]
+        if kind in ("ratio", "sag") or (kind != "ripple" and not robot.sliding[row])
     )
 
 

@@ -108,6 +108,7 @@ TERMS = [
     (JointTerm("once", 4), [1e-3, 1e-3]),
     (JointTerm("twice", 2), [1.5e-3, 0.0]),
     (JointTerm("sag", 2), [3e-3]),
+    (JointTerm("ripple", 1, 26), [2e-4, 1e-4]),
 ]
 
 
@@ -118,7 +119,7 @@ def test_a_term_that_is_there_is_found_and_no_other(name, term, random):
     own, coefficients = TERMS[term]
     bench = Bench(name, random, {own: coefficients})
     found = er3a.calibrate(bench.robot, bench.measured(200, 0.05))
-    assert [(each.kind, each.joint) for each in found.beyond.terms] == [(own.kind, own.joint)]
+    assert [(each.kind, each.joint, each.turns) for each in found.beyond.terms] == [(own.kind, own.joint, own.turns)]
     for value, true, error in zip(
         found.beyond.terms[0].coefficients, coefficients, found.beyond.terms[0].standard_errors
     ):

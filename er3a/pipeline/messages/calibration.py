@@ -13,7 +13,13 @@ from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.say import say
 
 MUCH_SCATTER = 2.0
-TERMS = {"ratio": "ratio", "once": "once a turn", "twice": "twice a turn", "sag": "sag under a load"}
+TERMS = {
+    "ratio": "ratio",
+    "once": "once a turn",
+    "twice": "twice a turn",
+    "sag": "sag under a load",
+    "ripple": "{turns} times a turn",
+}
 VERDICTS = {
     "taken": "taken",
     "not_lower": "left: poses left out are not met better",
@@ -64,6 +70,11 @@ def held_back_line(distances: Reals) -> str:
     return f"held back: {len(distances)} positions, {mean:.4g} mm off on average, {worst:.4g} mm at worst"
 
 
+def term_name(term: TriedTerm | TermEstimate) -> str:
+    """Such as J2 once a turn."""
+    return f"J{term.joint} " + TERMS[term.kind].format(turns=term.turns)
+
+
 def _entry_lines(estimates: Sequence[Estimate]) -> list[str]:
     lines = [f"{'entry':<9}{'table':>12}{'correction':>14}{'95 % interval':>16}"]
     for each in estimates:
@@ -92,13 +103,13 @@ def _residual_line(found: ResidualStructure) -> str:
 
 def _tried_line(found: TriedTerm) -> str:
     changes = f"{as_text(found.change, '+.1%')}, far from all others {as_text(found.far_change, '+.1%')}"
-    name = f"J{found.joint} {TERMS[found.kind]}"
+    name = term_name(found)
     return f"tried: {name:<20} squared error left out {changes}, p {found.probability:.1e}: {VERDICTS[found.verdict]}"
 
 
 def _beyond_lines(found: Beyond) -> list[str]:
     lines = [f"with terms beyond the table: {found.rms_mm:.4g} mm root mean square"]
-    lines += [f"  J{each.joint} {TERMS[each.kind]}: {_coefficients(each)}" for each in found.terms]
+    lines += [f"  {term_name(each)}: {_coefficients(each)}" for each in found.terms]
     if found.left_out:
         lines.append(f"with terms, {_left_out_line(found.left_out)}")
     if found.residuals:
