@@ -252,4 +252,5 @@ class _RippleSearch:
         return found
 
     def _by_pose(self, values: Reals) -> Reals:
-        return np.bincount(self._pose_of, weights=values, minlength=self._count)
+        sums: Reals = np.bincount(self._pose_of, weights=values, minlength=self._count).astype(float)
+        return sums

@@ -201,6 +201,12 @@ class PointObservations:
                 values[start + k] = MM * self.relative(xyz, xyz)[self.seen]
         return values
 
+    def positions(self, robot: Robot) -> Reals:
+        """Where a robot puts the measured points (P, 3), m."""
+        T = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1]
+        found: Reals = np.einsum("pij,pj->pi", T[:, :3, :3], self.points(robot)) + T[:, :3, 3]
+        return found
+
     def points(self, robot: Robot) -> Reals:
         """Where the measured points are in the flange's frame (P, 3), m."""
         return np.where(self.on_tool[:, None], robot.tool[:3, 3], 0.0)

@@ -116,8 +116,7 @@ def term_jacobian(here: Robot, robot: Robot, terms: Sequence[JointTerm], observa
     x = observations.row_values
     by_row = effects(here, x, observations.points(here)) * 1000
     columns = JointErrors(robot, tuple(terms), np.empty(0)).columns(x, observations.points(robot))
-    T = frames_of(tables_of(here), here, x)[0][:, -1]
-    around = np.einsum("pij,pj->pi", T[:, :3, :3], observations.points(here)) + T[:, :3, 3]
+    around = observations.positions(here)
     shifts = [observations.relative(values[:, None] * by_row[:, row], around) for row, values in columns]
     found = [shift[observations.seen] for shift in shifts]
     return np.stack(found, axis=1) if found else np.empty((len(observations), 0))

@@ -9,22 +9,22 @@ from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.residuals import ResidualStructure
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.diagnosis import level
-from er3a.pipeline.messages.language import as_text
+from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import say
 
 MUCH_SCATTER = 2.0
 TERMS = {
-    "ratio": "ratio",
-    "once": "once a turn",
-    "twice": "twice a turn",
-    "sag": "sag under a load",
-    "ripple": "{turns} times a turn",
+    "ratio": N_("ratio"),
+    "once": N_("once a turn"),
+    "twice": N_("twice a turn"),
+    "sag": N_("sag under a load"),
+    "ripple": N_("{turns} times a turn"),
 }
 VERDICTS = {
-    "taken": "taken",
-    "not_lower": "left: poses left out are not met better",
-    "noise": "left: noise may have made it",
-    "wrong_way": "left: a load would have to lift the arm",
+    "taken": N_("taken"),
+    "not_lower": N_("left: poses left out are not met better"),
+    "noise": N_("left: noise may have made it"),
+    "wrong_way": N_("left: a load would have to lift the arm"),
 }
 
 
@@ -72,7 +72,12 @@ def held_back_line(distances: Reals) -> str:
 
 def term_name(term: TriedTerm | TermEstimate) -> str:
     """Such as J2 once a turn."""
-    return f"J{term.joint} " + TERMS[term.kind].format(turns=term.turns)
+    return f"J{term.joint} {term_kind(term)}"
+
+
+def term_kind(term: TriedTerm | TermEstimate) -> str:
+    """Such as once a turn."""
+    return tr(TERMS[term.kind], turns=term.turns) if term.turns else tr(TERMS[term.kind])
 
 
 def _entry_lines(estimates: Sequence[Estimate]) -> list[str]:
@@ -91,20 +96,45 @@ def _left_out_line(found: HeldOutErrors) -> str:
 
 
 def _residual_line(found: ResidualStructure) -> str:
+    return "; ".join(residual_texts(found))
+
+
+def residual_texts(found: ResidualStructure) -> list[str]:
+    """Whether what remains is noise, its structure if it isn't, and where it is greatest."""
+    greatest = tr("greatest: {worst_mm:.3g} mm in row {row}", worst_mm=found.worst_mm, row=found.worst_row)
     if found.is_noise:
-        return f"what remains is noise by all three tests; greatest: {found.worst_mm:.3g} mm in row {found.worst_row}"
-    return (
-        f"what remains is more than noise: correlation {found.neighbours:.2f} between neighbouring poses (p "
-        f"{found.neighbours_probability:.2g}), {found.order:.2f} from row to row (p {found.order_probability:.2g}); "
-        f"J{found.joint} explains most, {found.share:.1%} (p {found.joint_probability:.2g}); greatest: "
-        f"{found.worst_mm:.3g} mm in row {found.worst_row}"
+        return [tr("what remains is noise by all four tests"), greatest]
+    correlated = tr(
+        "what remains is more than noise: correlation {neighbours:.2f} between neighbouring poses (p "
+        "{by_neighbours:.2g}), {order:.2f} from row to row (p {by_order:.2g})",
+        neighbours=found.neighbours,
+        by_neighbours=found.neighbours_probability,
+        order=found.order,
+        by_order=found.order_probability,
     )
+    by_value = tr(
+        "J{joint} explains most by its value, {share:.1%} (p {p:.2g})",
+        joint=found.joint,
+        share=found.share,
+        p=found.joint_probability,
+    )
+    play = tr(
+        "J{joint} explains most by the side from which it came, {share:.1%} (p {p:.2g}): it misses by {play:.3f}/1000 "
+        "rad or m either way",
+        joint=found.play_joint,
+        share=found.play_share,
+        p=found.play_probability,
+        play=abs(found.play),
+    )
+    return [correlated, by_value, play, greatest]
 
 
 def _tried_line(found: TriedTerm) -> str:
     changes = f"{as_text(found.change, '+.1%')}, far from all others {as_text(found.far_change, '+.1%')}"
     name = term_name(found)
-    return f"tried: {name:<20} squared error left out {changes}, p {found.probability:.1e}: {VERDICTS[found.verdict]}"
+    return (
+        f"tried: {name:<20} squared error left out {changes}, p {found.probability:.1e}: {tr(VERDICTS[found.verdict])}"
+    )
 
 
 def _beyond_lines(found: Beyond) -> list[str]:
