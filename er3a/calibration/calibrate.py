@@ -27,8 +27,16 @@ from er3a.calibration.cross_validation import (
 )
 from er3a.calibration.fit import NO_EFFECT, SCALE, Fit, Subspace, covariance_by_poses, fit, jacobian, subspace
 from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
-from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions, PlacementName
+from er3a.calibration.outcomes import (
+    INTERVAL_95,
+    CalibrationError,
+    LevelName,
+    MorePositions,
+    NoPositions,
+    PlacementName,
+)
 from er3a.calibration.parameters import LEVELS, Parameter, corrected, parameters_of, placements_of
+from er3a.calibration.plan import d_optimal
 from er3a.calibration.residuals import ResidualStructure, structure_of
 from er3a.calibration.terms import JointErrors, TermKind, effects, places_of
 from er3a.kinematics.chain import row_values
@@ -42,7 +50,6 @@ from er3a.robots.robot import Robot
 SHOWN_POSES = 3
 TURNS_ALL = Parameter("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
-INTERVAL_95 = 1.959963984540054
 CLOSE = 0.9
 MOST_SCATTER = 3.0
 FAR_OUT = 6.0
@@ -150,14 +157,7 @@ def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -
     candidates = observations.flange_at(robot, poses)
     blocks = SCALE * jacobian(robot, kept, candidates).reshape(len(poses), 3, len(kept))
     known = SCALE * jacobian(robot, kept, observations)
-    information = known.T @ known + 1e-9 * np.eye(len(kept))
-    chosen = []
-    for _ in range(SHOWN_POSES):
-        gain = [np.linalg.slogdet(information + block.T @ block)[1] for block in blocks]
-        at = int(np.argmax(gain))
-        information += blocks[at].T @ blocks[at]
-        chosen.append(poses[at])
-    return tuple(chosen)
+    return tuple(poses[k] for k in d_optimal(known.T @ known, list(blocks), SHOWN_POSES))
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ def term_jacobian(here: Robot, robot: Robot, terms: Sequence[JointTerm], observa
     by_row = effects(here, x, observations.points(here)) * 1000
     columns = JointErrors(robot, tuple(terms), np.empty(0)).columns(x, observations.points(robot))
     around = observations.positions(here)
-    shifts = [observations.relative(values[:, None] * by_row[:, row], around) for row, values in columns]
+    shifts = [observations.relative_shift(values[:, None] * by_row[:, row], around) for row, values in columns]
     found = [shift[observations.seen] for shift in shifts]
     return np.stack(found, axis=1) if found else np.empty((len(observations), 0))
 

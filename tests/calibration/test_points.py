@@ -172,7 +172,7 @@ def test_another_number_of_joints_or_unit_is_one_clear_error(tmp_path, random):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "model_mm"), [("ur5", 0.092), ("wam", 2.05)])
+@pytest.mark.parametrize(("name", "model_mm"), [("ur5", 0.06), ("wam", 2.05)])
 def test_real_arms_at_poses_left_out_are_met_as_by_a_fit_without_er3a(name, model_mm):
     robot, rows = load(name)
     out = np.arange(len(rows)) % 5 == 2
@@ -258,6 +258,66 @@ def test_what_is_touched_at_unknown_places_corrects_a_table(kind, random, tmp_pa
         if each.name in ("a2", "a3"):
             true = truth["a"][each.parameter.joint - 1] * ratio * 1000
             assert each.nominal + each.correction == pytest.approx(true, abs=3 * each.half_width)
+
+
+DISTANCES = {
+    "pair": [f"pair{k}" for k in range(120) for _ in (0, 1)],
+    "bar": [f"socket{k}" for k in range(3) for _ in range(60)],
+}
+
+
+@pytest.mark.parametrize("kind", DISTANCES)
+def test_distances_alone_correct_a_table_and_its_scale(kind, random, tmp_path):
+    bench, names = Bench("six", random), DISTANCES[kind]
+    q = bench.joints(len(names))
+    x = bench.positions(q)
+    other = (
+        x[np.arange(len(names)) ^ 1]
+        if kind == "pair"
+        else np.repeat([[600, 200, 0], [-300, 500, 99], [9, -600, 300]], 60, 0)
+    )
+    lengths = np.linalg.norm(x - other, axis=1)
+    lengths += (
+        np.repeat(random.normal(0, 0.02, len(names) // 2), 2) if kind == "pair" else random.normal(0, 0.02, len(x))
+    )
+    lines = [f"q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,point,x_mm,y_mm,z_mm,{kind},length_mm"]
+    lines += [
+        ",".join(map(repr, row)) + f",tool,,,,{name},{length!r}"
+        for row, name, length in zip(np.degrees(q).tolist(), names, lengths.tolist())
+    ]
+    path = tmp_path / "distances.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = er3a.calibrate(bench.robot, path)
+    assert found.deviation_mm == pytest.approx(0.02, rel=0.25)
+    assert "sets_scale" not in {each.code for each in found.held}
+    assert not any(each.name.startswith("base") for each in found.estimates)
+    new = bench.joints(100)
+    true, model, nominal = (
+        np.linalg.norm(np.diff(at, axis=0), axis=1)
+        for at in (bench.positions(new), *(er3a.forward(r, new)[:, :3, 3] * 1000 for r in (found.robot, bench.robot)))
+    )
+    assert abs(model - true).mean() < 0.02 < 1 < abs(nominal - true).mean()
+    for each in found.estimates:
+        if each.name in ("a2", "a3"):
+            true_mm = 1000 * bench.truth.a[each.parameter.joint - 1]
+            assert each.nominal + each.correction == pytest.approx(true_mm, abs=3 * each.half_width)
+
+
+@pytest.mark.parametrize(
+    ("rows", "problem"),
+    [
+        ("10,tool,,,,p,,300", "row 2, column pair: 1 rows are of the pair 'p'"),
+        ("10,tool,,,,p,,300\n20,tool,,,,p,,301", "row 3, column pair: the pair 'p' lacks one length"),
+        ("10,tool,,,,,b,300\n20,tool,,,,,b,", "row 3, column bar: the bar 'b' has a length in some rows only"),
+        ("10,tool,1,2,300,,,300", "row 2, column length_mm: a length of neither a pair nor a bar"),
+        ("10,tool,,,,,b,-300", "row 2, column length_mm: -300 is not positive"),
+    ],
+)
+def test_distances_that_make_no_sense_are_one_clear_error(rows, problem, tmp_path):
+    path = tmp_path / "distances.csv"
+    path.write_text(f"q1_deg,point,x_mm,y_mm,z_mm,pair,bar,length_mm\n{rows}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=problem):
+        load_measurements(path)
 
 
 def test_a_touch_beside_coordinates_is_one_clear_error(tmp_path):

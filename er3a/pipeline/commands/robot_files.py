@@ -141,6 +141,7 @@ def calibrate(
     output: Annotated[Path | None, typer.Option(help="the robot file to write; none by default")] = None,
     fixed: Annotated[list[FixedPlacement] | None, typer.Option(help="what the robot's file places right")] = None,
     held_back: Annotated[Path | None, typer.Option(help="a CSV of positions that the fit is not to see")] = None,
+    plan: Annotated[int, typer.Option(min=0, max=100, help="only say what is settled, and N poses to add")] = 0,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     rrd: Annotated[Path | None, typer.Option(help="also write a recording for the Rerun viewer")] = None,
     words: Annotated[str, typer.Option("--language", help=f"of the page: {' | '.join(LANGUAGES)}")] = "en",
@@ -151,13 +152,14 @@ def calibrate(
     Errors of joints beyond the table (ratio, once and twice a turn, sag) are fitted where poses left out are met
     better with them; the table in the file is the best without them.
     """
+    from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.by_name import load_measurements
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
-    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, lines_of
+    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, lines_of, plan_lines, plan_record
     from er3a.pipeline.messages.say import say
 
     if words not in LANGUAGES:
@@ -169,6 +171,15 @@ def calibrate(
         )
     arm = load_robot(robot)
     rows = load_measurements(file, arm) if file else ()
+    if plan:
+        from er3a.calibration.plan import plan as planned
+
+        if file is None:
+            raise Er3aError("--plan takes measured positions; give a CSV of them, not a reference set")
+        check_poses(rows, arm, file)
+        proposed = planned(arm, rows, plan, [each.value for each in fixed or ()])
+        print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
+        return
     others = load_measurements(held_back, arm) if held_back else None
     try:
         with shown_work(f"{robot}: corrections are estimated"):

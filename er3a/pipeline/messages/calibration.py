@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
+from er3a.calibration.plan import Plan
 from er3a.calibration.residuals import ResidualStructure
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.diagnosis import level
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import say
+from er3a.robots.robot import Robot
 
 MUCH_SCATTER = 2.0
 TERMS = {
@@ -37,6 +39,7 @@ def lines_of(found: Calibration) -> str:
     )
     lines = [
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
+        f"these measurements settle {len(found.estimates)} of {len(found.estimates) + len(found.held)} numbers",
         f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "
         + scatter,
         *_entry_lines(found.estimates),
@@ -62,6 +65,48 @@ def lines_of(found: Calibration) -> str:
     if found.more:
         lines.append(f"to estimate more: {say(found.more)}")
     return "\n".join(lines)
+
+
+def plan_lines(found: Plan, robot: Robot) -> str:
+    """What measurements settle, and what to measure next."""
+    units = ["mm" if slides else "deg" for slides in robot.slides]
+    able = len(found.settled) + len(found.lacking)
+    lines = [f"these measurements settle {len(found.settled)} of {able} numbers that such measurements can settle"]
+    lines += [f"settled by more poses: {', '.join(found.lacking)}"] if found.lacking else []
+    lines += [f"settled by no poses: {say(reason)}" for reason in found.held]
+    if found.beyond:
+        beyond = (
+            f"J{each.joint} {'beyond' if each.above else 'below'} {as_text(each.value, '.4g')} {units[each.joint - 1]}"
+            for each in found.beyond
+        )
+        lines.append(f"add poses with {', '.join(beyond)}")
+    lines.append("poses that add most, the first one first, by the table:")
+    for number, each in enumerate(found.proposals, 1):
+        pose = ", ".join(as_text(value, ".2f") for value in each.pose)
+        what = f"  {each.kind} {each.name}" if each.kind else ""
+        length = f", {each.length_mm:.2f} mm" if each.kind == "pair" else ""
+        lines.append(f"{number:>4}  ({pose}){what}{length}")
+    lines.append("half of the 95 % interval, with the measurements and with these poses as well:")
+    for width in found.widths:
+        now = "not settled" if width.now is None else f"{width.now:.4f}"
+        then = "not settled" if width.then is None else f"{width.then:.4f}"
+        lines.append(f"{width.parameter.name:<9}{now:>12}{then:>12} {width.parameter.unit}")
+    return "\n".join(lines)
+
+
+def plan_record(found: Plan) -> dict[str, object]:
+    """A plan as plain data, for another program."""
+    return {
+        "settled": list(found.settled),
+        "lacking": list(found.lacking),
+        "held": [say(reason) for reason in found.held],
+        "proposals": [vars(each) for each in found.proposals],
+        "beyond": [vars(each) for each in found.beyond],
+        "half_widths": [
+            {"name": each.parameter.name, "now": each.now, "then": each.then, "unit": each.parameter.unit}
+            for each in found.widths
+        ],
+    }
 
 
 def held_back_line(distances: Reals) -> str:
