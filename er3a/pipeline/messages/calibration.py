@@ -20,6 +20,7 @@ TERMS = {
     "once": N_("once a turn"),
     "twice": N_("twice a turn"),
     "sag": N_("sag under a load"),
+    "weight": N_("sag under its own weight"),
     "ripple": N_("{turns} times a turn"),
 }
 VERDICTS = {
