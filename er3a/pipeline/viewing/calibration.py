@@ -269,13 +269,14 @@ def _by_joint(robot: Robot, errors: MeasuredErrors) -> Picture:
         ax.set_xlabel(bracketed(f"J{joint + 1}", tr(unit)))
     for ax in axes[:, 0]:
         ax.set_ylabel(bracketed(tr("model minus measured"), "mm"))
-    axes[0, 0].legend()
+    if axes[0, 0].get_legend_handles_labels()[0]:
+        axes[0, 0].legend()
     caption = tr("What remains along each joint's value: means in bands with two standard errors; noise stays at 0.")
     return Picture(figure, tr("Mean differences in x, y and z along the value of each joint"), caption)
 
 
 def _binned(ax, values: Reals, left: Reals) -> None:
-    ends = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    ends = np.unique(np.quantile(values, np.linspace(0, 1, max(1, min(BINS, len(values) // LEAST_IN_BIN)) + 1)))
     band = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, max(len(ends) - 2, 0))
     ax.axhline(0, color=MUTED, linewidth=0.8)
     for c, name in enumerate(AXES):
