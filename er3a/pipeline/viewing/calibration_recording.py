@@ -23,9 +23,10 @@ from er3a.pipeline.viewing.recording import (
     log_note,
     recording,
     seconds,
-    send_series,
+    send_run,
     words_view,
 )
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant, size_of
 
 STAGE = "calibration"
@@ -41,9 +42,10 @@ def record_calibration(found: Calibration, errors: MeasuredErrors, output: Path)
     coloured by their errors, and the errors as curves."""
     robot, models = found.robot, list(errors.differences_mm)
     points = errors.xyz_mm / 1000
+    seen = [points, skeleton(robot, meant(robot, errors.q[0]))]
     layout = rrb.Horizontal(
-        view_of(robot, "Before", [ARM, "/calibration/before/**"], [points]),
-        view_of(robot, "After", [ARM, "/calibration/after/**"], [points]),
+        view_of(robot, "Before", [ARM, "/calibration/before/**"], seen),
+        view_of(robot, "After", [ARM, "/calibration/after/**"], seen),
         rrb.Vertical(curves_view("/calibration/curves", "Error (mm)", legend=True), words_view(STAGE, "This pose")),
         column_shares=[2, 2, 1],
     )
@@ -58,7 +60,7 @@ def record_calibration(found: Calibration, errors: MeasuredErrors, output: Path)
             _log_errors(stream, f"{STAGE}/{name}", points, errors, model, size_of(robot))
         distances = np.stack([errors.distances_mm(model)[shown] for model in models], axis=1)
         names = [NAMES[model] for model in models]
-        send_series(stream, f"{STAGE}/curves", times, distances, names, [COLOURS[model] for model in models])
+        send_run(stream, f"{STAGE}/curves", times, distances, names, [COLOURS[model] for model in models])
         texts = [_now(errors, int(k)) for k in shown]
         stream.send_columns(
             f"{STAGE}/now",
