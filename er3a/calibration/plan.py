@@ -40,7 +40,7 @@ from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
 CANDIDATES = 256
-RIDGE = 1e-9
+RIDGE, RELATIVE_RIDGE = 1e-9, 1e-13
 NEWTON_STEPS = 40
 LONGEST_STEP = 0.2  # rad, m
 TOUCHES_M = 1e-6
@@ -135,7 +135,7 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
 def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[int]:
     """Places of the blocks of rows (k, p) that add most to ln det of an information matrix (p, p), one after the
     other."""
-    information = information + RIDGE * np.eye(len(information))
+    information = information + max(RIDGE, RELATIVE_RIDGE * np.trace(information)) * np.eye(len(information))
     chosen: list[int] = []
     for _ in range(min(count, len(blocks))):
         half = np.linalg.solve(np.linalg.cholesky(information), np.concatenate(blocks).T).T
