@@ -27,10 +27,18 @@ from er3a.calibration.cross_validation import (
 )
 from er3a.calibration.fit import NO_EFFECT, SCALE, Fit, Subspace, covariance_by_poses, fit, jacobian, subspace
 from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
-from er3a.calibration.outcomes import CalibrationError, LevelName, MorePositions, NoPositions, PlacementName
+from er3a.calibration.outcomes import (
+    INTERVAL_95,
+    CalibrationError,
+    LevelName,
+    MorePositions,
+    NoPositions,
+    PlacementName,
+)
 from er3a.calibration.parameters import LEVELS, Parameter, corrected, parameters_of, placements_of
+from er3a.calibration.plan import d_optimal
 from er3a.calibration.residuals import ResidualStructure, structure_of
-from er3a.calibration.terms import JointErrors, TermKind, places_of
+from er3a.calibration.terms import JointErrors, TermKind, effects, places_of
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import frames_of, tables_of
@@ -42,7 +50,6 @@ from er3a.robots.robot import Robot
 SHOWN_POSES = 3
 TURNS_ALL = Parameter("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
-INTERVAL_95 = 1.959963984540054
 CLOSE = 0.9
 MOST_SCATTER = 3.0
 FAR_OUT = 6.0
@@ -150,14 +157,7 @@ def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -
     candidates = observations.flange_at(robot, poses)
     blocks = SCALE * jacobian(robot, kept, candidates).reshape(len(poses), 3, len(kept))
     known = SCALE * jacobian(robot, kept, observations)
-    information = known.T @ known + 1e-9 * np.eye(len(kept))
-    chosen = []
-    for _ in range(SHOWN_POSES):
-        gain = [np.linalg.slogdet(information + block.T @ block)[1] for block in blocks]
-        at = int(np.argmax(gain))
-        information += blocks[at].T @ blocks[at]
-        chosen.append(poses[at])
-    return tuple(chosen)
+    return tuple(poses[k] for k in d_optimal(known.T @ known, list(blocks), SHOWN_POSES))
 
 
 @dataclass(frozen=True)
@@ -215,13 +215,15 @@ class TermEstimate:
 
     Attributes
     ----------
-    coefficients, standard_errors : one for a ratio and for sag; of sine and cosine once and twice a turn
+    coefficients, standard_errors : one for a ratio and for sag; else of sine and cosine
+    turns : how often a ripple returns in a turn
     """
 
     kind: TermKind
     joint: int
     coefficients: tuple[float, ...]
     standard_errors: tuple[float, ...]
+    turns: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,16 +324,16 @@ class Calibration(ByValue, Displayed):
         InputError
             for poses of another arm, or outside its limits
         """
-        robot = self.robot if self.beyond is None else self.beyond.robot
-        seen = observed(measurements, robot)
-        assert isinstance(seen, PointObservations)
-        meant = seen
-        if self.beyond:
-            errors = self.beyond.errors
-            meant = seen.shifted(errors.amounts(seen.row_values, seen.points(errors.robot)))
-        off = meant.predict(robot, (), np.zeros((1, 0)))[0] - seen.values_mm
-        distances: Reals = np.sqrt(np.bincount(seen.pose_of, weights=off**2, minlength=len(measurements)))
-        return distances
+        return _lengths(self.differences_mm(measurements))
+
+    def differences_mm(self, measurements: Sequence[Measurement]) -> Reals:
+        """Of each measurement what the model (as of :meth:`forward`) says minus what was observed, (P, 3); NaN where
+        nothing was. Of a touched place or plane, and of distances, see :class:`PointObservations`."""
+        return _differences_mm(self.robot if self.beyond is None else self.beyond.robot, self._errors, measurements)
+
+    @property
+    def _errors(self) -> JointErrors | None:
+        return None if self.beyond is None else self.beyond.errors
 
     def sheet(self) -> Sheet:
         """A row for each estimated entry."""
@@ -345,6 +347,70 @@ class Calibration(ByValue, Displayed):
             left,
             (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
         )
+
+
+def _lengths(differences: Reals) -> Reals:
+    """Of differences (P, 3) the distances over what was observed, (P,)."""
+    found: Reals = np.sqrt(np.nansum(differences**2, axis=1))
+    return found
+
+
+def _differences_mm(robot: Robot, errors: JointErrors | None, measurements: Sequence[Measurement]) -> Reals:
+    seen = observed(measurements, robot)
+    assert isinstance(seen, PointObservations)
+    meant = seen.shifted(errors.amounts(seen.row_values, seen.points(errors.robot))) if errors else seen
+    found = np.full(seen.seen.shape, np.nan)
+    found[seen.seen] = meant.predict(robot, (), np.zeros((1, 0)))[0] - seen.values_mm
+    return found
+
+
+@dataclass(frozen=True)
+class JointShare:
+    """What corrections of a joint, of base or tool do to the measured points.
+
+    Attributes
+    ----------
+    joint : from 1; 0 for base and tool
+    placement : which of these
+    entries : those that were corrected
+    table_mm, terms_mm : root mean square of the way by which they move the points, alone
+    """
+
+    joint: int
+    placement: PlacementName | None
+    entries: tuple[str, ...]
+    table_mm: float
+    terms_mm: float
+
+
+def joint_shares(found: Calibration, robot: Robot, measurements: Sequence[Measurement]) -> tuple[JointShare, ...]:
+    """How far the corrections of base, each joint and tool move the measured points; shares of several may cancel.
+
+    Parameters
+    ----------
+    robot : the table that was started from
+    """
+    seen = observed(measurements, robot)
+    assert isinstance(seen, PointObservations)
+    own, errors = (found.beyond.estimates, found.beyond.errors) if found.beyond else (found.estimates, None)
+    before, effect = seen.positions(robot), effects(robot, seen.row_values, seen.points(robot))
+    too_far = np.zeros_like(seen.row_values)
+    if errors:
+        too_far = errors.amounts(seen.row_values, seen.points(errors.robot))
+    shares = []
+    owners: list[tuple[int, PlacementName | None]] = [(row, None) for row in range(1, robot.rows + 1)]
+    for joint, placement in ((0, "base"), *owners, (0, "tool")):
+        mine = [each for each in own if each.parameter.joint == joint]
+        if placement:
+            mine = [each for each in mine if each.parameter.column.startswith(placement)]
+        amounts = np.array([each.correction / each.parameter.in_unit for each in mine])
+        moved = corrected(robot, [each.parameter for each in mine], amounts)
+        by_terms = effect[:, joint - 1] * too_far[:, [joint - 1]] if joint else np.zeros_like(before)
+        ways = (
+            1000 * float(np.sqrt((way**2).sum(axis=1).mean())) for way in (seen.positions(moved) - before, by_terms)
+        )
+        shares.append(JointShare(joint, placement, tuple(each.name for each in mine), *ways))
+    return tuple(shares)
 
 
 def _with_errors(model: Beyond, q: Reals) -> Reals:
@@ -481,7 +547,7 @@ def _from_points(robot: Robot, every: PointObservations) -> Calibration:
         deviation_mm=None if observations.deviation_known else float(observations.deviation_mm[0]),
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
         left_out=_left_out(observations, model.table),
-        residuals=_structure(observations, model.table),
+        residuals=_structure(robot, observations, model.table),
         tried=model.choice.tried,
         beyond=_beyond(robot, observations, model.whole) if terms else None,
     )
@@ -535,10 +601,12 @@ def _left_out(observations: PointObservations, found: Fit) -> HeldOutErrors | No
     return left_out(observations, found) if can_leave_out(observations, found.J.shape[1]) else None
 
 
-def _structure(observations: PointObservations, found: Fit) -> ResidualStructure | None:
+def _structure(robot: Robot, observations: PointObservations, found: Fit) -> ResidualStructure | None:
     residuals = np.zeros(observations.seen.shape)
     residuals[observations.seen] = found.after * observations.deviation_mm
-    return structure_of(residuals, observations.row_values, observations.lines)
+    effect = 1000 * effects(robot, observations.row_values, observations.points(robot))
+    effect *= ((observations.touched < 0)[:, None] & observations.seen)[:, None]
+    return structure_of(residuals, observations.row_values, observations.lines, effect)
 
 
 def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond:
@@ -552,11 +620,12 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
                 term.joint,
                 tuple((1000 * found.coefficients[own]).tolist()),
                 tuple((1000 * error[count:][own]).tolist()),
+                term.turns,
             )
             for term, own in zip(found.terms, places_of(found.terms))
         ),
         estimates=_estimates(robot, found, error, _quantile(observations, found)),
         rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
         left_out=_left_out(observations, found),
-        residuals=_structure(observations, found),
+        residuals=_structure(robot, observations, found),
     )

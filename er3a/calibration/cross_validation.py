@@ -19,18 +19,30 @@ import numpy as np
 import scipy
 from scipy.cluster.vq import kmeans2
 
-from er3a.calibration.fit import Fit, jacobian
+from er3a.calibration.fit import DEPENDENT, Fit, jacobian
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import TermVerdict
 from er3a.calibration.parameters import Parameter
-from er3a.calibration.terms import TYPICAL, JointTerm, TermKind, candidates, places_of, term_jacobian, wrong_way
+from er3a.calibration.terms import (
+    RIPPLES,
+    TYPICAL,
+    JointTerm,
+    TermKind,
+    candidates,
+    effects,
+    places_of,
+    term_jacobian,
+    wrong_way,
+)
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
 PARTS = 10
 SEEDS = 1, 2, 3, 4
 SURE = 1e-4
-"""How improbable a term's share has to be if there is only noise; some 25 terms are tried."""
+"""How improbable a term's share has to be if there is only noise; some 30 terms are tried."""
+LEAST_GAIN = 0.01
+"""Share of the mean squared error at poses left out that a term has to take away, either way of leaving out."""
 LEAST_POSES = 40
 LEAST_SPARE = 4
 """Coordinates for each number of the largest model, for terms to be tried."""
@@ -59,10 +71,10 @@ class TriedTerm:
 
     Attributes
     ----------
-    kind, joint : which
+    kind, joint, turns : which; of ripples the one of the joint that explains most
     change, far_change : of the mean squared error at poses left out, as a share, tenths at random and neighbourhoods:
         when a term was taken, or of a term that was not, beside those that were
-    probability : of so large a share by chance, if there is only noise
+    probability : of so large a share by chance, if there is only noise, of ripples for all numbers a turn
     verdict : whether it was taken, or why not
     """
 
@@ -72,33 +84,31 @@ class TriedTerm:
     far_change: float
     probability: float
     verdict: TermVerdict
+    turns: int = 0
 
 
 class _Linear:
-    """The model near the best fit: columns of numbers and terms, and the tenths that are left out."""
+    """The model near the best fit: columns of ``count`` numbers and of terms, and the tenths that are left out."""
 
-    def __init__(self, J: Reals, rest: Reals, prior: Reals, pose_of: Integers, parts: Sequence[Integers]):
+    def __init__(self, J: Reals, rest: Reals, count: int, pose_of: Integers, parts: Sequence[Integers]):
         scale = np.linalg.norm(J, axis=0)
         scale[scale == 0] = 1.0
-        self.J, self.rest, self._pose_of = J / scale, rest, pose_of
+        self.J, self.rest, self.scale = J / scale, rest, scale
+        prior = np.r_[np.zeros(count), np.full(J.shape[1] - count, 1 / TYPICAL)]
         self._prior = (prior / scale) ** 2 + RIDGE
         self.whole = self.J.T @ self.J, self.J.T @ rest
-        self.parts = [[self._part(part[pose_of] == k) for k in range(PARTS)] for part in parts]
-        self.scale = scale
-
-    def _part(self, out: np.ndarray) -> tuple[np.ndarray, Reals, Reals]:
-        own = self.J[out]
-        return out, self.whole[0] - own.T @ own, self.whole[1] - own.T @ self.rest[out]
+        self._parts = [[np.flatnonzero(part[pose_of] == k) for k in range(PARTS)] for part in parts]
 
     def errors(self, columns: list[int]) -> list[Reals]:
         """(n,) for each way of leaving out: what the fits without a coordinate's part leave of it."""
-        square, prior = np.ix_(np.array(columns), np.array(columns)), np.diag(self._prior[columns])
+        J, square = np.ascontiguousarray(self.J[:, columns]), np.ix_(np.array(columns), np.array(columns))
+        whole, right = self.whole[0][square] + np.diag(self._prior[columns]), self.whole[1][columns]
         found = []
-        for parts in self.parts:
+        for parts in self._parts:
             errors = np.empty_like(self.rest)
-            for out, information, right in parts:
-                amounts = np.linalg.solve(information[square] + prior, right[columns])
-                errors[out] = self.rest[out] - self.J[out][:, columns] @ amounts
+            for out in parts:
+                own, rest = J[out], self.rest[out]
+                errors[out] = rest - own @ np.linalg.solve(whole - own.T @ own, right - own.T @ rest)
             found.append(errors)
         return found
 
@@ -140,9 +150,8 @@ def can_leave_out(observations: PointObservations, numbers: int) -> bool:
 def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
     """What the model of a fit errs by at poses left out; other parts than those that terms are chosen by."""
     parts = parts_of(observations.row_values, seed)
-    prior = np.r_[np.zeros(len(found.amounts)), np.full(len(found.coefficients), 1 / TYPICAL)]
     unknowns = np.r_[found.amounts, found.coefficients]
-    linear = _Linear(found.J, found.J @ unknowns - found.after, prior, observations.pose_of, parts)
+    linear = _Linear(found.J, found.J @ unknowns - found.after, len(found.amounts), observations.pose_of, parts)
     near, far = (
         np.sqrt(np.bincount(observations.pose_of, weights=(errors * observations.deviation_mm) ** 2))
         for errors in linear.errors(list(range(len(unknowns))))
@@ -157,43 +166,91 @@ def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observati
     ----------
     robot : the table to start from; here : corrected without terms
     """
-    every = candidates(robot)
-    count, numbers = len(kept), len(kept) + sum(term.count for term in every)
+    fixed_terms, count = candidates(robot), len(kept)
+    numbers = count + sum(term.count for term in fixed_terms) + 2 * int((~robot.sliding).sum())
     if not can_leave_out(observations, 0) or len(observations) < LEAST_SPARE * numbers:
         return ChosenTerms((), ())
     weights = observations.deviation_mm[:, None]
-    J = np.hstack([jacobian(here, kept, observations), term_jacobian(here, robot, every, observations)]) / weights
+    J = jacobian(here, kept, observations) / weights
     rest = (observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0]) / weights[:, 0]
-    prior = np.r_[np.zeros(count), np.full(numbers - count, 1 / TYPICAL)]
+    rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
     parts = [part for seed in SEEDS for part in parts_of(observations.row_values, seed)]
-    linear = _Linear(J, rest / np.sqrt(rest @ rest / (len(rest) - count)), prior, observations.pose_of, parts)
-    places, open_terms = dict(zip(every, places_of(every, count))), list(every)
-    columns, taken, tried = list(range(count)), [], []
+    search = None if (observations.touched >= 0).any() else _RippleSearch(here, observations)
+    taken: list[JointTerm] = []
+    tried: list[TriedTerm] = []
     while True:
-        outcomes = {term: _outcome(linear, columns, places[term], term) for term in open_terms}
-        good = [term for term, outcome in outcomes.items() if outcome.verdict == "taken"]
-        if not good:
-            break
-        best = min(good, key=lambda term: outcomes[term].change + outcomes[term].far_change)
-        columns += places[best]
-        taken.append(best)
-        tried.append(outcomes[best])
-        open_terms.remove(best)
-    return ChosenTerms(tuple(taken), (*tried, *outcomes.values()))
+        own = term_jacobian(here, robot, taken, observations) / weights
+        open_terms = [term for term in fixed_terms if term not in taken]
+        open_terms += search.best(np.hstack([J, own]), rest) if search else []
+        more = term_jacobian(here, robot, open_terms, observations) / weights
+        linear = _Linear(np.hstack([J, own, more]), rest, count, observations.pose_of, parts)
+        used, places = list(range(count + own.shape[1])), places_of(open_terms, count + own.shape[1])
+        trials = [_Trial(linear, used, *pair) for pair in zip(open_terms, places)]
+        before = linear.squares(used)
+        by_gain = sorted((trial for trial in trials if trial.probability <= SURE), key=lambda trial: trial.rest)
+        outcome = next((found for trial in by_gain if (found := trial.outcome(before)).verdict == "taken"), None)
+        if outcome is None:
+            return ChosenTerms(tuple(taken), (*tried, *(trial.outcome(before) for trial in trials)))
+        taken.append(JointTerm(outcome.kind, outcome.joint, outcome.turns))
+        tried.append(outcome)
 
 
-def _outcome(linear: _Linear, columns: list[int], own: list[int], term: JointTerm) -> TriedTerm:
-    before, after = linear.squares(columns), linear.squares([*columns, *own])
-    change = (after / before - 1).reshape(len(SEEDS), 2).mean(axis=0)
-    (_, squares), (amounts, fewer) = linear.fitted(columns), linear.fitted([*columns, *own])
-    freedom = len(linear.rest) - len(columns) - len(own)
-    ratio = max((squares - fewer) / len(own) / (fewer / freedom), 0.0)
-    probability = float(scipy.special.fdtrc(len(own), freedom, ratio))
-    verdict: TermVerdict = "taken"
-    if probability > SURE:
-        verdict = "noise"
-    elif change.max() >= 0:
-        verdict = "not_lower"
-    elif wrong_way(term, amounts[-len(own) :]):
-        verdict = "wrong_way"
-    return TriedTerm(term.kind, term.joint, float(change[0]), float(change[1]), probability, verdict)
+class _Trial:
+    """A term beside those that were taken: what it leaves, and whether noise may have made it."""
+
+    def __init__(self, linear: _Linear, used: list[int], term: JointTerm, own: list[int]):
+        self.term, self._linear, self._columns = term, linear, [*used, *own]
+        squares = linear.fitted(used)[1]
+        amounts, self.rest = linear.fitted(self._columns)
+        self._amounts = amounts[-len(own) :]
+        freedom = len(linear.rest) - len(self._columns)
+        ratio = max((squares - self.rest) / len(own) / (self.rest / freedom), 0.0)
+        self.probability = float(scipy.special.fdtrc(len(own), freedom, ratio))
+        if term.kind == "ripple":
+            self.probability = min(1.0, len(RIPPLES) * self.probability)
+
+    def outcome(self, before: Reals) -> TriedTerm:
+        """What leaving out poses says of it; ``before``: their mean squares without it."""
+        term = self.term
+        change = (self._linear.squares(self._columns) / before - 1).reshape(len(SEEDS), 2).mean(axis=0)
+        verdict: TermVerdict = "taken"
+        if self.probability > SURE:
+            verdict = "noise"
+        elif change.max() > -LEAST_GAIN:
+            verdict = "not_lower"
+        elif wrong_way(term, self._amounts):
+            verdict = "wrong_way"
+        return TriedTerm(
+            term.kind, term.joint, float(change[0]), float(change[1]), self.probability, verdict, term.turns
+        )
+
+
+class _RippleSearch:
+    """Of each joint's ripples the one that explains most, of coordinates that were measured."""
+
+    def __init__(self, here: Robot, observations: PointObservations):
+        x, rows = observations.row_values, np.flatnonzero(~here.sliding)
+        effect = 1000 * effects(here, x, observations.points(here))[:, rows]
+        self._pose_of = observations.pose_of
+        self._effect = effect.transpose(0, 2, 1)[observations.seen] / observations.deviation_mm[:, None]
+        angle = x[:, rows].T[:, None] * np.array(RIPPLES)[:, None]
+        self._shapes = np.stack([np.sin(angle), np.cos(angle)], axis=2)
+        self._rows, self._count = rows, len(x)
+
+    def best(self, J: Reals, rest: Reals) -> list[JointTerm]:
+        """One for each joint; J (n, k), whose columns they come beside, and what is to be explained, (n,)."""
+        span = np.linalg.qr(J)[0]
+        left, found = rest - span @ (span.T @ rest), []
+        for row, effect, shapes in zip(self._rows, self._effect.T, self._shapes):
+            own, square = self._by_pose(effect * left), self._by_pose(effect**2)
+            taken = shapes @ np.stack([self._by_pose(effect * column) for column in span.T], axis=1)
+            whole = (shapes * square) @ shapes.transpose(0, 2, 1)
+            gram = whole - taken @ taken.transpose(0, 2, 1) + DEPENDENT * square.sum() * np.eye(2)
+            along = shapes @ own
+            explained = np.einsum("tk,tk->t", along, np.linalg.solve(gram, along[..., None])[..., 0])
+            found.append(JointTerm("ripple", int(row) + 1, RIPPLES[int(explained.argmax())]))
+        return found
+
+    def _by_pose(self, values: Reals) -> Reals:
+        sums: Reals = np.bincount(self._pose_of, weights=values, minlength=self._count).astype(float)
+        return sums

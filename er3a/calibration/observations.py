@@ -34,6 +34,10 @@ LIMIT_SLACK = 0.01  # deg, mm
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
 HALF_WIDTH_TO_DEVIATION = 1 / np.sqrt(3)
 RICH_POSES = 64
+TouchKind = Literal["place", "plane", "pair", "bar"]
+LEAST_LENGTH = 1e-9
+SOCKET_STEPS = 50
+SOCKET_STEP = 1e-13  # m
 AT_ONCE = 8_000  # poses of tables whose frames are held at once
 
 
@@ -50,6 +54,9 @@ class Measurement:
     deviation_mm : standard deviation of each coordinate; None if it is unknown
     place, plane : the name of a fixed point (a ball in a socket, a tip) or of a plane that was touched there, of which
         nobody knows where it is; no coordinate is measured then
+    pair : the name that two measurements share whose points are ``length_mm`` apart (a scale bar, touched at both ends)
+    bar : the name of a ball bar, whose other end is in a fixed socket of which nobody knows where it is
+    length_mm : distance of a pair's points; from the socket, None if it is unknown and the same for all of a bar
     """
 
     row: int
@@ -59,6 +66,17 @@ class Measurement:
     deviation_mm: float | None = None
     place: str | None = None
     plane: str | None = None
+    pair: str | None = None
+    bar: str | None = None
+    length_mm: float | None = None
+
+    @property
+    def touched(self) -> tuple[TouchKind, str] | None:
+        """What was touched, or a distance's kind, and its name; None where coordinates were measured."""
+        named: list[tuple[TouchKind, str | None]] = [
+            ("place", self.place), ("plane", self.plane), ("pair", self.pair), ("bar", self.bar)
+        ]  # fmt: skip
+        return next(((kind, name) for kind, name in named if name), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +141,12 @@ class PointObservations:
     deviation_known : whether the deviations were stated
     lines : (P,), of the file
     free : what is placed by the measurements, too
-    touched : (P,), number of the place or plane that was touched; -1 where coordinates were measured. What is observed
-        of a place's points is their offset from their mean, of a plane's their distance from the plane that fits them
-        best (in the first coordinate): place and plane drop out
-    planes : (P,) bool, where a plane was touched
+    touched : (P,), number of the place, plane, pair or bar; -1 where coordinates were measured. What is observed of a
+        place's points is their offset from their mean; the rest has one coordinate: of a plane's points their distance
+        from the plane that fits them best, of a pair the distance of its points (with the first of them), of a bar's
+        points their distance from the socket that fits them best, beside its mean if the length is unknown. Place,
+        plane, socket and unknown length drop out
+    kinds : of each number
     """
 
     row_values: Reals
@@ -138,39 +158,74 @@ class PointObservations:
     lines: Integers
     free: tuple[PlacementName, ...]
     touched: Integers
-    planes: Flags
+    kinds: tuple[TouchKind, ...] = ()
 
     def __len__(self) -> int:
         return len(self.values_mm)
 
+    def groups(self) -> list[tuple[TouchKind, Integers]]:
+        """Of each place, plane, pair and bar its kind and points."""
+        numbers = np.unique(self.touched[self.touched >= 0])
+        return [(self.kinds[number], np.flatnonzero(self.touched == number)) for number in numbers]
+
     @property
     def dropped(self) -> int:
-        """How many numbers of places and planes have dropped out, three of each."""
-        return 3 * len(np.unique(self.touched[self.touched >= 0]))
+        """How many numbers of places, planes and bars have dropped out."""
+        return sum(
+            0 if kind == "pair" else 3 + (kind == "bar" and not self._lengths_mm(rows).any())
+            for kind, rows in self.groups()
+        )
 
     @property
     def has_scale(self) -> bool:
-        """Whether coordinates were measured, which set the scale of the arm."""
-        return bool((self.touched < 0).any())
+        """Whether coordinates or lengths were measured, which set the scale of the arm."""
+        return bool((self.touched < 0).any()) or any(
+            kind in ("pair", "bar") and self._lengths_mm(rows).any() for kind, rows in self.groups()
+        )
 
-    def relative(self, xyz: Reals, around: Reals) -> Reals:
-        """What is observed of points (P, 3), or of small shifts of points ``around``: see ``touched``."""
-        if not (self.touched >= 0).any():
-            return xyz
+    def _lengths_mm(self, rows: Integers) -> Reals:
+        """Measured lengths of a pair or bar; 0 if they are unknown."""
+        lengths = np.zeros(self.seen.shape)
+        lengths[self.seen] = self.values_mm
+        found: Reals = lengths[rows, 0]
+        return found
+
+    def relative(self, xyz: Reals) -> Reals:
+        """What is observed of points (P, 3), m: see ``touched``."""
         found = xyz.copy()
-        for number in np.unique(self.touched[self.touched >= 0]):
-            rows = self.touched == number
-            own = xyz[rows] - xyz[rows].mean(axis=0)
-            if not self.planes[rows].any():
-                found[rows] = own
-                continue
-            here = around[rows] - around[rows].mean(axis=0)
-            axes = np.linalg.svd(here, full_matrices=False)[2]
-            normal = axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
-            across = own @ normal
-            inside = here @ axes[:2].T
-            found[rows] = 0.0
-            found[rows, 0] = across - inside @ np.linalg.lstsq(inside, across, rcond=None)[0]
+        for kind, rows in self.groups():
+            own = xyz[rows]
+            if kind == "place":
+                found[rows] = own - own.mean(axis=0)
+            elif kind == "plane":
+                found[rows, 0] = _off_plane(own, own)
+            elif kind == "pair":
+                found[rows, 0] = np.linalg.norm(own[0] - own[-1])
+            else:
+                lengths = self._lengths_mm(rows) / MM
+                found[rows, 0] = np.linalg.norm(own - socket(own, lengths), axis=1)
+                if not lengths.any():
+                    found[rows, 0] -= found[rows, 0].mean()
+        return found
+
+    def relative_shift(self, shift: Reals, around: Reals) -> Reals:
+        """By how much small shifts (P, 3) of points ``around`` change what is observed, m."""
+        found = shift.copy()
+        for kind, rows in self.groups():
+            own, here = shift[rows], around[rows]
+            if kind == "place":
+                found[rows] = own - own.mean(axis=0)
+            elif kind == "plane":
+                found[rows, 0] = _off_plane(own, here)
+            elif kind == "pair":
+                apart = here[0] - here[-1]
+                found[rows, 0] = (own[0] - own[-1]) @ apart / max(float(np.linalg.norm(apart)), LEAST_LENGTH)
+            else:
+                lengths = self._lengths_mm(rows) / MM
+                along = _directions(here - socket(here, lengths))[0]
+                basis = along if lengths.any() else np.column_stack([along, np.ones(len(rows))])
+                longer = np.einsum("pi,pi->p", along, own)
+                found[rows, 0] = longer - basis @ np.linalg.lstsq(basis, longer, rcond=None)[0]
         return found
 
     @property
@@ -198,8 +253,14 @@ class PointObservations:
                 points = self.points(robot) + self.on_tool[:, None] * shift
                 xyz = np.einsum("pij,pj->pi", T[k, :, :3, :3], points) + T[k, :, :3, 3]
                 xyz = xyz @ world[:3, :3].T + world[:3, 3]
-                values[start + k] = MM * self.relative(xyz, xyz)[self.seen]
+                values[start + k] = MM * self.relative(xyz)[self.seen]
         return values
+
+    def positions(self, robot: Robot) -> Reals:
+        """Where a robot puts the measured points (P, 3), m."""
+        T = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1]
+        found: Reals = np.einsum("pij,pj->pi", T[:, :3, :3], self.points(robot)) + T[:, :3, 3]
+        return found
 
     def points(self, robot: Robot) -> Reals:
         """Where the measured points are in the flange's frame (P, 3), m."""
@@ -217,7 +278,6 @@ class PointObservations:
             deviation_mm=self.deviation_mm[own],
             lines=self.lines[used],
             touched=self.touched[used],
-            planes=self.planes[used],
         )
 
     def shifted(self, amounts: Reals) -> PointObservations:
@@ -250,8 +310,45 @@ class PointObservations:
             deviation_mm=np.full(3 * count, np.median(self.deviation_mm)),
             lines=np.zeros(count, dtype=np.int64),
             touched=np.full(count, -1),
-            planes=np.zeros(count, dtype=bool),
         )
+
+
+def _off_plane(xyz: Reals, around: Reals) -> Reals:
+    """Distances (P,) of points, or of their shifts, from the plane that fits points ``around`` best, which drops
+    out."""
+    here = around - around.mean(axis=0)
+    axes = np.linalg.svd(here, full_matrices=False)[2]
+    normal = axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
+    across, inside = (xyz - xyz.mean(axis=0)) @ normal, here @ axes[:2].T
+    found: Reals = across - inside @ np.linalg.lstsq(inside, across, rcond=None)[0]
+    return found
+
+
+def _directions(apart: Reals) -> tuple[Reals, Reals]:
+    """Unit vectors (P, 3) of vectors, and their lengths (P,)."""
+    size = np.maximum(np.linalg.norm(apart, axis=1), LEAST_LENGTH)
+    return apart / size[:, None], size
+
+
+def socket(xyz: Reals, lengths: Reals) -> Reals:
+    """The point (3,), m, from which points (P, 3) are nearest to lengths (P,), or to one length if they are all 0: a
+    sphere by linear least squares, then Gauss-Newton steps."""
+    middle = xyz.mean(axis=0)
+    here = xyz - middle
+    unknown = not lengths.any()
+    squares = (here**2).sum(axis=1) - lengths**2
+    centre: Reals = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, rcond=None)[0][:3]
+    for _ in range(SOCKET_STEPS):
+        along, size = _directions(here - centre)
+        off = size - lengths
+        if unknown:
+            along, off = along - along.mean(axis=0), off - off.mean()
+        step = np.linalg.lstsq(along, off, rcond=None)[0]
+        centre = centre + step
+        if np.abs(step).max() < SOCKET_STEP:
+            break
+    found: Reals = middle + centre
+    return found
 
 
 Observations = QuantityObservations | PointObservations
@@ -281,12 +378,19 @@ def observed(
         return QuantityObservations(quantities_of(stated), expected, HALF_WIDTH_TO_DEVIATION * uncertainty)
     check_poses(measurements, robot)
     xyz = np.array([each.xyz_mm for each in measurements], dtype=float).reshape(-1, 3)
-    names = [each.place or each.plane for each in measurements]
-    known_names = {name: k for k, name in enumerate(dict.fromkeys(name for name in names if name))}
-    touched = np.array([known_names[name] if name else -1 for name in names], dtype=np.int64)
-    planes = np.array([each.plane is not None for each in measurements], dtype=bool)
-    xyz[touched >= 0] = 0.0
-    xyz[planes, 1:] = np.nan
+    names = [each.touched for each in measurements]
+    numbers = {name: k for k, name in enumerate(dict.fromkeys(name for name in names if name))}
+    touched = np.array([numbers[name] if name else -1 for name in names], dtype=np.int64)
+    begun: set[str] = set()
+    for k, each in enumerate(measurements):
+        if each.touched:
+            lone = each.touched[0] == "place"
+            xyz[k] = (
+                (0.0, *([0.0 if lone else np.nan] * 2)) if each.length_mm is None else (each.length_mm, np.nan, np.nan)
+            )
+        if each.pair:
+            xyz[k, 0] = np.nan if each.pair in begun else xyz[k, 0]
+            begun.add(each.pair)
     seen = np.isfinite(xyz)
     on_tool = np.array([each.point == "tool" for each in measurements], dtype=bool)
     known = all(each.deviation_mm is not None for each in measurements)
@@ -304,7 +408,7 @@ def observed(
             name for name in PLACEMENTS if name not in fixed and (on_tool if name == "tool" else touched < 0).any()
         ),
         touched=touched,
-        planes=planes,
+        kinds=tuple(kind for kind, _ in numbers),
     )
 
 

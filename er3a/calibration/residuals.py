@@ -1,8 +1,11 @@
-"""Whether what a calibration leaves is noise: by neighbours in joint space, by the order of measuring, joint by joint.
+"""Whether what a calibration leaves is noise: by neighbours in joint space, by the order of measuring, joint by joint,
+and by the side from which each joint came.
 
 Noise knows no neighbours: over random orders of the poses, the mean product of residual vectors at neighbouring poses
 scatters about 0, and the share of orders that reach the measured value is its probability [1]_. Structure is named by
-the joint whose angle explains most: residuals against a polynomial of it, by an F test for all joints tried.
+the joint whose angle explains most: residuals against a polynomial of it, by an F test for all joints tried. A joint
+with play, or friction, stops short on the side from which it came: residuals against the sign of its last move in the
+file's order, times how the point moves with it.
 
 References
 ----------
@@ -37,6 +40,9 @@ class ResidualStructure:
     order, order_probability : the same of poses one after the other in the file: drift, or how they were come to
     joint : whose value explains most of the residuals; share : of their squares beyond chance
     joint_probability : of so much by chance, for all joints
+    shares, probabilities : the same of each joint
+    play_joint, play_share, play_probability : the joint whose last move's sign explains most, the share and its
+        probability, for all joints; play : by how much it stops short, 1/1000 rad or m
     worst_row, worst_mm : line of the file with the greatest residual
     """
 
@@ -47,17 +53,31 @@ class ResidualStructure:
     joint: int
     share: float
     joint_probability: float
+    shares: tuple[float, ...]
+    probabilities: tuple[float, ...]
+    play_joint: int
+    play_share: float
+    play_probability: float
+    play: float
     worst_row: int
     worst_mm: float
 
     @property
     def is_noise(self) -> bool:
-        """Whether none of the three tests finds structure, at 1 % together."""
-        return min(self.neighbours_probability, self.order_probability, self.joint_probability) > SURE / 3
+        """Whether none of the four tests finds structure, at 1 % together."""
+        found = self.neighbours_probability, self.order_probability, self.joint_probability, self.play_probability
+        return min(found) > SURE / len(found)
 
 
-def structure_of(residuals_mm: Reals, row_values: Reals, lines: Integers) -> ResidualStructure | None:
-    """Structure of residuals (P, 3), mm, at poses (P, m); None of fewer than 40."""
+def structure_of(
+    residuals_mm: Reals, row_values: Reals, lines: Integers, effects_mm: Reals
+) -> ResidualStructure | None:
+    """Structure of residuals (P, 3), mm, at poses (P, m); None of fewer than 40.
+
+    Parameters
+    ----------
+    effects_mm : (P, m, 3), how the measured point moves with what the rows move by, mm per rad or m
+    """
     count = len(residuals_mm)
     if count < LEAST_POSES:
         return None
@@ -69,6 +89,9 @@ def structure_of(residuals_mm: Reals, row_values: Reals, lines: Integers) -> Res
     order, by_order = _correlation(residuals_mm, np.arange(count - 1), after)
     shares = [_explained(residuals_mm, values) for values in row_values.T]
     joint = min(range(len(shares)), key=lambda k: shares[k][1])
+    every = tuple(min(1.0, own * len(shares)) for _, own in shares)
+    plays = [_play(residuals_mm, row_values[:, k], effects_mm[:, k]) for k in range(row_values.shape[1])]
+    loosest = min(range(len(plays)), key=lambda k: plays[k][1])
     distance = np.linalg.norm(residuals_mm, axis=1)
     return ResidualStructure(
         neighbours=neighbours,
@@ -77,7 +100,13 @@ def structure_of(residuals_mm: Reals, row_values: Reals, lines: Integers) -> Res
         order_probability=by_order,
         joint=joint + 1,
         share=shares[joint][0],
-        joint_probability=min(1.0, shares[joint][1] * len(shares)),
+        joint_probability=every[joint],
+        shares=tuple(share for share, _ in shares),
+        probabilities=every,
+        play_joint=loosest + 1,
+        play_share=plays[loosest][0],
+        play_probability=min(1.0, plays[loosest][1] * len(plays)),
+        play=1000 * plays[loosest][2],
         worst_row=int(lines[distance.argmax()]),
         worst_mm=float(distance.max()),
     )
@@ -108,3 +137,16 @@ def _explained(residuals: Reals, values: Reals) -> tuple[float, float]:
     return max(0.0, 1 - (rest / (count - numbers)) / (whole / count)), float(
         scipy.special.fdtrc(numbers, count - numbers, ratio)
     )
+
+
+def _play(residuals: Reals, values: Reals, effect: Reals) -> tuple[float, float, float]:
+    """Share of the residuals' squares that the side from which a joint came explains, its probability, and by how much
+    the joint stops short, rad or m."""
+    shape = (np.sign(np.diff(values, prepend=values[:1]))[:, None] * effect).ravel()
+    size, whole = float(shape @ shape), float((residuals**2).sum())
+    if size == 0 or whole == 0:
+        return 0.0, 1.0, 0.0
+    amount = float(shape @ residuals.ravel()) / size
+    share = amount**2 * size / whole
+    freedom = residuals.size - 1
+    return share, float(scipy.special.fdtrc(1, freedom, freedom * share / max(1 - share, 1e-12))), amount

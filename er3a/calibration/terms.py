@@ -1,9 +1,10 @@
-"""Errors of joints that no table holds: of a gear's ratio, once and twice a turn, and sag under a load.
+"""Errors of joints that no table holds: of a gear's ratio, once, twice and many times a turn, and sag under a load.
 
-A row that is meant to move by x moves by ``x + sum_k c_k s_k``: ``s = x`` for its ratio, ``(sin x, cos x)`` and ``(sin
-2x, cos 2x)`` for what returns with each turn and half turn (eccentric gears, encoders), and ``-dh/dx`` for sag, h the
-height (m) of the measured point: the torque of a unit weight there, by its Jacobian [1]_. A weight that sinks lowers
-the arm, so the compliance c can't be negative.
+A row that is meant to move by x moves by ``x + sum_k c_k s_k``: ``s = x`` for its ratio, ``(sin kx, cos kx)`` for what
+returns k times a turn (eccentric gears and encoders once and twice, teeth many times), and ``-dh/dx`` for sag: the
+torque of a unit weight, by its Jacobian [1]_. h is the height (m) of the measured point, for a load there; or, where
+the robot's file gives masses, that of the centre of mass of its known links, for the arm's own weight. A weight that
+sinks lowers the arm, so the compliance c can't be negative.
 
 References
 ----------
@@ -25,57 +26,81 @@ from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
-TermKind = Literal["ratio", "once", "twice", "sag"]
+TermKind = Literal["ratio", "once", "twice", "sag", "weight", "ripple"]
 KINDS: tuple[TermKind, ...] = get_args(TermKind)
+RIPPLES = range(3, 257)
+"""How many times a turn an error is looked for; strain wave gears have some 200 a turn."""
 TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma
 
 
 @dataclass(frozen=True)
 class JointTerm:
-    """One kind of error of the joint of one row, from 1."""
+    """One kind of error of the joint of one row, from 1; ``turns``: how often a ripple returns in a turn."""
 
     kind: TermKind
     joint: int
+    turns: int = 0
 
     @property
     def count(self) -> int:
         """How many coefficients it has."""
-        return 2 if self.kind in ("once", "twice") else 1
+        return 1 if self.kind in ("ratio", "sag", "weight") else 2
 
-    def shapes(self, x: Reals, climb: Reals) -> Reals:
+    def shapes(self, x: Reals, climb: Reals, own_climb: Reals) -> Reals:
         """(P, count), what the coefficients are multiplied by.
 
         Parameters
         ----------
         x : (P, m), what the rows are meant to move by
-        climb : (P, m), derivative of the measured point's height by it
+        climb, own_climb : (P, m), derivative of the measured point's height by it, and of the centre of mass's
         """
         own = x[:, self.joint - 1]
         if self.kind == "ratio":
             return own[:, None]
         if self.kind == "sag":
             return -climb[:, [self.joint - 1]]
-        turns = 1 if self.kind == "once" else 2
+        if self.kind == "weight":
+            return -own_climb[:, [self.joint - 1]]
+        turns = {"once": 1, "twice": 2}.get(self.kind, self.turns)
         return np.column_stack([np.sin(turns * own), np.cos(turns * own)])
 
 
 def candidates(robot: Robot) -> tuple[JointTerm, ...]:
-    """The terms that are tried; joints that slide have no turns."""
+    """The terms that are tried beside ripples; joints that slide have no turns."""
     return tuple(
         JointTerm(kind, row + 1)
         for kind in KINDS
         for row in range(robot.rows)
-        if kind in ("ratio", "sag") or not robot.sliding[row]
+        if kind != "ripple"
+        and (kind != "weight" or any(each.link > row for each in robot.masses.links))
+        and (kind in ("ratio", "sag", "weight") or not robot.sliding[row])
     )
 
 
 def effects(robot: Robot, row_values: Reals, points: Reals) -> Reals:
     """How points (P, 3), m, in the flange's frame move with what the rows move by: (P, m, 3), m per rad or m."""
     T = frames_of(tables_of(robot), robot, row_values)[0]
-    p = np.einsum("pij,pj->pi", T[:, -1, :3, :3], points) + T[:, -1, :3, 3]
+    return _moving(robot, T, np.einsum("pij,pj->pi", T[:, -1, :3, :3], points) + T[:, -1, :3, 3])
+
+
+def _moving(robot: Robot, T: Reals, p: Reals) -> Reals:
+    """How points p (P, 3) move with each row, (P, m, 3); frames T (P, m + 1, 4, 4)."""
     axis, origin = T[:, :-1, :3, 2], T[:, :-1, :3, 3]
     turning = np.cross(axis, p[:, None] - origin)
     found: Reals = robot.direction[:, None] * np.where(robot.sliding[:, None], axis, turning)
+    return found
+
+
+def centre_climb(robot: Robot, row_values: Reals) -> Reals:
+    """How the centre of mass of all known links rises with what the rows move by, (P, m), m per rad or m; 0 without
+    known masses."""
+    T = frames_of(tables_of(robot), robot, row_values)[0]
+    found, whole = np.zeros_like(row_values), sum(each.body.mass for each in robot.masses.links)
+    for each in robot.masses.links:
+        k = each.link
+        if k and whole:
+            centre = T[:, k - 1, :3, :3] @ np.array(each.body.centre) + T[:, k - 1, :3, 3]
+            found[:, :k] += each.body.mass / whole * _moving(robot, T, centre)[:, :k, 2]
     return found
 
 
@@ -95,8 +120,8 @@ class JointErrors(ByValue):
 
     def columns(self, x: Reals, points: Reals) -> list[tuple[int, Reals]]:
         """For each coefficient the row (from 0) and what it is multiplied by (P,)."""
-        climb = effects(self.robot, x, points)[:, :, 2]
-        shapes = [(term, term.shapes(x, climb)) for term in self.terms]
+        climb, own = effects(self.robot, x, points)[:, :, 2], centre_climb(self.robot, x)
+        shapes = [(term, term.shapes(x, climb, own)) for term in self.terms]
         return [(term.joint - 1, values[:, k]) for term, values in shapes for k in range(term.count)]
 
     def amounts(self, x: Reals, points: Reals) -> Reals:
@@ -113,9 +138,8 @@ def term_jacobian(here: Robot, robot: Robot, terms: Sequence[JointTerm], observa
     x = observations.row_values
     by_row = effects(here, x, observations.points(here)) * 1000
     columns = JointErrors(robot, tuple(terms), np.empty(0)).columns(x, observations.points(robot))
-    T = frames_of(tables_of(here), here, x)[0][:, -1]
-    around = np.einsum("pij,pj->pi", T[:, :3, :3], observations.points(here)) + T[:, :3, 3]
-    shifts = [observations.relative(values[:, None] * by_row[:, row], around) for row, values in columns]
+    around = observations.positions(here)
+    shifts = [observations.relative_shift(values[:, None] * by_row[:, row], around) for row, values in columns]
     found = [shift[observations.seen] for shift in shifts]
     return np.stack(found, axis=1) if found else np.empty((len(observations), 0))
 
@@ -128,4 +152,4 @@ def places_of(terms: Sequence[JointTerm], first: int = 0) -> list[list[int]]:
 
 def wrong_way(term: JointTerm, coefficients: Reals) -> bool:
     """Whether a load would have to lift the arm."""
-    return term.kind == "sag" and float(coefficients[0]) < 0
+    return term.kind in ("sag", "weight") and float(coefficients[0]) < 0

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 
 from er3a.calibration import calibrate as calibration
 from er3a.calibration.calibrate import Calibration
-from er3a.calibration.observations import PLACEMENTS, Measurement, check_poses
+from er3a.calibration.observations import PLACEMENTS, Measurement, TouchKind, check_poses
 from er3a.calibration.outcomes import PlacementName
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
@@ -43,6 +43,9 @@ def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:
         "standard_deviation_mm": CsvColumn(float, always=False),
         "place": CsvColumn(str, optional=True, always=False),
         "plane": CsvColumn(str, optional=True, always=False),
+        "pair": CsvColumn(str, optional=True, always=False),
+        "bar": CsvColumn(str, optional=True, always=False),
+        "length_mm": CsvColumn(float, optional=True, always=False),
     }
 
 
@@ -54,7 +57,8 @@ APART_DEVIATIONS = 8.0
 def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Measurement, ...]:
     """Read measured positions: joint values ``q1_deg`` ... (``q3_mm`` of a joint that slides), ``point`` (flange or
     tool), ``x_mm``, ``y_mm``, ``z_mm``, and, if it is known, ``standard_deviation_mm``. In place of coordinates
-    ``place`` or ``plane`` names a fixed point or a plane, of which nobody knows where it is, that was touched there.
+    ``place`` or ``plane`` names a fixed point or a plane, of which nobody knows where it is, that was touched there;
+    ``pair`` two rows whose points are ``length_mm`` apart, ``bar`` a ball bar whose other end is in a fixed socket.
 
     Parameters
     ----------
@@ -74,11 +78,15 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
     rows = []
     for fields in table:
         xyz, deviation = tuple(fields[f"{c}_mm"] for c in "xyz"), fields["standard_deviation_mm"]
-        place, plane = fields["place"], fields["plane"]
-        given = [name for name, value in (("place", place), ("plane", plane)) if value]
+        names = {kind: fields[kind] for kind in get_args(TouchKind)}
+        given, length = [kind for kind, value in names.items() if value], fields["length_mm"]
         if given and (len(given) > 1 or xyz != (None, None, None)):
-            problem = "a touched place or plane beside another, or beside coordinates"
-            raise InputError(path, f"row {fields['row']}, column {given[-1]}", problem, "Give one of the three")
+            problem = "a touched place or plane, a pair or a bar beside another, or beside coordinates"
+            raise InputError(path, f"row {fields['row']}, column {given[-1]}", problem, "Give one of them")
+        if length is not None and (length <= 0 or not {"pair", "bar"} & set(given)):
+            problem = f"{length:g} is not positive" if length <= 0 else "a length of neither a pair nor a bar"
+            remedy = "Write the distance of a pair's points, or of a bar's point from its socket"
+            raise InputError(path, f"row {fields['row']}, column length_mm", problem, remedy)
         if xyz == (None, None, None) and not given:
             raise InputError(path, f"row {fields['row']}, column x_mm", "no coordinate is given", "Give one at least")
         if deviation is not None and deviation <= 0:
@@ -86,10 +94,29 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
             remedy = "Write the measuring device's standard deviation, or leave the column out to have it estimated"
             raise InputError(path, where, problem, remedy)
         pose = tuple(fields[f"q{joint}_{unit}"] for joint, unit in enumerate(units, 1))
-        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, place, plane))
+        rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, **names, length_mm=length))
     _check_units(path, rows, units)
     _check_contradictions(path, rows)
+    _check_lengths(path, rows)
     return tuple(rows)
+
+
+def _check_lengths(path: Path, rows: list[Measurement]) -> None:
+    """A pair has two rows and one length, a bar a length in all of its rows or in none."""
+    groups: dict[tuple[str, str], list[Measurement]] = {}
+    for row in rows:
+        if row.touched and row.touched[0] in ("pair", "bar"):
+            groups.setdefault(row.touched, []).append(row)
+    for (kind, name), own in groups.items():
+        lengths = {row.length_mm for row in own}
+        where = f"row {own[-1].row}, column {kind}"
+        if kind == "pair" and len(own) != 2:
+            raise InputError(path, where, f"{len(own)} rows are of the pair '{name}'", "Give two rows to each pair")
+        if kind == "pair" and (len(lengths) > 1 or None in lengths):
+            raise InputError(path, where, f"the pair '{name}' lacks one length", "Write it in both rows, in length_mm")
+        if kind == "bar" and None in lengths and len(lengths) > 1:
+            problem = f"the bar '{name}' has a length in some rows only"
+            raise InputError(path, where, problem, "Write it in all rows, or in none if it is unknown")
 
 
 def _units_in(path: Path) -> list[str]:
@@ -119,7 +146,7 @@ def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
     for row in rows:
         if row.deviation_mm is None:
             return
-        if row.place or row.plane:
+        if row.touched:
             continue
         by_pose.setdefault((row.pose, row.point), []).append(row)
     for same in (rows for rows in by_pose.values() if len(rows) > 1):

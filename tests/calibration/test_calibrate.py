@@ -22,7 +22,8 @@ from er3a.pipeline.cli import app
 from er3a.robots.conventions import to_modified
 from testing.simulated_measurements import covered, measured
 
-HEADER = ",".join(name for name in COLUMNS if name not in ("place", "plane")) + "\n"
+TOUCHED = ("place", "plane", "pair", "bar", "length_mm")
+HEADER = ",".join(name for name in COLUMNS if name not in TOUCHED) + "\n"
 TRUSTED = ("er3a_c60", "er3_600")
 
 

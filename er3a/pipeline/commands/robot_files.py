@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,7 @@ from er3a.pipeline.commands.options import (
     print_json,
     print_note,
 )
+from er3a.pipeline.messages.language import LANGUAGES, using
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 
@@ -139,6 +141,10 @@ def calibrate(
     output: Annotated[Path | None, typer.Option(help="the robot file to write; none by default")] = None,
     fixed: Annotated[list[FixedPlacement] | None, typer.Option(help="what the robot's file places right")] = None,
     held_back: Annotated[Path | None, typer.Option(help="a CSV of positions that the fit is not to see")] = None,
+    plan: Annotated[int, typer.Option(min=0, max=100, help="only say what is settled, and N poses to add")] = 0,
+    html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
+    rrd: Annotated[Path | None, typer.Option(help="also write a recording for the Rerun viewer")] = None,
+    words: Annotated[str, typer.Option("--language", help=f"of the page: {' | '.join(LANGUAGES)}")] = "en",
     as_json: AsJson = False,
 ):
     """Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot file.
@@ -146,34 +152,75 @@ def calibrate(
     Errors of joints beyond the table (ratio, once and twice a turn, sag) are fitted where poses left out are met
     better with them; the table in the file is the best without them.
     """
+    from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.by_name import load_measurements
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
-    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, lines_of
+    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, lines_of, plan_lines, plan_record
     from er3a.pipeline.messages.say import say
 
-    source = Path(measurements) if measurements.endswith(".csv") else load_references(measurements)
+    if words not in LANGUAGES:
+        raise Er3aError(f"--language is '{words}'; known: {', '.join(LANGUAGES)}")
+    file = Path(measurements) if measurements.endswith(".csv") else None
+    if file is None and (html or rrd):
+        raise Er3aError(
+            f"--{'html' if html else 'rrd'} shows measured positions; give a CSV of them, not a reference set"
+        )
     arm = load_robot(robot)
+    rows = load_measurements(file, arm) if file else ()
+    if plan:
+        from er3a.calibration.plan import plan as planned
+
+        if file is None:
+            raise Er3aError("--plan takes measured positions; give a CSV of them, not a reference set")
+        check_poses(rows, arm, file)
+        proposed = planned(arm, rows, plan, [each.value for each in fixed or ()])
+        print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
+        return
     others = load_measurements(held_back, arm) if held_back else None
     try:
         with shown_work(f"{robot}: corrections are estimated"):
+            source = file or load_references(measurements)
             found = calibrate_robot(arm, source, [each.value for each in fixed or ()])
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
+    name = output.stem if output else f"{arm.name}_calibrated"
+    corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated")
     if output:
-        write_robot(found.robot.replace(name=output.stem, title=f"{found.robot.title}, calibrated"), output)
+        write_robot(corrected, output)
     distances = found.distances_mm(others) if others else None
+    if html:
+        from er3a.pipeline.viewing.calibration import write_calibration
+
+        with using(words):
+            write_calibration(
+                arm,
+                rows,
+                found,
+                html,
+                command=["er3a", *sys.argv[1:]],
+                files=[given for given in (Path(robot), file) if given and given.is_file()],
+                corrected=corrected,
+                recording=rrd,
+                held_back=distances,
+            )
+    if rrd:
+        from er3a.pipeline.viewing.calibration import measured_errors
+        from er3a.pipeline.viewing.calibration_recording import record_calibration
+
+        record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
         print_json({"output": str(output) if output else None, **calibration_record(found, distances)})
         return
     print(lines_of(found))
     if distances is not None:
         print(held_back_line(distances))
-    if output:
-        print(f"{output}: written")
+    for written in (output, html, rrd):
+        if written:
+            print(f"{written}: written")
 
 
 @app.command(rich_help_panel=ROBOT_FILES)

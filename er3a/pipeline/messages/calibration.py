@@ -6,19 +6,28 @@ from collections.abc import Sequence
 
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
+from er3a.calibration.plan import Plan
 from er3a.calibration.residuals import ResidualStructure
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.diagnosis import level
-from er3a.pipeline.messages.language import as_text
+from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import say
+from er3a.robots.robot import Robot
 
 MUCH_SCATTER = 2.0
-TERMS = {"ratio": "ratio", "once": "once a turn", "twice": "twice a turn", "sag": "sag under a load"}
+TERMS = {
+    "ratio": N_("ratio"),
+    "once": N_("once a turn"),
+    "twice": N_("twice a turn"),
+    "sag": N_("sag under a load"),
+    "weight": N_("sag under its own weight"),
+    "ripple": N_("{turns} times a turn"),
+}
 VERDICTS = {
-    "taken": "taken",
-    "not_lower": "left: poses left out are not met better",
-    "noise": "left: noise may have made it",
-    "wrong_way": "left: a load would have to lift the arm",
+    "taken": N_("taken"),
+    "not_lower": N_("left: poses left out are not met better"),
+    "noise": N_("left: noise may have made it"),
+    "wrong_way": N_("left: a load would have to lift the arm"),
 }
 
 
@@ -31,6 +40,7 @@ def lines_of(found: Calibration) -> str:
     )
     lines = [
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
+        f"these measurements settle {len(found.estimates)} of {len(found.estimates) + len(found.held)} numbers",
         f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "
         + scatter,
         *_entry_lines(found.estimates),
@@ -58,10 +68,62 @@ def lines_of(found: Calibration) -> str:
     return "\n".join(lines)
 
 
+def plan_lines(found: Plan, robot: Robot) -> str:
+    """What measurements settle, and what to measure next."""
+    units = ["mm" if slides else "deg" for slides in robot.slides]
+    able = len(found.settled) + len(found.lacking)
+    lines = [f"these measurements settle {len(found.settled)} of {able} numbers that such measurements can settle"]
+    lines += [f"settled by more poses: {', '.join(found.lacking)}"] if found.lacking else []
+    lines += [f"settled by no poses: {say(reason)}" for reason in found.held]
+    if found.beyond:
+        beyond = (
+            f"J{each.joint} {'beyond' if each.above else 'below'} {as_text(each.value, '.4g')} {units[each.joint - 1]}"
+            for each in found.beyond
+        )
+        lines.append(f"add poses with {', '.join(beyond)}")
+    lines.append("poses that add most, the first one first, by the table:")
+    for number, each in enumerate(found.proposals, 1):
+        pose = ", ".join(as_text(value, ".2f") for value in each.pose)
+        what = f"  {each.kind} {each.name}" if each.kind else ""
+        length = f", {each.length_mm:.2f} mm" if each.kind == "pair" else ""
+        lines.append(f"{number:>4}  ({pose}){what}{length}")
+    lines.append("half of the 95 % interval, with the measurements and with these poses as well:")
+    for width in found.widths:
+        now = "not settled" if width.now is None else f"{width.now:.4f}"
+        then = "not settled" if width.then is None else f"{width.then:.4f}"
+        lines.append(f"{width.parameter.name:<9}{now:>12}{then:>12} {width.parameter.unit}")
+    return "\n".join(lines)
+
+
+def plan_record(found: Plan) -> dict[str, object]:
+    """A plan as plain data, for another program."""
+    return {
+        "settled": list(found.settled),
+        "lacking": list(found.lacking),
+        "held": [say(reason) for reason in found.held],
+        "proposals": [vars(each) for each in found.proposals],
+        "beyond": [vars(each) for each in found.beyond],
+        "half_widths": [
+            {"name": each.parameter.name, "now": each.now, "then": each.then, "unit": each.parameter.unit}
+            for each in found.widths
+        ],
+    }
+
+
 def held_back_line(distances: Reals) -> str:
     """How far the model is from positions that the fit has not seen, mm."""
     mean, worst = distances.mean(), distances.max()
     return f"held back: {len(distances)} positions, {mean:.4g} mm off on average, {worst:.4g} mm at worst"
+
+
+def term_name(term: TriedTerm | TermEstimate) -> str:
+    """Such as J2 once a turn."""
+    return f"J{term.joint} {term_kind(term)}"
+
+
+def term_kind(term: TriedTerm | TermEstimate) -> str:
+    """Such as once a turn."""
+    return tr(TERMS[term.kind], turns=term.turns) if term.turns else tr(TERMS[term.kind])
 
 
 def _entry_lines(estimates: Sequence[Estimate]) -> list[str]:
@@ -80,25 +142,50 @@ def _left_out_line(found: HeldOutErrors) -> str:
 
 
 def _residual_line(found: ResidualStructure) -> str:
+    return "; ".join(residual_texts(found))
+
+
+def residual_texts(found: ResidualStructure) -> list[str]:
+    """Whether what remains is noise, its structure if it isn't, and where it is greatest."""
+    greatest = tr("greatest: {worst_mm:.3g} mm in row {row}", worst_mm=found.worst_mm, row=found.worst_row)
     if found.is_noise:
-        return f"what remains is noise by all three tests; greatest: {found.worst_mm:.3g} mm in row {found.worst_row}"
-    return (
-        f"what remains is more than noise: correlation {found.neighbours:.2f} between neighbouring poses (p "
-        f"{found.neighbours_probability:.2g}), {found.order:.2f} from row to row (p {found.order_probability:.2g}); "
-        f"J{found.joint} explains most, {found.share:.1%} (p {found.joint_probability:.2g}); greatest: "
-        f"{found.worst_mm:.3g} mm in row {found.worst_row}"
+        return [tr("what remains is noise by all four tests"), greatest]
+    correlated = tr(
+        "what remains is more than noise: correlation {neighbours:.2f} between neighbouring poses (p "
+        "{by_neighbours:.2g}), {order:.2f} from row to row (p {by_order:.2g})",
+        neighbours=found.neighbours,
+        by_neighbours=found.neighbours_probability,
+        order=found.order,
+        by_order=found.order_probability,
     )
+    by_value = tr(
+        "J{joint} explains most by its value, {share:.1%} (p {p:.2g})",
+        joint=found.joint,
+        share=found.share,
+        p=found.joint_probability,
+    )
+    play = tr(
+        "J{joint} explains most by the side from which it came, {share:.1%} (p {p:.2g}): it misses by {play:.3f}/1000 "
+        "rad or m either way",
+        joint=found.play_joint,
+        share=found.play_share,
+        p=found.play_probability,
+        play=abs(found.play),
+    )
+    return [correlated, by_value, play, greatest]
 
 
 def _tried_line(found: TriedTerm) -> str:
     changes = f"{as_text(found.change, '+.1%')}, far from all others {as_text(found.far_change, '+.1%')}"
-    name = f"J{found.joint} {TERMS[found.kind]}"
-    return f"tried: {name:<20} squared error left out {changes}, p {found.probability:.1e}: {VERDICTS[found.verdict]}"
+    name = term_name(found)
+    return (
+        f"tried: {name:<20} squared error left out {changes}, p {found.probability:.1e}: {tr(VERDICTS[found.verdict])}"
+    )
 
 
 def _beyond_lines(found: Beyond) -> list[str]:
     lines = [f"with terms beyond the table: {found.rms_mm:.4g} mm root mean square"]
-    lines += [f"  J{each.joint} {TERMS[each.kind]}: {_coefficients(each)}" for each in found.terms]
+    lines += [f"  {term_name(each)}: {_coefficients(each)}" for each in found.terms]
     if found.left_out:
         lines.append(f"with terms, {_left_out_line(found.left_out)}")
     if found.residuals:

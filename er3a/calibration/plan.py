@@ -1,0 +1,304 @@
+"""What measurements settle before anything is fitted, and which poses would settle most of the rest.
+
+Poses are proposed one after the other, each the one of many candidates that adds most to ln det of the information
+matrix [1]_. Where something is touched, candidates touch it by the table.
+
+References
+----------
+.. [1] J.-H. Borm, C.-H. Menq, "Determination of optimal measurement configurations for robot calibration based on
+   observability measure", Int. J. of Robotics Research 10(1), 1991.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from er3a.calibration.fit import SCALE, jacobian, subspace
+from er3a.calibration.observations import (
+    PLACEMENTS,
+    Measurement,
+    PointObservations,
+    TouchKind,
+    observed,
+    socket,
+)
+from er3a.calibration.outcomes import INTERVAL_95, Held, PlacementName
+from er3a.calibration.parameters import Parameter, parameters_of, placements_of
+from er3a.calibration.terms import effects
+from er3a.collision.along import clearance
+from er3a.kinematics.chain import row_values
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.quasi_random import quasi_random_points
+from er3a.references.quantities import Pose
+from er3a.robots.joint_limits import meant, shown
+from er3a.robots.robot import Robot
+
+CANDIDATES = 256
+RIDGE, RELATIVE_RIDGE = 1e-9, 1e-13
+NEWTON_STEPS = 40
+LONGEST_STEP = 0.2  # rad, m
+TOUCHES_M = 1e-6
+BEYOND = 10.0
+"""deg or mm by which proposals go beyond what a joint has been measured at, to be named."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A pose to measure next: deg, or mm of joints that slide; what to touch or to use there, if not coordinates."""
+
+    pose: Pose
+    kind: TouchKind | None = None
+    name: str | None = None
+    length_mm: float | None = None
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """A joint that proposals take ``above`` or below a value (deg or mm) at which measurements end."""
+
+    joint: int
+    above: bool
+    value: float
+
+
+@dataclass(frozen=True)
+class Width:
+    """Half-width of a number's 95 % interval (mm or deg), with the measurements and with the proposals as well; None if
+    they don't settle it."""
+
+    parameter: Parameter
+    now: float | None
+    then: float | None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What measurements settle, and what to measure next.
+
+    Attributes
+    ----------
+    settled : numbers that they tell apart; lacking : that measurements of this kind at more poses would
+    held : why no poses settle the others
+    proposals : poses, the one that adds most first
+    beyond : where these go beyond the measured poses
+    widths : of all numbers that are settled with the proposals, for the deviation stated or else 0.1 mm
+    """
+
+    settled: tuple[str, ...]
+    lacking: tuple[str, ...]
+    held: tuple[Held, ...]
+    proposals: tuple[Proposal, ...]
+    beyond: tuple[Beyond, ...]
+    widths: tuple[Width, ...]
+
+
+ASSUMED_MM = 0.1
+
+
+def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: Sequence[PlacementName] = ()) -> Plan:
+    """What positions settle of base, table and tool, and ``count`` poses, within limits and free of collision of the
+    arm with itself, that would settle most of the rest.
+
+    Raises
+    ------
+    InputError
+        for poses of another arm, or outside its limits
+    """
+    seen = observed(measurements, robot, fixed)
+    assert isinstance(seen, PointObservations)
+    if not seen.deviation_known:
+        seen = seen.with_deviation(ASSUMED_MM)
+    parameters = (*placements_of(seen.free), *parameters_of(robot, "all_entries"))
+    options = _options(robot, measurements, seen)
+    every = _with(robot, measurements, [each for option in options for each in option], seen)
+    now, able = subspace(robot, parameters, seen), subspace(robot, parameters, every)
+    kept = [parameters[k] for k in able.kept]
+    chosen = [options[k] for k in _chosen(robot, kept, every, len(measurements), options, count)]
+    proposals = tuple(each for option in chosen for each in option)
+    then = _with(robot, measurements, proposals, seen)
+    return Plan(
+        settled=tuple(parameters[k].name for k in now.kept),
+        lacking=tuple(parameters[k].name for k in able.kept if k not in now.kept),
+        held=able.held,
+        proposals=proposals,
+        beyond=_beyond(measurements, proposals),
+        widths=_widths(robot, parameters, (seen, now.kept), then),
+    )
+
+
+def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[int]:
+    """Places of the blocks of rows (k, p) that add most to ln det of an information matrix (p, p), one after the
+    other."""
+    information = information + max(RIDGE, RELATIVE_RIDGE * np.trace(information)) * np.eye(len(information))
+    chosen: list[int] = []
+    for _ in range(min(count, len(blocks))):
+        half = np.linalg.solve(np.linalg.cholesky(information), np.concatenate(blocks).T).T
+        ends = np.cumsum([0, *(len(block) for block in blocks)])
+        parts = [half[start:end] for start, end in pairwise(ends)]
+        gain = [np.linalg.slogdet(np.eye(len(part)) + part @ part.T)[1] for part in parts]
+        for at in chosen:
+            gain[at] = -1.0
+        best = int(np.argmax(gain))
+        information = information + blocks[best].T @ blocks[best]
+        chosen.append(best)
+    return chosen
+
+
+def _chosen(
+    robot: Robot,
+    kept: Sequence[Parameter],
+    every: PointObservations,
+    measured: int,
+    options: Sequence[tuple[Proposal, ...]],
+    count: int,
+) -> list[int]:
+    """Options by D-optimality, of observations whose first points were measured."""
+    J = SCALE * jacobian(robot, kept, every) / every.deviation_mm[:, None]
+    old = J[every.pose_of < measured]
+    ends = measured + np.cumsum([0, *(len(option) for option in options)])
+    blocks = [J[(every.pose_of >= start) & (every.pose_of < end)] for start, end in pairwise(ends)]
+    return d_optimal(old.T @ old, blocks, count)
+
+
+def _with(
+    robot: Robot, measurements: Sequence[Measurement], proposals: Sequence[Proposal], seen: PointObservations
+) -> PointObservations:
+    """The observations with those at proposed poses, as they would be by the table."""
+    point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
+    known = {each.touched for each in measurements if each.length_mm is not None}
+    new = [_as_measured(each, point, each.kind == "pair" or (each.kind, each.name) in known) for each in proposals]
+    found = observed([*measurements, *new], robot, [name for name in PLACEMENTS if name not in seen.free])
+    assert isinstance(found, PointObservations)
+    return found.with_deviation(float(np.median(seen.deviation_mm)))
+
+
+def _as_measured(proposal: Proposal, point: Literal["flange", "tool"], with_length: bool) -> Measurement:
+    xyz = (None, None, None) if proposal.kind else (0.0, 0.0, 0.0)
+    measured = Measurement(0, proposal.pose, point, xyz, length_mm=proposal.length_mm if with_length else None)
+    return replace(measured, **{proposal.kind: proposal.name}) if proposal.kind else measured  # type: ignore[arg-type]
+
+
+def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObservations) -> list[tuple[Proposal, ...]]:
+    """Candidates within limits and free of collision, as many for each thing that is measured."""
+    low, high = shown(robot, robot.lower), shown(robot, robot.upper)
+    kinds = dict.fromkeys(each.touched for each in measurements)
+    if any(each and each[0] == "pair" for each in kinds):
+        kinds = dict.fromkeys(each if each and each[0] != "pair" else ("pair", "") if each else None for each in kinds)
+    q = meant(robot, np.round(quasi_random_points(low, high, CANDIDATES)))
+    q = q[clearance(robot, q, None).distance > 0]
+    x = seen.positions(robot)
+    options: list[tuple[Proposal, ...]] = []
+    for number, touched in enumerate(kinds):
+        own = q[number :: len(kinds)]
+        if touched is None:
+            options += [(Proposal(_pose(robot, each)),) for each in own]
+            continue
+        rows = np.array(
+            [k for k, each in enumerate(measurements) if each.touched == touched or (not touched[1] and each.pair)]
+        )
+        kind, name = touched
+        lengths = np.array([measurements[k].length_mm or 0.0 for k in rows]) / 1000
+        first = own[: len(own) // 2] if kind == "pair" else own
+        around = _points(robot, own[: len(first)], seen)
+        second, size, done = _touching(robot, own[-len(first) :], seen, kind, x[rows], lengths, around)
+        for k in np.flatnonzero(done):
+            if kind == "pair":
+                label, length = f"next {len(options) + 1}", 1000 * float(size[k])
+                options.append(tuple(Proposal(_pose(robot, each[k]), kind, label, length) for each in (first, second)))
+            else:
+                options.append((Proposal(_pose(robot, second[k]), kind, name, 1000 * float(size[k])),))
+    return options
+
+
+def _touching(
+    robot: Robot, q: Reals, seen: PointObservations, kind: TouchKind, x: Reals, lengths: Reals, others: Reals
+) -> tuple[Reals, Reals, Flags]:
+    """Joint values (N, n) near to others that touch what points x (P, 3), m, have touched, or are at a pair's length
+    from ``others`` (N, 3); lengths (N,), m, and whether each does, free of collision and within limits."""
+    size = np.resize(lengths, len(q))
+    centre = x.mean(axis=0)
+    normal = np.linalg.svd(x - centre)[2][2]
+    if kind == "bar":
+        centre = socket(x, lengths)
+        if not lengths.any():
+            size = np.full(len(q), np.linalg.norm(x - centre, axis=1).mean())
+    for _ in range(NEWTON_STEPS):
+        point = _points(robot, q, seen)
+        apart = point - (others if kind == "pair" else centre)
+        J = _by_joints(robot, q, seen)
+        if kind == "place":
+            off, slope = apart, J
+        else:
+            far = np.linalg.norm(apart, axis=1)
+            along = np.tile(normal, (len(q), 1)) if kind == "plane" else apart / np.maximum(far, TOUCHES_M)[:, None]
+            off = ((apart * along).sum(axis=1) - (0.0 if kind == "plane" else size))[:, None]
+            slope = np.einsum("pi,pij->pj", along, J)[:, None]
+        step = -np.einsum("pji,pi->pj", np.linalg.pinv(slope, rcond=1e-4), off)
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        q = q + step * np.minimum(1.0, LONGEST_STEP / np.maximum(longest, TOUCHES_M))
+    done = (np.abs(off).max(axis=1) < TOUCHES_M) & ((q >= robot.lower) & (q <= robot.upper)).all(axis=1)
+    done[done] = clearance(robot, q[done], None).distance > 0
+    return q, size, done
+
+
+def _points(robot: Robot, q: Reals, seen: PointObservations) -> Reals:
+    """Where the table puts the measured point (N, 3), m."""
+    T = forward(robot if seen.on_tool.any() else robot.without_tool(), q)
+    found: Reals = T[:, :3, 3]
+    return found
+
+
+def _by_joints(robot: Robot, q: Reals, seen: PointObservations) -> Reals:
+    """How the measured point moves with joints, (N, 3, n), m per rad or m."""
+    point = robot.tool[:3, 3] if seen.on_tool.any() else np.zeros(3)
+    by_row = effects(robot, row_values(robot, q), np.broadcast_to(point, (len(q), 3)))
+    coupling = np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling
+    found: Reals = np.einsum("pmc,mj->pcj", by_row, coupling)
+    return found
+
+
+def _pose(robot: Robot, q: Reals) -> Pose:
+    return tuple(np.round(shown(robot, q), 3).tolist())
+
+
+def _beyond(measurements: Sequence[Measurement], proposals: Sequence[Proposal]) -> tuple[Beyond, ...]:
+    old = np.array([each.pose for each in measurements], dtype=float)
+    new = np.array([each.pose for each in proposals], dtype=float).reshape(-1, old.shape[1])
+    found = []
+    for joint, (before, after) in enumerate(zip(old.T, new.T)):
+        if len(after) and after.max() > before.max() + BEYOND:
+            found.append(Beyond(joint + 1, True, float(before.max())))
+        if len(after) and after.min() < before.min() - BEYOND:
+            found.append(Beyond(joint + 1, False, float(before.min())))
+    return tuple(found)
+
+
+def _widths(
+    robot: Robot,
+    parameters: Sequence[Parameter],
+    now: tuple[PointObservations, tuple[int, ...]],
+    then: PointObservations,
+) -> tuple[Width, ...]:
+    kept = subspace(robot, parameters, then).kept
+    before, after = _errors(robot, parameters, *now), _errors(robot, parameters, then, kept)
+    return tuple(
+        Width(
+            parameters[k],
+            *(INTERVAL_95 * own[k] * parameters[k].in_unit if k in own else None for own in (before, after)),
+        )
+        for k in kept
+    )
+
+
+def _errors(
+    robot: Robot, parameters: Sequence[Parameter], seen: PointObservations, kept: tuple[int, ...]
+) -> dict[int, float]:
+    """Standard errors of those that are settled, m or rad."""
+    J = SCALE * jacobian(robot, [parameters[k] for k in kept], seen) / seen.deviation_mm[:, None]
+    return dict(zip(kept, SCALE * np.sqrt(np.diag(np.linalg.pinv(J.T @ J)))))

@@ -1,0 +1,290 @@
+"""The page of ``er3a calibrate``: errors before and after over the workspace, each joint's share, entries, terms, the
+corrected file beside the table before."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from er3a.calibration.calibrate import Calibration, JointShare, TermEstimate, joint_shares
+from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
+from er3a.calibration.observations import Measurement, PointObservations, observed
+from er3a.comparison.compare import compare
+from er3a.files.kept_files import sha256
+from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages import language
+from er3a.pipeline.messages.calibration import VERDICTS, residual_texts, term_kind
+from er3a.pipeline.messages.comparison import headline, layer_rows
+from er3a.pipeline.messages.language import N_, as_text, tr
+from er3a.pipeline.messages.say import bracketed, say
+from er3a.pipeline.results import Input, Provenance
+from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
+from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.page import Picture, ShownFigure
+from er3a.pipeline.viewing.palette import JOINTS, MUTED
+from er3a.robots.robot import Robot
+
+BINS = 12
+LEAST_IN_BIN = 3
+AXES = ("x", "y", "z")
+MODELS = {"before": N_("before"), "table": N_("table alone"), "model": N_("with terms")}
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredErrors:
+    """A calibration at the positions that it was made from.
+
+    Attributes
+    ----------
+    q : (P, n), deg or mm; xyz_mm : (P, 3), where the corrected table puts the points
+    differences_mm : by ``before``, ``table`` and, if there are terms, ``model``: (P, 3), model minus measurement
+    lines : (P,), of the file
+    """
+
+    q: Reals
+    xyz_mm: Reals
+    differences_mm: dict[str, Reals]
+    lines: Sequence[int]
+
+    def distances_mm(self, model: str) -> Reals:
+        """Over what was measured, (P,)."""
+        found: Reals = np.sqrt(np.nansum(self.differences_mm[model] ** 2, axis=1))
+        return found
+
+    @property
+    def after(self) -> str:
+        """The last of the models."""
+        return list(self.differences_mm)[-1]
+
+
+def measured_errors(robot: Robot, measurements: Sequence[Measurement], found: Calibration) -> MeasuredErrors:
+    """Differences by the table before, the corrected one, and the model with terms if there are any."""
+    seen = observed(measurements, robot)
+    assert isinstance(seen, PointObservations)
+    nothing = found.without_terms()
+    by_model = {
+        "before": replace(nothing, robot=robot).differences_mm(measurements),
+        "table": nothing.differences_mm(measurements),
+    }
+    if found.beyond:
+        by_model["model"] = found.differences_mm(measurements)
+    poses = np.array([each.pose for each in measurements], dtype=float)
+    return MeasuredErrors(poses, 1000 * seen.positions(found.robot), by_model, [each.row for each in measurements])
+
+
+def write_calibration(
+    robot: Robot,
+    measurements: Sequence[Measurement],
+    found: Calibration,
+    output: Path,
+    *,
+    command: Sequence[str],
+    files: Sequence[Path],
+    corrected: Robot,
+    recording: Path | None = None,
+    held_back: Reals | None = None,
+) -> None:
+    """Render a calibration as a page.
+
+    Parameters
+    ----------
+    robot : the table that it started from
+    command : that made it
+    files : what it was made from
+    corrected : what the robot file holds, with the file's name
+    recording : its recording, if there is one
+    held_back : distances (P,), mm, at positions that the fit has not seen
+    """
+    errors = measured_errors(robot, measurements, found)
+    text = yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True))
+    comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
+    residuals = found.beyond.residuals if found.beyond else found.residuals
+    with house_style():
+        page.render(
+            Path(__file__).with_name("calibration.html.j2"),
+            output,
+            command=shlex.join(command),
+            provenance=Provenance(tuple(Input(str(f), sha256(f), {}) for f in files), code_digest(__name__)),
+            arm=language.own_title(robot.title),
+            verdict="pass" if found.fits else "fail",
+            conclusion=say(found.conclusion),
+            texts=_texts(found),
+            figures=_figures(found, errors),
+            errors=_errors(found, errors, held_back),
+            recording=recording,
+            structure=[page.whole_sentence(each) for each in residual_texts(residuals)]
+            if residuals
+            else [tr("There are too few poses to tell noise from structure.")],
+            shares=[_share(each, found) for each in joint_shares(found, robot, measurements)],
+            entries=_entries(found),
+            held=[say(why) for why in found.held],
+            outliers=[(str(each.row), number(each.distance_mm, 3)) for each in found.outliers],
+            tried=_tried(found),
+            layers=layer_rows(comparison),
+            headline=headline(comparison),
+            compare_command=shlex.join(
+                ["er3a", "compare", robot.name, f"{corrected.name}.yaml", "--html", "compared.html"]
+            ),
+            corrected=text,
+            corrected_name=f"{corrected.name}.yaml",
+            corrected_address=page.text_address(text),
+            maps=_maps(errors),
+            by_joint=_by_joint(robot, errors),
+        )
+
+
+def _texts(found: Calibration) -> list[str]:
+    texts = [
+        tr(
+            "{settled} of {all} numbers are settled by {coordinates} coordinates at {poses} poses.",
+            settled=len(found.estimates),
+            all=len(found.estimates) + len(found.held),
+            coordinates=found.coordinates,
+            poses=found.poses,
+        )
+    ]
+    if found.more:
+        texts.append(say(found.more))
+    return texts
+
+
+def _figures(found: Calibration, errors: MeasuredErrors) -> list[ShownFigure]:
+    left_out = found.beyond.left_out if found.beyond else found.left_out
+    figures = [
+        (tr("before, mean distance"), float(errors.distances_mm("before").mean())),
+        (tr("after, mean distance"), float(errors.distances_mm(errors.after).mean())),
+    ]
+    if left_out:
+        figures.append((tr("at poses left out, mean"), left_out.mean_mm))
+        figures.append((tr("at poses left out, worst"), left_out.worst_mm))
+    if found.deviation_mm is not None:
+        figures.append((tr("standard deviation of a coordinate, estimated for the table alone"), found.deviation_mm))
+    return [ShownFigure(label, label, value, "mm", None, False) for label, value in figures]
+
+
+def _errors(found: Calibration, errors: MeasuredErrors, held_back: Reals | None) -> list[list[str]]:
+    left_out: dict[str, HeldOutErrors | None] = {
+        "table": found.left_out,
+        "model": found.beyond.left_out if found.beyond else None,
+    }
+    rows = []
+    for model in errors.differences_mm:
+        rms, own = float(np.sqrt((errors.distances_mm(model) ** 2).mean())), left_out.get(model)
+        numbers = () if own is None else (own.mean_mm, own.worst_mm, own.far_mean_mm, own.far_worst_mm)
+        rows.append([tr(MODELS[model]), number(rms, 3), *(number(value, 3) for value in numbers or [None] * 4)])
+    if held_back is not None:
+        mean, worst = float(held_back.mean()), float(held_back.max())
+        title = tr("held back: {count} positions", count=len(held_back))
+        rows.append([title, "–", number(mean, 3), number(worst, 3), "–", "–"])
+    return rows
+
+
+def _share(share: JointShare, found: Calibration) -> list[str]:
+    who = tr(share.placement) if share.placement else f"J{share.joint}"
+    residuals = found.beyond.residuals if found.beyond else found.residuals
+    left = ["–", "–"]
+    if residuals and share.joint:
+        k = share.joint - 1
+        left = [as_text(residuals.shares[k], ".1%"), number(residuals.probabilities[k], 2)]
+    terms = number(share.terms_mm, 3) if share.terms_mm else "–"
+    return [who, ", ".join(share.entries) or "–", number(share.table_mm, 3), terms, *left]
+
+
+def _entries(found: Calibration) -> list[list[str]]:
+    return [
+        [
+            each.name,
+            fixed(each.nominal, 4),
+            fixed(each.correction, 4),
+            fixed(each.half_width, 4),
+            fixed(each.nominal + each.correction, 4),
+            tr(each.unit),
+            tr("yes") if abs(each.correction) <= each.half_width else tr("no"),
+        ]
+        for each in found.estimates
+    ]
+
+
+def _tried(found: Calibration) -> list[list[str]]:
+    taken = {(each.kind, each.joint, each.turns): each for each in (found.beyond.terms if found.beyond else ())}
+
+    def row(each: TriedTerm) -> list[str]:
+        term = taken.get((each.kind, each.joint, each.turns)) if each.verdict == "taken" else None
+        changes = (as_text(value, "+.1%") for value in (each.change, each.far_change))
+        p, result = number(each.probability, 2), tr(VERDICTS[each.verdict])
+        return [f"J{each.joint}", term_kind(each), *changes, p, result, _coefficients(term) if term else "–"]
+
+    return [row(each) for each in found.tried]
+
+
+def _coefficients(term: TermEstimate) -> str:
+    pairs = zip(term.coefficients, term.standard_errors)
+    return ", ".join(f"{as_text(value, '+.3f')} ± {1.96 * error:.3f}" for value, error in pairs)
+
+
+def _maps(errors: MeasuredErrors) -> Picture:
+    """Distances over the workspace: from above and in the section through the first axis, a column for each model."""
+    models = list(errors.differences_mm)
+    figure, axes = new_figure(2, len(models), width=4.2 * len(models), height=7.5, squeeze=False)
+    x, y, z = errors.xyz_mm.T
+    views = (
+        (x, y, bracketed("x", "mm"), bracketed("y", "mm")),
+        (np.hypot(x, y), z, bracketed(tr("distance from the base's axis"), "mm"), bracketed("z", "mm")),
+    )
+    for column, model in enumerate(models):
+        distance = errors.distances_mm(model)
+        order, top = np.argsort(distance), float(distance.max()) or 1.0
+        for row, (across, up, x_label, y_label) in enumerate(views):
+            ax = axes[row, column]
+            drawn = ax.scatter(
+                across[order], up[order], c=distance[order], s=14, cmap="viridis", vmin=0, vmax=top, rasterized=True
+            )
+            equal_scale(ax, x_label, y_label)
+        axes[0, column].set_title(tr(MODELS[model]))
+        figure.colorbar(drawn, ax=axes[:, column], location="bottom", label=bracketed(tr("distance"), "mm"))
+    caption = tr("Error over the workspace: above from above, below in the section through the base's axis; each "
+                 "column has its own scale.")  # fmt: skip
+    return Picture(figure, tr("Points of the workspace, coloured by their error before and after"), caption)
+
+
+def _by_joint(robot: Robot, errors: MeasuredErrors) -> Picture:
+    """Means of what remains along each joint's value, with two standard errors."""
+    columns = min(4, robot.joints)
+    rows = -(-robot.joints // columns)
+    figure, axes = new_figure(rows, columns, width=11, height=2.6 * rows, squeeze=False, sharey=True)
+    left = errors.differences_mm[errors.after]
+    for joint, ax in enumerate(axes.flat):
+        if joint >= robot.joints:
+            ax.set_axis_off()
+            continue
+        _binned(ax, errors.q[:, joint], left)
+        unit = "mm" if robot.slides[joint] else "deg"
+        ax.set_xlabel(bracketed(f"J{joint + 1}", tr(unit)))
+    for ax in axes[:, 0]:
+        ax.set_ylabel(bracketed(tr("model minus measured"), "mm"))
+    if axes[0, 0].get_legend_handles_labels()[0]:
+        axes[0, 0].legend()
+    caption = tr("What remains along each joint's value: means in bands with two standard errors; noise stays at 0.")
+    return Picture(figure, tr("Mean differences in x, y and z along the value of each joint"), caption)
+
+
+def _binned(ax, values: Reals, left: Reals) -> None:
+    ends = np.unique(np.quantile(values, np.linspace(0, 1, max(1, min(BINS, len(values) // LEAST_IN_BIN)) + 1)))
+    band = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, max(len(ends) - 2, 0))
+    ax.axhline(0, color=MUTED, linewidth=0.8)
+    for c, name in enumerate(AXES):
+        own = [(values[band == k], left[band == k, c]) for k in range(max(len(ends) - 1, 1))]
+        kept = [(at.mean(), d[np.isfinite(d)]) for at, d in own if np.isfinite(d).sum() >= LEAST_IN_BIN]
+        if kept:
+            at = np.array([middle for middle, _ in kept])
+            mean = np.array([d.mean() for _, d in kept])
+            error = np.array([2 * d.std(ddof=1) / np.sqrt(len(d)) for _, d in kept])
+            ax.plot(at, mean, color=JOINTS[c], label=name)
+            ax.fill_between(at, mean - error, mean + error, color=JOINTS[c], alpha=0.2, linewidth=0)
