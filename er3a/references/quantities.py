@@ -16,12 +16,14 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal, cast
 
 import numpy as np
+import scipy
 
 from er3a.numerics.arrays import Reals
 
 Pose = tuple[float, ...]
 """Joint values as they are written: deg, or mm of joints that slide."""
 Vector = tuple[float, float, float]
+Rotation3 = tuple[Vector, Vector, Vector]
 Unit = Literal["mm", "deg", "deg/s"]
 Coordinate = Literal["x", "y", "z"]
 SectionAxis = Literal["x", "z"]
@@ -31,6 +33,7 @@ Side = Literal["lower", "upper"]
 Extremity = Literal["greatest", "least"]
 ZERO_POSE: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MM = 1000.0
+NEARLY_OPPOSITE = 1e-5
 SECTION_AXES: tuple[SectionAxis, ...] = ("x", "z")
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
 FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": -1}
@@ -176,6 +179,30 @@ class PointCoordinate(QuantityAtPose):
     @property
     def vector(self) -> Hashable:
         return self.pose, self.point
+
+
+@dataclass(frozen=True)
+class FlangeTurn(QuantityAtPose):
+    """A coordinate (base frame) of the rotation vector from a stated orientation of the flange to the arm's.
+
+    ``stated`` : rows of its rotation matrix. The vector's length is the angle between the two; it is 0 where they agree.
+    """
+
+    stated: Rotation3 = field(compare=False)
+    coordinate: Coordinate
+    unit: ClassVar[Unit] = "deg"
+
+    def value(self, state: ModelState) -> Reals:
+        R = state.at(self.pose)[..., FRAME_OF_POINT["flange"], :3, :3]
+        return rotation_vectors_deg(R @ np.array(self.stated).T)[..., COORDINATES.index(self.coordinate)]
+
+    @property
+    def vector(self) -> Hashable:
+        return FlangeTurn, self.pose
+
+    def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+        turn = np.array(self.stated) @ np.array(cast(FlangeTurn, other).stated).T
+        return abs(float(rotation_vectors_deg(turn)[COORDINATES.index(self.coordinate)]))
 
 
 @dataclass(frozen=True)
@@ -345,6 +372,19 @@ def angle_between(a: Reals, b: Reals, signed: bool) -> Reals:
     """Angle in deg; of lines (at most 90) if not signed."""
     cross, dot = _cross(a, b), _dot(a, b)
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))
+
+
+def rotation_vectors_deg(R: Reals) -> Reals:
+    """Rotation vectors (..., 3) in deg, at most 180 long, of rotation matrices (..., 3, 3)."""
+    skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
+    cosine = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1.0  # this and the sine twice
+    sine = np.sqrt(_dot(skew, skew))
+    per_sine = np.arctan2(sine, cosine) / np.where(sine > 0, sine, 1.0)
+    vectors: Reals = np.degrees(np.where(sine > 0, per_sine, 0.5)[..., None] * skew)
+    opposite = (cosine < 0) & (sine < NEARLY_OPPOSITE)  # the skew part has few digits left there
+    if opposite.any():
+        vectors[opposite] = scipy.spatial.transform.Rotation.from_matrix(R[opposite]).as_rotvec(degrees=True)
+    return vectors
 
 
 class TurnedApart:

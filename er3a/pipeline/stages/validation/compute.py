@@ -161,12 +161,13 @@ def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> Axes:
     rows = []
     for references in sets:
         for row in references.of(AxisRow):
-            stated = np.array(row.point_mm)
+            found = circles.axes.point_mm[row.joint - 1]
+            stated = found if row.point_mm is None else np.array(row.point_mm)
             direction = circles.axes.direction[row.joint - 1]
-            nearest = nearest_on_line(direction, circles.axes.point_mm[row.joint - 1], stated)
+            nearest = nearest_on_line(direction, found, stated)
             angle = float(angle_between(direction, np.array(row.direction), row.signed))
             distance = float(np.linalg.norm(nearest - stated))
-            head = (references.name, row.source, row.grade, row.joint, row.direction, row.point_mm)
+            head = (references.name, row.source, row.grade, row.joint, row.direction, stated)
             rows.append((*head, direction, nearest, angle, distance, row.uncertainty_deg, row.uncertainty_mm))
     return Axes.of_rows(rows)
 
