@@ -33,6 +33,7 @@ from er3a.diagnosis.faults import (
     ReversedDirection,
     WrongAlpha,
     WrongLength,
+    WrongLimit,
     WrongOffset,
 )
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
@@ -85,7 +86,7 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
 
     Parameters
     ----------
-    references : that all state a value; limits and speeds don't count here
+    references : that all state a value; limits don't count here, but are set right besides
     meets : half-widths by which a reference that is met may be off
     """
     if robot.coupling is not None or robot.rows != robot.joints or robot.sliding.any():
@@ -95,7 +96,8 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
     if lines is None:
         return None
     found = (_conventions(robot, stated, lines, meets, finer) for finer in FINER)
-    return next((each for each in found if each is not None), None)
+    best = next((each for each in found if each is not None), None)
+    return best and _with_limits(robot, best, references)
 
 
 def _conventions(
@@ -141,6 +143,24 @@ def _conventions(
         *_differences(robot, best, tolerances),
     )
     return Conventions(faults, best, left) if faults else None
+
+
+def _with_limits(given: Robot, found: Conventions, references: Sequence[Reference]) -> Conventions:
+    """What was found, with limits as they are stated; those that the robot's file gives otherwise are faults."""
+    lower, upper, faults = found.corrected.lower.copy(), found.corrected.upper.copy(), list(found.faults)
+    source = given.sources.get("limits")
+    assumed = source is not None and source.grade == "inferred"
+    for reference in references:
+        quantity = reference.quantity
+        if isinstance(quantity, Limit) and not given.slides[quantity.joint - 1]:
+            stated, uncertainty = (float(each[0]) for each in expected_of([reference]))
+            ends, joint = (lower if quantity.side == "lower" else upper), quantity.joint - 1
+            own = math.degrees(ends[joint])
+            if abs(own - stated) > uncertainty:
+                ends[joint] = math.radians(stated)
+                if not assumed:
+                    faults.append(WrongLimit(joint + 1, quantity.side, own, stated))
+    return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper), found.left)
 
 
 def _gross(found: EntryDifference) -> bool:

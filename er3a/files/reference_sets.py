@@ -18,7 +18,7 @@ from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.shipped import names, own_or_shipped
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import ZERO_POSE, Pose, Quantity, Rotation3
+from er3a.references.quantities import FRAME_OF_POINT, ZERO_POSE, Pose, Quantity, Rotation3
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
 from er3a.references.seen import COARSE_DEG, SEEN
@@ -491,6 +491,8 @@ def _check_joints(path: Path, rows: Iterable[Row], robot: Robot) -> None:
             column, problem = "joint", f"there is no joint {joint}"
         elif any(pose[robot.joints :]):
             column, problem = f"q{len(pose)}_deg", f"the pose has {len(pose)} joints"
+        elif FRAME_OF_POINT.get(getattr(row, "point", "flange"), -1) > robot.rows:
+            column, problem = "point", "there is no wrist centre"
         else:
             continue
         remedy = f"{robot.name} has {robot.joints} joints: correct the row, or the robot's references"

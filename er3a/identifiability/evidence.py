@@ -37,7 +37,7 @@ from er3a.identifiability.requirements import Asked, Requirement, requirements_o
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags
-from er3a.references.quantities import Limit, PoseOutside, Speed
+from er3a.references.quantities import Limit, PoseOutside, Speed, value_at
 from er3a.references.reference import Documents, Reference, conflicts
 from er3a.robots.robot import Robot
 
@@ -79,7 +79,7 @@ def _past_poses(entry: TableNumber, independent: Sequence[Reference], low: float
     """A limit lies beyond every pose at which a document shows the arm."""
     for reference in independent:
         if isinstance(reference.quantity, PoseOutside):
-            angle = reference.quantity.pose[entry.joint - 1]
+            angle = value_at(reference.quantity.pose, entry.joint)
             if entry.column == "upper":
                 low = max(low, angle - reference.uncertainty)
             else:

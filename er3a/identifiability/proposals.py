@@ -18,7 +18,7 @@ from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import join, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict, predict_tables
-from er3a.references.quantities import Limit, Point, Pose, Quantity, Side, Speed
+from er3a.references.quantities import FRAME_OF_POINT, Limit, Point, Pose, Quantity, Side, Speed
 from er3a.references.reference import Reference
 from er3a.references.seen import COARSE_DEG, SEEN, Manner, Seen, SeenMotion, TableEntry
 from er3a.references.subjects import EntryOfTable, JointLimit, JointSpeed, MotionOfJoint, ReferenceSubject
@@ -190,6 +190,8 @@ def _look(evidence: Evidence, entry: TableNumber) -> LookAtMotion | None:
     unaffected = len(others) + 1
     for pose in _poses(robot):
         for point, manner in WAYS_TO_LOOK:
+            if FRAME_OF_POINT[point] > robot.rows:
+                continue
             motions = [SeenMotion(pose, entry.joint, point, seen) for seen in SEEN]
             motions = [motion for motion in motions if motion.manner == manner]
             values = predict_tables(tables, robot, motions)

@@ -18,7 +18,7 @@ from typing import ClassVar, Literal, cast
 import numpy as np
 import scipy
 
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 
 Pose = tuple[float, ...]
 """Joint values as they are written: deg, or mm of joints that slide."""
@@ -50,6 +50,7 @@ class ModelState:
     direction, lower, upper, speed : (..., 6), of the robot
     extremes : value (mm) of each :class:`Extreme` that was searched for
     columns : (..., 6) each, of the table: a, d in m, alpha, offset in rad; ``twist`` (..., 5), between joint axes
+    slides : (n,), joints whose limits are in m; None where all turn
     axes : the joints' axis lines in the zero pose, if they were measured on the model; else those of the frames
     """
 
@@ -62,6 +63,7 @@ class ModelState:
     extremes: Mapping[Quantity, float]
     axes: AxisLines | None = None
     columns: Mapping[str, Reals] = field(default_factory=dict)
+    slides: Flags | None = None
 
     def at(self, pose: Pose) -> Reals:
         """Frames (..., 7, 4, 4) at a pose."""
@@ -164,6 +166,11 @@ class QuantityAtPose(Quantity):
     @property
     def seen_at(self) -> Pose:
         return self.pose
+
+
+def value_at(pose: Pose, joint: int) -> float:
+    """What a pose has of a joint, counted from 1, deg or mm; 0 of one that it does not name."""
+    return pose[joint - 1] if joint <= len(pose) else 0.0
 
 
 @dataclass(frozen=True)
@@ -293,15 +300,18 @@ class Speed(Quantity):
 
 @dataclass(frozen=True)
 class PoseOutside(QuantityAtPose):
-    """How far a pose lies outside the joint limits: greatest excess of a joint, 0 inside."""
+    """How far a pose lies outside the joint limits: greatest excess of a joint (mm of one that slides), 0 inside."""
 
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
         joints = state.lower.shape[-1]
-        q = np.radians([*self.pose, *ZERO_POSE, *ZERO_POSE][:joints])
-        excess: Reals = np.maximum(np.maximum(state.lower - q, q - state.upper).max(axis=-1), 0.0)
-        return np.degrees(excess)
+        slides = np.zeros(joints, dtype=bool) if state.slides is None else state.slides
+        written = np.array([value_at(self.pose, joint) for joint in range(1, joints + 1)])
+        q = np.where(slides, written / MM, np.radians(written))
+        beyond = np.maximum(state.lower - q, q - state.upper)
+        excess: Reals = np.maximum(np.where(slides, beyond * MM, np.degrees(beyond)).max(axis=-1), 0.0)
+        return excess
 
 
 @dataclass(frozen=True)

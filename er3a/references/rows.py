@@ -110,8 +110,8 @@ class AxisRow(Row):
 
 @dataclass(frozen=True)
 class PositionRow(Row):
-    """Flange or wrist centre at a pose; None for coordinates, or the flange's orientation (rows of its rotation matrix),
-    that aren't given. Without any, the row says only that the pose lies within the limits."""
+    """Flange or wrist centre at a pose; None for coordinates, and the flange's orientation (rows of its rotation
+    matrix), that aren't given. Without any, the row says only that the pose lies within the limits."""
 
     kind: ClassVar[str] = "positions"
     groups: ClassVar[tuple[str, ...]] = ("zero_pose", "key_poses")
@@ -134,10 +134,11 @@ class PositionRow(Row):
                 subject = PointAtPose(self.name, self.point, coordinate)
                 quantity = PointCoordinate(self.pose, self.point, coordinate)
                 yield subject, self.group, quantity, expected, self.uncertainty_mm
-        for coordinate in COORDINATES if self.orientation else ():
-            turn = FlangeTurn(self.pose, self.orientation, coordinate)
-            yield OrientationAtPose(self.name, coordinate), self.group, turn, 0.0, self.uncertainty_deg
-        if self.xyz_mm == (None, None, None) and not self.orientation:
+        if self.orientation is not None:
+            for coordinate in COORDINATES:
+                turn = FlangeTurn(self.pose, self.orientation, coordinate)
+                yield OrientationAtPose(self.name, coordinate), self.group, turn, 0.0, self.uncertainty_deg
+        if self.xyz_mm == (None, None, None) and self.orientation is None:
             yield self.within_limits()
 
     def within_limits(self) -> Scalar:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from er3a.diagnosis.conclusions import TooSmallToTell
-from er3a.diagnosis.faults import CONVENTIONS
+from er3a.diagnosis.faults import CONVENTIONS, WrongLimit
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName, PartStatus, parts_of, together
@@ -99,7 +99,7 @@ def set_summaries(
         counts = counts_of(check for check in checks if check.reference_set == references.name)
         weighing = counts.independent, counts.consistency
         failed, total = (sum(getattr(each, name) for each in weighing) for name in ("failed", "total"))
-        diagnosis = diagnoses.get(references.name)  # there is none of arms with other than six turning joints
+        diagnosis = diagnoses.get(references.name)  # there is none of arms with joints that slide or are coupled
         conclusion = diagnosis.conclusion if diagnosis else None
         found.append(
             SetSummary(
@@ -257,7 +257,8 @@ def _missed(
         return AnotherArm(**common, described=own.described)
     found = named.get(quoted.reference_set)
     faults = () if found is None or isinstance(found, TooSmallToTell) else found.faults
-    chosen = bool(faults) and all(isinstance(fault, CONVENTIONS) for fault in faults)
+    chosen = any(isinstance(fault, CONVENTIONS) for fault in faults)
+    chosen &= all(isinstance(fault, (*CONVENTIONS, WrongLimit)) for fault in faults)
     return DefinedOtherwise(**common) if chosen else Contradicted(**common)
 
 
