@@ -18,7 +18,7 @@ from er3a.identifiability.alternatives import (
     open_table,
     with_readings,
 )
-from er3a.identifiability.continuous import Extent, Extents
+from er3a.identifiability.continuous import Extent, Extents, same_robots
 from er3a.identifiability.entries import (
     GROUP_OF,
     Gauge,
@@ -35,14 +35,17 @@ from er3a.identifiability.feasible import MET
 from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, Requirement, requirements_of
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import Tables, robot_of, tables_of
+from er3a.kinematics.table_batch import Tables, join, robot_of, tables_of
 from er3a.numerics.arrays import Flags
 from er3a.references.quantities import Limit, PoseOutside, Speed, value_at
 from er3a.references.reference import Documents, Reference, conflicts
 from er3a.robots.robot import Robot
 
 LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
+OUTRIGHT_OR_NOT: tuple[Status, ...] = ("settled", "settled_up_to_signs")
 ROUNDING = 1e-9
+MOST_TOGETHER = 32
+OF_SIGNS = ("a", "alpha", "d", "beta", "offset", "direction")
 WIDEST = 720.0
 FIRST_STEP, HALVINGS = 0.05, 12
 
@@ -165,6 +168,7 @@ class _Judge:
         self._repairs: dict[tuple[int, ...], list[Alternative]] = {}
         self._extents: dict[tuple[int, ...], Extents] = {}
         self._found: list[Tables] = []
+        self._otherwise: dict[tuple[int, ...], set[str]] = {}
         flips = flips_of(robot, [])
         self.same = gauge_flips(self.tool, flips)
         self.values = {entry.name: entry.value(robot) for entry in self.entries}
@@ -272,7 +276,7 @@ class _Judge:
         elif entry.name in by_all:
             status = "open"
         elif not concerned and extents.met and self._small(extent):
-            status = "settled"
+            status = self._settled(own, [entry.name])
         return self._described(entry, status, extent, concerned, speaking)
 
     def _direction(self, entry: TableNumber) -> EntryEvidence:
@@ -294,9 +298,11 @@ class _Judge:
         else:
             doubtful = bool(own) and extents.met and extents.may_reverse(entry.joint)
             interval = (-1.0, 1.0) if doubtful else interval
-            status = "settled" if own and extents.met and not doubtful else "weak" if speaking or doubtful else "open"
+            status = "weak" if speaking or doubtful else "open"
+            if own and extents.met and not doubtful:
+                status = self._settled(own, [entry.name])
         off = _worst([each.off for each in concerned])
-        if status == "settled" and not speaking:
+        if status in OUTRIGHT_OR_NOT and not speaking:
             speaking = self._speaking_at(extents.met_by, entry, own)
         return self._described(entry, status, Extent(*interval, off, False), concerned, speaking)
 
@@ -353,9 +359,23 @@ class _Judge:
             by=self._documents(known),
             alternatives=tuple(readings),
             document=document_of(self.robot, entry),
-            off=NOT_OFF if status in ("settled", "gauge") else off,
+            off=NOT_OFF if status in (*OUTRIGHT_OR_NOT, "gauge") else off,
             at_least=extent.at_least and status == "weak",
         )
+
+    def _settled(self, own: tuple[int, ...], names: Sequence[str]) -> Status:
+        """Settled; but only up to signs if another arm that evidence allows can be written with other entries here."""
+        return "settled_up_to_signs" if self._written_otherwise(own) & set(names) else "settled"
+
+    def _written_otherwise(self, own: tuple[int, ...]) -> set[str]:
+        """Entries in the smallest changes that make of the table an arm that evidence allows and that moves otherwise:
+        alternatives, several of them together, and all rows that are the same robots as these."""
+        own = self._geometric(own)
+        if own not in self._otherwise:
+            base, found = self._extents_of(own).met_by, self._alternatives_of(own)
+            every = [base[[]], *(same_robots(with_readings(base, self.robot, each)) for each in _together(found))]
+            self._otherwise[own] = _smallest_changes(base, join(every), self.entries)
+        return self._otherwise[own]
 
     def _small(self, extent: Extent) -> bool:
         """Whether what is left open moves the tool by less than the tolerance, as far as a finished search can tell."""
@@ -377,7 +397,7 @@ class _Judge:
         elif not speaking:
             status = "consistent" if everyone else "open"
         elif extents.met and self._small(extent):
-            status = "settled"
+            status = self._settled(own, [entry.name for entry, _ in factors])
         return EntryEvidence(
             entry=_sum_of(factors),
             value=sum(f * self.values[entry.name] for entry, f in factors),
@@ -387,7 +407,7 @@ class _Judge:
             by=self._documents(speaking or everyone),
             alternatives=(),
             document=document,
-            off=NOT_OFF if status == "settled" else extent.off,
+            off=NOT_OFF if status in OUTRIGHT_OR_NOT else extent.off,
             at_least=extent.at_least and status == "weak",
         )
 
@@ -494,6 +514,33 @@ class _Judge:
         )
 
 
+def _together(found: Sequence[Alternative]) -> list[tuple[Alternative, ...]]:
+    """Alternatives, and several of them together that change different entries; the first ``MOST_TOGETHER``."""
+    sets: list[tuple[Alternative, ...]] = [()]
+    for each in found:
+        apart = [own for own in sets if not {name for other in own for name in other.names} & set(each.names)]
+        sets += [(*own, each) for own in apart]
+    return sorted(sets[1:], key=len)[:MOST_TOGETHER]
+
+
+def _smallest_changes(table: Tables, others: Tables, entries: Sequence[TableNumber]) -> set[str]:
+    """Names of the entries in which others (a batch) differ from a table (a batch of one), as few at once as do."""
+    own = [entry for entry in entries if entry.column in OF_SIGNS]
+    differs = np.zeros((len(others), len(own)), dtype=bool)
+    for k, entry in enumerate(own):
+        off = (getattr(others, entry.column) - getattr(table, entry.column))[:, entry.joint - 1]
+        off = (off + np.pi) % (2 * np.pi) - np.pi if entry.unit == "deg" else off
+        differs[:, k] = np.abs(off) > ROUNDING
+    left = np.unique(differs, axis=0)
+    left = left[np.argsort(left.sum(axis=1), kind="stable")]
+    names = set[str]()
+    while len(left):
+        smallest, left = left[0], left[1:]
+        names |= {own[k].name for k in np.flatnonzero(smallest)}
+        left = left[~(left | ~smallest).all(axis=1)]
+    return names
+
+
 def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:
     text = ""
     for entry, factor in factors:
@@ -516,15 +563,15 @@ def _worst(found: Sequence[ToolOff]) -> ToolOff:
 
 
 PartName = Literal["geometry", "zero_and_directions", "limits", "speeds"]
-PartStatus = Literal["settled", "consistent", "weak", "open", "contradicted", "absent"]
+PartStatus = Literal["settled", "settled_up_to_signs", "consistent", "weak", "open", "contradicted", "absent"]
 PART_OF_GROUP: dict[str, PartName] = {
     "dh": "geometry",
     "zero": "zero_and_directions",
     "limits": "limits",
     "speeds": "speeds",
 }
-GRAVEST: tuple[PartStatus, ...] = ("contradicted", "open", "weak", "consistent", "settled")
-SETTLED: tuple[Status, ...] = ("settled", "gauge", "given")
+GRAVEST: tuple[PartStatus, ...] = ("contradicted", "open", "weak", "consistent", "settled_up_to_signs", "settled")
+SETTLED: tuple[Status, ...] = (*OUTRIGHT_OR_NOT, "gauge", "given")
 MOST_COMBINED = 256
 
 
@@ -553,7 +600,7 @@ def parts_of(evidence: Evidence) -> tuple[PartEvidence, ...]:
     for part in PART_OF_GROUP.values():
         own = [each for each in (*evidence.entries, *evidence.combinations) if _part(each, columns) == part]
         unsettled = tuple(each for each in own if each.status not in SETTLED)
-        held = {each.status for each in unsettled}
+        held = {each.status for each in own}
         best: PartStatus = "settled" if own else "absent"
         status: PartStatus = next((each for each in GRAVEST if each in held), best)
         off = NOT_OFF

@@ -29,7 +29,7 @@ PLAIN_DEG = 50.0  # of the direction that is named, within which a motion is pla
 BENT_DEG = 45.0
 LENGTH_MM, ANGLE_DEG, LIMIT_DEG, SPEED_SHARE = 1.0, 0.5, 0.5, 0.02
 SHARE_OF_TOLERANCE = 0.4
-SETTLED = ("settled", "given", "gauge", "contradicted")
+SETTLED = ("settled", "settled_up_to_signs", "given", "gauge", "contradicted")
 WAYS_TO_LOOK: tuple[tuple[Point, Manner], ...] = (
     ("flange", "tilts"),
     ("flange", "moves"),

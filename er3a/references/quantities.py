@@ -192,7 +192,7 @@ class PointCoordinate(QuantityAtPose):
 class FlangeTurn(QuantityAtPose):
     """A coordinate (base frame) of the rotation vector from a stated orientation of the flange to the arm's.
 
-    ``stated`` : rows of its rotation matrix. The vector's length is the angle between the two; it is 0 where they agree.
+    ``stated`` : rows of its rotation matrix. The vector's length is the angle between both, 0 where they agree.
     """
 
     stated: Rotation3 = field(compare=False)

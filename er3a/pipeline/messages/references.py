@@ -46,6 +46,7 @@ check_complete("words for groups of references", GROUPS, GROUP_WORDS)
 check_complete("words for groups that a set lacks", GROUPS, MISSING_WORDS)
 STATUS_WORDS = {
     "settled": N_("settled"),
+    "settled_up_to_signs": N_("settled up to signs"),
     "weak": N_("weak"),
     "contradicted": N_("contradicted"),
     "consistent": N_("consistent"),
@@ -56,6 +57,10 @@ STATUS_WORDS = {
 }
 STATUS_MEANINGS = {
     "settled": N_("what independent documents leave open moves the tool by less than the tolerance"),
+    "settled_up_to_signs": N_(
+        "as settled, but its sign or half turn hangs on entries that are open: with another value there the same arm can "
+        "be written otherwise here"
+    ),
     "weak": N_(
         "independent documents depend on it, but what they leave open moves the tool by more than the tolerance"
     ),

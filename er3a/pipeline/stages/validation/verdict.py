@@ -80,6 +80,7 @@ def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[
         status=status,
         entries=sum(each.status != "gauge" for each in own),
         settled=len(named("settled")),
+        up_to_signs=len(named("settled_up_to_signs")),
         contradicted=named("contradicted"),
         open=named("open"),
         off=off,
