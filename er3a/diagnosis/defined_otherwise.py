@@ -57,7 +57,7 @@ from er3a.robots.robot import Robot
 
 Misfit = Callable[[Robot], Reals]
 Lines = tuple[Reals, Reals, list[bool], Tolerances]
-"""Directions and points (n, 3), m, of all axes, which directions are of positive rotation, how exactly they are known."""
+"""Directions and points (n, 3), m, of all axes, which of these directions are of positive rotation, and how exactly."""
 
 MOST_WRONG = 3
 SLIGHT_LENGTH, SLIGHT_ANGLE = 1e-3, math.radians(0.2)

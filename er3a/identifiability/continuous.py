@@ -131,6 +131,11 @@ def same_robots(table: Tables) -> Tables:
     return found
 
 
+def turned_once(table: Tables) -> Tables:
+    """Rows (a batch) of the same robot as a table's, with one axis turned round in each; itself first."""
+    return join([table, *(turn(table) for turn in _turns(table))])
+
+
 def _turns(table: Tables) -> list[Callable[[Tables], Tables]]:
     """What turns an x axis or a z axis between base and flange round."""
     joints, first = table.direction.shape[1], 0 if not table.modified[0] else 1

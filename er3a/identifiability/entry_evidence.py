@@ -16,9 +16,8 @@ from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
 
 Status = Literal["settled", "settled_up_to_signs", "weak", "contradicted", "consistent", "open", "gauge", "given"]
-"""``settled_up_to_signs``: every arm that evidence allows can be written with this value. But one of them moves otherwise
-than the table's, and the same arm can be written with another sign or half turn here as well: see
-:func:`er3a.identifiability.continuous.same_robots`."""
+"""``settled_up_to_signs``: every arm that evidence allows can be written with this value; but one of them moves
+otherwise than the table's, and can be written with another sign or half turn here as well."""
 TOLERANCE_MM, TOLERANCE_DEG = 5.0, 0.5
 """How far a settled entry may leave the tool off: what an arm of this size is off without calibration. What matters
 less is the business of a calibration and says nothing about the table."""

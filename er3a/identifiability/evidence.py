@@ -18,7 +18,7 @@ from er3a.identifiability.alternatives import (
     open_table,
     with_readings,
 )
-from er3a.identifiability.continuous import Extent, Extents, same_robots
+from er3a.identifiability.continuous import Extent, Extents, turned_once
 from er3a.identifiability.entries import (
     GROUP_OF,
     Gauge,
@@ -35,7 +35,7 @@ from er3a.identifiability.feasible import MET
 from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, Requirement, requirements_of
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import Tables, join, robot_of, tables_of
+from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags
 from er3a.references.quantities import Limit, PoseOutside, Speed, value_at
 from er3a.references.reference import Documents, Reference, conflicts
@@ -44,7 +44,6 @@ from er3a.robots.robot import Robot
 LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
 OUTRIGHT_OR_NOT: tuple[Status, ...] = ("settled", "settled_up_to_signs")
 ROUNDING = 1e-9
-MOST_TOGETHER = 32
 OF_SIGNS = ("a", "alpha", "d", "beta", "offset", "direction")
 WIDEST = 720.0
 FIRST_STEP, HALVINGS = 0.05, 12
@@ -168,7 +167,6 @@ class _Judge:
         self._repairs: dict[tuple[int, ...], list[Alternative]] = {}
         self._extents: dict[tuple[int, ...], Extents] = {}
         self._found: list[Tables] = []
-        self._otherwise: dict[tuple[int, ...], set[str]] = {}
         flips = flips_of(robot, [])
         self.same = gauge_flips(self.tool, flips)
         self.values = {entry.name: entry.value(robot) for entry in self.entries}
@@ -364,18 +362,21 @@ class _Judge:
         )
 
     def _settled(self, own: tuple[int, ...], names: Sequence[str]) -> Status:
-        """Settled; but only up to signs if another arm that evidence allows can be written with other entries here."""
-        return "settled_up_to_signs" if self._written_otherwise(own) & set(names) else "settled"
+        """Settled; but only up to signs where evidence allows another arm, for it can be written otherwise here."""
+        return "settled_up_to_signs" if self._alternatives_of(own) and self._rewritten & set(names) else "settled"
 
-    def _written_otherwise(self, own: tuple[int, ...]) -> set[str]:
-        """Entries in the smallest changes that make of the table an arm that evidence allows and that moves otherwise:
-        alternatives, several of them together, and all rows that are the same robots as these."""
-        own = self._geometric(own)
-        if own not in self._otherwise:
-            base, found = self._extents_of(own).met_by, self._alternatives_of(own)
-            every = [base[[]], *(same_robots(with_readings(base, self.robot, each)) for each in _together(found))]
-            self._otherwise[own] = _smallest_changes(base, join(every), self.entries)
-        return self._otherwise[own]
+    @cached_property
+    def _rewritten(self) -> set[str]:
+        """Entries that have another sign or half turn in other rows of the same robot."""
+        every, found = turned_once(self.table), set[str]()
+        for entry in self.entries:
+            if entry.column in OF_SIGNS:
+                values = getattr(every, entry.column)[:, entry.joint - 1]
+                off = values - values[0]
+                off = (off + np.pi) % (2 * np.pi) - np.pi if entry.unit == "deg" else off
+                if np.abs(off).max() > ROUNDING:
+                    found.add(entry.name)
+        return found
 
     def _small(self, extent: Extent) -> bool:
         """Whether what is left open moves the tool by less than the tolerance, as far as a finished search can tell."""
@@ -512,33 +513,6 @@ class _Judge:
         return Extents(
             asked, table, self.free, near.speaking, self.gauge, self.tool, found=found, tolerance=self.tolerance
         )
-
-
-def _together(found: Sequence[Alternative]) -> list[tuple[Alternative, ...]]:
-    """Alternatives, and several of them together that change different entries; the first ``MOST_TOGETHER``."""
-    sets: list[tuple[Alternative, ...]] = [()]
-    for each in found:
-        apart = [own for own in sets if not {name for other in own for name in other.names} & set(each.names)]
-        sets += [(*own, each) for own in apart]
-    return sorted(sets[1:], key=len)[:MOST_TOGETHER]
-
-
-def _smallest_changes(table: Tables, others: Tables, entries: Sequence[TableNumber]) -> set[str]:
-    """Names of the entries in which others (a batch) differ from a table (a batch of one), as few at once as do."""
-    own = [entry for entry in entries if entry.column in OF_SIGNS]
-    differs = np.zeros((len(others), len(own)), dtype=bool)
-    for k, entry in enumerate(own):
-        off = (getattr(others, entry.column) - getattr(table, entry.column))[:, entry.joint - 1]
-        off = (off + np.pi) % (2 * np.pi) - np.pi if entry.unit == "deg" else off
-        differs[:, k] = np.abs(off) > ROUNDING
-    left = np.unique(differs, axis=0)
-    left = left[np.argsort(left.sum(axis=1), kind="stable")]
-    names = set[str]()
-    while len(left):
-        smallest, left = left[0], left[1:]
-        names |= {own[k].name for k in np.flatnonzero(smallest)}
-        left = left[~(left | ~smallest).all(axis=1)]
-    return names
 
 
 def _sum_of(factors: Sequence[tuple[TableNumber, float]]) -> str:

@@ -58,8 +58,8 @@ STATUS_WORDS = {
 STATUS_MEANINGS = {
     "settled": N_("what independent documents leave open moves the tool by less than the tolerance"),
     "settled_up_to_signs": N_(
-        "as settled, but its sign or half turn hangs on entries that are open: with another value there the same arm can "
-        "be written otherwise here"
+        "as settled, but its sign or half turn hangs on entries that are open: with another value there the same arm "
+        "can be written otherwise here"
     ),
     "weak": N_(
         "independent documents depend on it, but what they leave open moves the tool by more than the tolerance"

@@ -543,8 +543,8 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
 
 
 def _geometry(finding: object) -> tuple[int, int, int] | None:
-    """How many entries of a table's geometry are settled, how many more up to signs, and of how many, where only part of
-    it is."""
+    """How many entries of a table's geometry are settled, how many more up to signs, and of how many, where only
+    part of it is."""
     if not isinstance(finding, LeftOpen):
         return None
     return next(
