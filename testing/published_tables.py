@@ -194,10 +194,11 @@ def urdf_flange(path: Path, first: str, last: str, q: np.ndarray) -> np.ndarray:
             for key in ("xyz", "rpy")
         )
         T = T @ shift(*xyz) @ rot(2, rpy[2]) @ rot(1, rpy[1]) @ rot(0, rpy[0])
-        if joint.get("type") in ("revolute", "continuous"):
+        if joint.get("type") in ("revolute", "continuous", "prismatic"):
             stated = joint.find("axis")
             axis = np.array([float(x) for x in (stated.get("xyz", "1 0 0") if stated is not None else "1 0 0").split()])
-            T = T @ about(axis / np.linalg.norm(axis), next(values))
+            axis, value = axis / np.linalg.norm(axis), next(values)
+            T = T @ (shift(*(value * axis)) if joint.get("type") == "prismatic" else about(axis, value))
     return np.asarray(T)
 
 

@@ -25,10 +25,11 @@ def test_the_table_decides_first_then_what_fails(table, failed, start):
 
 
 def test_a_table_of_which_nothing_is_settled_is_told_from_one_that_is_nearly():
-    assert decision("caution", [], geometry=(0, 17)).startswith("Not proven")
-    assert decision("caution", [], geometry=(16, 17)).startswith("Use it with care")
-    assert "16 of 17" in decision("caution", [], geometry=(16, 17))
-    assert decision("pass", [], geometry=(0, 17)).startswith("Use it: ")
+    assert decision("caution", [], geometry=(0, 0, 17)).startswith("Not proven")
+    assert decision("caution", [], geometry=(16, 0, 17)).startswith("Use it with care")
+    assert "16 of 17" in decision("caution", [], geometry=(16, 0, 17))
+    assert "16 of 17 entries of its geometry are settled, 14 of them" in decision("caution", [], geometry=(2, 14, 17))
+    assert decision("pass", [], geometry=(0, 0, 17)).startswith("Use it: ")
 
 
 @pytest.mark.parametrize(("end", "gap"), [(".", " "), (";", " "), ("。", ""), ("；", "")])

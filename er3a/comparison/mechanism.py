@@ -353,8 +353,20 @@ def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
 
 def is_same_mechanism(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
     """Whether no entry of geometry differs; much faster than :func:`match` where many do."""
+    if _links_differ(one, other, tolerances):
+        return False
     found = _best_match(one, other, tolerances, may_differ=False)
     return found is not None and not found.differences and not found.unexplained
+
+
+def _links_differ(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
+    """Whether some link's length or twist differs whichever way axes and normals point."""
+    if one.beta.any() or other.beta.any():
+        return False
+    angles = between(one), between(other)
+    plain = ~_beside_a_slide(one.sliding) & (np.minimum(*angles) > NEARLY_PARALLEL)
+    apart = np.abs(np.abs(one.a) - np.abs(other.a)) > tolerances.length
+    return bool((plain & (apart | (np.abs(angles[0] - angles[1]) > tolerances.angle))).any())
 
 
 def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True) -> Match | None:
@@ -577,18 +589,17 @@ def _fewest(columns: Reals, wanted: Reals, printed: Reals, tolerances: Tolerance
         return amounts, float(np.abs(wanted - columns @ amounts).max(initial=0.0)), rank
     fit = float(np.abs(wanted - columns @ amounts).max()) + 0.1 * tolerances.length
     for size in range(1, min(rank, MOST_ENTRIES) + 1):
-        best: tuple[float, Reals] | None = None
-        for chosen in itertools.combinations(range(count), size):
-            some = columns[:, chosen]
-            values = np.asarray(np.linalg.lstsq(some, wanted, rcond=1e-7)[0], float)
-            if np.abs(wanted - some @ values).max() <= fit:
-                strange = float(np.sum(printed) - printed[list(chosen)].sum() + 1e-6 * np.abs(values).sum())
-                if best is None or strange < best[0]:
-                    full = np.zeros(count)
-                    full[list(chosen)] = values
-                    best = strange, full
-        if best is not None:
-            return best[1], float(np.abs(wanted - columns @ best[1]).max()), rank
+        chosen = np.array(list(itertools.combinations(range(count), size)))
+        some = columns.T[chosen].transpose(0, 2, 1)  # (sets, rows, size)
+        values = np.linalg.pinv(some, rcond=1e-7) @ wanted
+        left = np.abs(wanted - np.einsum("srk,sk->sr", some, values)).max(axis=1)
+        fits = np.flatnonzero(left <= fit)
+        if len(fits):
+            strange = np.sum(printed) - printed[chosen[fits]].sum(axis=1) + 1e-6 * np.abs(values[fits]).sum(axis=1)
+            best = fits[int(np.argmin(strange))]
+            full = np.zeros(count)
+            full[chosen[best]] = values[best]
+            return full, float(np.abs(wanted - columns @ full).max()), rank
     return amounts, float(np.abs(wanted - columns @ amounts).max()), rank
 
 

@@ -15,7 +15,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.comparison.mechanism import Match, Tolerances, match, mechanism_from_axes, mechanism_of, turn_of, wrapped
+from er3a.comparison.mechanism import (
+    EntryDifference,
+    Match,
+    Tolerances,
+    match,
+    mechanism_from_axes,
+    mechanism_of,
+    turn_of,
+    wrapped,
+)
 from er3a.diagnosis.faults import (
     BaseElsewhere,
     Fault,
@@ -24,19 +33,35 @@ from er3a.diagnosis.faults import (
     ReversedDirection,
     WrongAlpha,
     WrongLength,
+    WrongLimit,
     WrongOffset,
 )
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Reals
-from er3a.references.predict import predict_tables
-from er3a.references.quantities import MM, ZERO_POSE, AxisAngle, AxisCoordinate, Limit, PointCoordinate, PoseOutside
+from er3a.references.predict import joints_of, predict_tables
+from er3a.references.quantities import (
+    COORDINATES,
+    MM,
+    ZERO_POSE,
+    AxisAngle,
+    AxisCoordinate,
+    FlangeTurn,
+    Limit,
+    PointCoordinate,
+    PoseOutside,
+)
 from er3a.references.reference import Reference, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
 Misfit = Callable[[Robot], Reals]
+Lines = tuple[Reals, Reals, list[bool], Tolerances]
+"""Directions and points (n, 3), m, of all axes, which of these directions are of positive rotation, and how exactly."""
 
 MOST_WRONG = 3
+SLIGHT_LENGTH, SLIGHT_ANGLE = 1e-3, math.radians(0.2)
+FINER = (1.0, 0.3, 0.1)
 LEAST_LENGTH, LEAST_ANGLE = 1e-5, math.radians(1e-3)
 LEVER = 0.3  # m, over which an axis' direction says where it is
 SPREAD = 3.0  # times its uncertainty, that what is derived from two lines may be off
@@ -61,7 +86,7 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
 
     Parameters
     ----------
-    references : that all state a value; limits and speeds don't count here
+    references : that all state a value; limits don't count here, but are set right besides
     meets : half-widths by which a reference that is met may be off
     """
     if robot.coupling is not None or robot.rows != robot.joints or robot.sliding.any():
@@ -70,14 +95,23 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
     lines = _lines(stated, robot.joints)
     if lines is None:
         return None
-    directions, points, signed, tolerances = lines
-    T = translation(*_zero_flange(robot, stated))
-    other = mechanism_from_axes(directions, points, T, tolerances.angle)
-    own = mechanism_of(robot.without_tool())
-    found = match(own, other, tolerances)
+    found = (_conventions(robot, stated, lines, meets, finer) for finer in FINER)
+    best = next((each for each in found if each is not None), None)
+    return best and _with_limits(robot, best, references)
+
+
+def _conventions(
+    robot: Robot, stated: Sequence[Reference], lines: Lines, meets: float, finer: float
+) -> Conventions | None:
+    """What :func:`conventions_of` finds where entries differ that are off by more than the lines' tolerances, or by a
+    finer part of them."""
+    directions, points, signed, widest = lines
+    tolerances = Tolerances(finer * widest.length, finer * widest.angle)
+    other = mechanism_from_axes(directions, points, _zero_flange(stated), widest.angle)
+    found = match(mechanism_of(robot.without_tool()), other, tolerances)
     if any(each.column not in ("a", "d", "alpha") for each in found.differences):
         return None
-    if found.unexplained or len(found.differences) > MOST_WRONG:
+    if found.unexplained or sum(_gross(each) for each in found.differences) > MOST_WRONG:
         return None
     later = int(robot.convention == "modified")  # rows of a and alpha are those of the joint behind
     wrong = [(each.column, each.link + later * (each.column != "d")) for each in found.differences]
@@ -111,7 +145,30 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
     return Conventions(faults, best, left) if faults else None
 
 
-def _lines(stated: Sequence[Reference], joints: int) -> tuple[Reals, Reals, list[bool], Tolerances] | None:
+def _with_limits(given: Robot, found: Conventions, references: Sequence[Reference]) -> Conventions:
+    """What was found, with limits as they are stated; those that the robot's file gives otherwise are faults."""
+    lower, upper, faults = found.corrected.lower.copy(), found.corrected.upper.copy(), list(found.faults)
+    source = given.sources.get("limits")
+    assumed = source is not None and source.grade == "inferred"
+    for reference in references:
+        quantity = reference.quantity
+        if isinstance(quantity, Limit) and not given.slides[quantity.joint - 1]:
+            stated, uncertainty = (float(each[0]) for each in expected_of([reference]))
+            ends, joint = (lower if quantity.side == "lower" else upper), quantity.joint - 1
+            own = math.degrees(ends[joint])
+            if abs(own - stated) > uncertainty:
+                ends[joint] = math.radians(stated)
+                if not assumed:
+                    faults.append(WrongLimit(joint + 1, quantity.side, own, stated))
+    return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper), found.left)
+
+
+def _gross(found: EntryDifference) -> bool:
+    """Whether an entry is off by more than a table's rounding or another edition of an arm's drawing."""
+    return abs(found.one - found.other) > (SLIGHT_ANGLE if found.column == "alpha" else SLIGHT_LENGTH)
+
+
+def _lines(stated: Sequence[Reference], joints: int) -> Lines | None:
     """Directions, points (n, 3), m, of all joint axes, which directions are of positive rotation, and how exactly."""
     toward = dict[int, AxisAngle]()
     points = dict[int, tuple[float, float, float]]()
@@ -132,15 +189,16 @@ def _lines(stated: Sequence[Reference], joints: int) -> tuple[Reals, Reals, list
     return directions, places, [toward[joint].signed for joint in every], Tolerances(length + LEVER * angle, angle)
 
 
-def _zero_flange(robot: Robot, stated: Sequence[Reference]) -> tuple[float, float, float]:
-    """Where the flange (m) is with all joints at 0: as stated, else the last axis' own point."""
-    found = dict.fromkeys("xyz", math.nan)
+def _zero_flange(stated: Sequence[Reference]) -> Reals:
+    """The flange (4, 4), m, with all joints at 0, as far as it is stated."""
+    T = np.eye(4)
     for reference in stated:
         quantity = reference.quantity
         if isinstance(quantity, PointCoordinate) and quantity.point == "flange" and quantity.pose == ZERO_POSE:
-            found[quantity.coordinate] = float(expected_of([reference])[0][0]) / MM
-    x, y, z = (0.0 if math.isnan(value) else value for value in found.values())
-    return x, y, z
+            T[COORDINATES.index(quantity.coordinate), 3] = float(expected_of([reference])[0][0]) / MM
+        elif isinstance(quantity, FlangeTurn) and quantity.pose == ZERO_POSE:
+            T[:3, :3] = quantity.stated
+    return T
 
 
 def _moved(robot: Robot, found: Match) -> Robot:
@@ -151,7 +209,14 @@ def _moved(robot: Robot, found: Match) -> Robot:
 
 
 def _with_flange(robot: Robot, stated: Sequence[Reference]) -> Robot:
-    """The arm with its flange shifted to where stated positions have it, which is a linear matter."""
+    """The arm with its flange where stated poses have it: turned as the first orientation says, and shifted, which is a
+    linear matter."""
+    first = next((r.quantity for r in stated if isinstance(r.quantity, FlangeTurn)), None)
+    if first is not None:
+        T = forward(robot.without_tool(), joints_of(robot, [first.pose])[0])
+        turn = np.eye(4)
+        turn[:3, :3] = T[:3, :3].T @ np.array(first.stated)
+        robot = robot.replace(flange=robot.flange @ turn)
     own = [r for r in stated if isinstance(r.quantity, PointCoordinate) and r.quantity.point == "flange"]
     if not own:
         return robot
@@ -174,18 +239,21 @@ def _with_entry(robot: Robot, column: str, row: int, value: float) -> Robot:
 
 
 def _changed(robot: Robot, wrong: Sequence[tuple[str, int]], x: Reals) -> Robot:
-    """The arm with base (6), flange (3), inner zeros and wrong entries moved by x, m and rad."""
+    """The arm with base (6), flange (6), inner zeros and wrong entries moved by x, m and rad."""
     for (column, row), amount in zip(wrong, x[len(x) - len(wrong) :]):
         robot = _with_entry(robot, column, row, getattr(robot, column)[row] + amount)
-    base = robot.base @ translation(*x[:3]) @ rot_z(x[3]) @ rot_y(x[4]) @ rot_x(x[5])
+    base, flange = (
+        T @ translation(*x[k : k + 3]) @ rot_z(x[k + 3]) @ rot_y(x[k + 4]) @ rot_x(x[k + 5])
+        for T, k in ((robot.base, 0), (robot.flange, 6))
+    )
     offset = robot.offset.copy()
-    offset[1:-1] += x[9 : 9 + len(offset[1:-1])]
-    return robot.replace(base=base, flange=robot.flange @ translation(*x[6:9]), offset=offset)
+    offset[1:-1] += x[12 : 12 + len(offset[1:-1])]
+    return robot.replace(base=base, flange=flange, offset=offset)
 
 
 def _fitted(robot: Robot, wrong: Sequence[tuple[str, int]], off: Misfit, meets: float) -> Robot:
     """Gauss and Newton's steps from an arm that nearly meets the references."""
-    count = 9 + max(robot.joints - 2, 0) + len(wrong)
+    count = 12 + max(robot.joints - 2, 0) + len(wrong)
     for _ in range(ROUNDS):
         here = off(robot)
         if np.abs(here).max() < 0.1 * meets:
@@ -209,7 +277,7 @@ def _plain(given: Robot, fitted: Robot, off: Misfit, meets: float, tolerances: T
     snapped = np.where(np.abs(moved - np.round(moved)) < 2 * np.degrees(tolerances.angle), np.round(moved), moved)
     arm = kept(fitted, fitted.replace(offset=wrapped(given.offset + np.radians(snapped))))
     shift = np.linalg.inv(given.flange) @ arm.flange
-    if np.linalg.norm(shift[:3, 3]) < 2 * tolerances.length:
+    if np.linalg.norm(shift[:3, 3]) < 2 * tolerances.length and turn_of(shift) < 2 * tolerances.angle:
         arm = kept(arm, arm.replace(flange=given.flange))
     shift = np.linalg.inv(given.base) @ arm.base
     if np.linalg.norm(shift[:3, 3]) < 2 * tolerances.length and turn_of(shift) < 2 * tolerances.angle:
@@ -237,8 +305,8 @@ def _differences(given: Robot, found: Robot, tolerances: Tolerances) -> Faults:
     if np.linalg.norm(base[:3, 3]) > tolerances.length or turn_of(base) > tolerances.angle:
         faults.append(BaseElsewhere(_shift(base), float(np.round(np.degrees(turn_of(base)), 4))))
     flange = np.linalg.inv(given.flange) @ found.flange
-    if np.linalg.norm(flange[:3, 3]) > tolerances.length:
-        faults.append(FlangeElsewhere(_shift(flange)))
+    if np.linalg.norm(flange[:3, 3]) > tolerances.length or turn_of(flange) > tolerances.angle:
+        faults.append(FlangeElsewhere(_shift(flange), float(np.round(np.degrees(turn_of(flange)), 4))))
     return tuple(faults)
 
 

@@ -193,9 +193,10 @@ class BaseElsewhere:
 
 @dataclass(frozen=True)
 class FlangeElsewhere:
-    """The references' flange stands elsewhere than the table's: ``shift_mm`` in the flange's frame."""
+    """The references' flange stands elsewhere than the table's: ``shift_mm`` and ``turn_deg`` in the flange's frame."""
 
     shift_mm: tuple[float, float, float]
+    turn_deg: float = 0.0
     kind: ClassVar[FaultKind] = "flange"
     code: Literal["flange_elsewhere"] = "flange_elsewhere"
 

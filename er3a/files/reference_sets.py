@@ -9,12 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import scipy
+
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Written, read_csv
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.shipped import names, own_or_shipped
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
-from er3a.references.quantities import ZERO_POSE, Pose, Quantity
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import FRAME_OF_POINT, ZERO_POSE, Pose, Quantity, Rotation3
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
 from er3a.references.seen import COARSE_DEG, SEEN
@@ -44,6 +48,19 @@ _SOURCE = {
 _POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
 _XYZ = ("x_mm", "y_mm", "z_mm")
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
+_RPY = ("roll_deg", "pitch_deg", "yaw_deg")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+_ROTATION_VECTOR = ("rx_deg", "ry_deg", "rz_deg")
+_MATRIX = ("nx", "ny", "nz", "ox", "oy", "oz", "ax", "ay", "az")
+ORIENTATIONS: dict[str, tuple[str, ...]] = {
+    "roll, pitch and yaw": _RPY,
+    "quaternion": _QUATERNION,
+    "rotation vector": _ROTATION_VECTOR,
+    "matrix": _MATRIX,
+}
+"""Columns of the flange's orientation, by how it is written: rpy as in URDF, the matrix column by column."""
+ORIENTATION_COLUMNS = tuple(column for columns in ORIENTATIONS.values() for column in columns)
+NOT_RIGID = 2e-3
 _POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
 _FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MOST_JOINTS + 1))
 _POSE_COLUMNS = dict.fromkeys(_POSE, _NUMBER) | dict.fromkeys(_FURTHER, CsvColumn(Written, always=False))
@@ -85,7 +102,8 @@ class Format:
 def _axis_fields(fields: Fields) -> Fields:
     values = dict(fields)
     values["direction"] = tuple(values.pop(name) for name in _DIRECTION)
-    values["point_mm"] = tuple(values.pop(name) for name in _XYZ)
+    point = tuple(values.pop(name) for name in _XYZ)
+    values["point_mm"] = None if None in point else point
     values["signed"] = values["signed"] == "yes"
     return values
 
@@ -94,13 +112,70 @@ def _axis_faults(fields: Fields) -> Iterator[Fault]:
     length = math.hypot(*(fields[name] for name in _DIRECTION))
     if abs(length - 1) > 1e-3:
         yield "direction_x", f"the direction has length {length:g}", "Write a unit vector"
+    given = [fields[name] is not None for name in _XYZ]
+    if any(given) and not all(given):
+        yield _XYZ[given.index(False)], "empty", "Give all three, or none of a joint that slides"
 
 
 def _position_fields(fields: Fields) -> Fields:
     values = dict(fields)
     values["pose"] = _pose(values)
     values["xyz_mm"] = tuple(values.pop(name) for name in _XYZ)
+    values["orientation"] = _orientation(values)
+    for name in ORIENTATION_COLUMNS:
+        del values[name]
     return values
+
+
+def _written_as(fields: Fields) -> list[tuple[str, ...]]:
+    """The columns of each way of writing an orientation that a row uses."""
+    return [columns for columns in ORIENTATIONS.values() if any(fields[name] is not None for name in columns)]
+
+
+def _orientation(fields: Fields) -> Rotation3 | None:
+    """Rows of the rotation matrix that a row states; None if it states no orientation."""
+    written = _written_as(fields)
+    if not written:
+        return None
+    values = np.array([fields[name] for name in written[0]])
+    R = rotation_of(written[0], values)
+    return tuple(tuple(row) for row in R.tolist())  # type: ignore[return-value]
+
+
+def rotation_of(columns: tuple[str, ...], values: Reals) -> Reals:
+    """The rotation matrix (3, 3) nearest to an orientation as it is written in such columns."""
+    turn = scipy.spatial.transform.Rotation
+    if columns == _RPY:
+        found = turn.from_euler("xyz", values, degrees=True)
+    elif columns == _QUATERNION:
+        found = turn.from_quat(values, scalar_first=True)
+    elif columns == _ROTATION_VECTOR:
+        found = turn.from_rotvec(values, degrees=True)
+    else:
+        found = turn.from_matrix(values.reshape(3, 3).T)
+    R: Reals = found.as_matrix()
+    return R
+
+
+def _position_faults(fields: Fields) -> Iterator[Fault]:
+    written = _written_as(fields)
+    if len(written) > 1:
+        yield written[1][0], "the orientation is written in two ways", "Keep one of the two"
+    for columns in written[:1]:
+        missing = [name for name in columns if fields[name] is None]
+        if missing:
+            yield missing[0], "empty, but the row gives other parts of the orientation", f"Give {', '.join(columns)}"
+        elif fields["point"] != "flange":
+            yield "point", f"an orientation of the {fields['point']}", "Write flange: its orientation alone is checked"
+        else:
+            values = np.array([fields[name] for name in columns])
+            if columns == _QUATERNION and abs(np.linalg.norm(values) - 1) > NOT_RIGID:
+                yield columns[0], f"the quaternion has length {np.linalg.norm(values):g}", "Write a unit quaternion"
+            if columns == _MATRIX:
+                M = values.reshape(3, 3).T
+                if np.abs(M.T @ M - np.eye(3)).max() > NOT_RIGID or np.linalg.det(M) < 0:
+                    remedy = "nx, ny, nz is the flange's x axis in the base frame, ox ... its y axis, ax ... its z axis"
+                    yield columns[0], "these columns are no rotation matrix", remedy
 
 
 def _pose(fields: Fields) -> Pose:
@@ -152,7 +227,8 @@ FORMATS: dict[str, Format] = {
     "axes": Format(
         {
             "joint": _JOINT,
-            **dict.fromkeys((*_DIRECTION, *_XYZ), _NUMBER),
+            **dict.fromkeys(_DIRECTION, _NUMBER),
+            **dict.fromkeys(_XYZ, _OPTIONAL),
             "signed": CsvColumn(str, choices=("yes", "no")),
             "uncertainty_mm": _NUMBER,
             "uncertainty_deg": _NUMBER,
@@ -167,9 +243,11 @@ FORMATS: dict[str, Format] = {
             **_POSE_COLUMNS,
             **dict.fromkeys(_XYZ, _OPTIONAL),
             "uncertainty_mm": _OPTIONAL,
+            **dict.fromkeys((*ORIENTATION_COLUMNS, "uncertainty_deg"), CsvColumn(Written, optional=True, always=False)),
         },
         digits=_XYZ,
         gather=_position_fields,
+        faults=_position_faults,
         mixed_lengths=True,
     ),
     "directions": Format(
@@ -413,6 +491,8 @@ def _check_joints(path: Path, rows: Iterable[Row], robot: Robot) -> None:
             column, problem = "joint", f"there is no joint {joint}"
         elif any(pose[robot.joints :]):
             column, problem = f"q{len(pose)}_deg", f"the pose has {len(pose)} joints"
+        elif FRAME_OF_POINT.get(getattr(row, "point", "flange"), -1) > robot.rows:
+            column, problem = "point", "there is no wrist centre"
         else:
             continue
         remedy = f"{robot.name} has {robot.joints} joints: correct the row, or the robot's references"
@@ -432,16 +512,35 @@ def _fill_uncertainty(format: Format, fields: Fields) -> None:
     if format.digits and fields[format.uncertainty] is None:
         decimals = [fields[name].decimals for name in format.digits if fields[name] is not None]
         fields[format.uncertainty] = 0.5 * 10.0 ** -max(decimals, default=0)
+    if ORIENTATION_COLUMNS[0] in fields:
+        _fill_orientation_uncertainty(fields)
     if format.coarse and fields[format.uncertainty] is None:
         fields[format.uncertainty] = format.coarse
     for name, value in fields.items():
         fields[name] = float(value) if isinstance(value, Written) else value
 
 
+def _states_none(fields: Fields) -> bool:
+    """Whether a row could give an orientation and does not."""
+    return ORIENTATION_COLUMNS[0] in fields and not _written_as(fields)
+
+
+def _fill_orientation_uncertainty(fields: Fields) -> None:
+    """The angle that half the last digit of an orientation turns the flange by; 0 of a row without one."""
+    written = _written_as(fields)
+    if not written:
+        fields["uncertainty_deg"] = 0.0
+    elif fields["uncertainty_deg"] is None:
+        columns = written[0]
+        half = 0.5 * 10.0 ** -max(fields[name].decimals for name in columns if fields[name] is not None)
+        angles = {_QUATERNION: math.degrees(2 * half), _MATRIX: math.degrees(half)}
+        fields["uncertainty_deg"] = angles.get(columns, half)
+
+
 def _check_row(path: Path, format: Format, fields: Fields) -> None:
     faults = []
     for column, value in fields.items():
-        if column in UNCERTAINTIES and value <= 0:
+        if column in UNCERTAINTIES and value <= 0 and not (column == "uncertainty_deg" and _states_none(fields)):
             remedy = "Half the last digit that the source prints, if it gives none"
             faults.append((column, f"{value:g} is not positive", remedy))
     if fields.get("joint", 1) not in range(1, MOST_JOINTS + 1):

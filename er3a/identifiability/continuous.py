@@ -17,8 +17,9 @@ the joint limits are left aside meanwhile: what meets the rest is put to them af
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -49,6 +50,7 @@ WIDEST_M, WIDEST_RAD = 0.4, np.pi
 REACTS = 1e-9
 FAR = 3.0  # of an entry's scale
 A_LENGTH_M, REVERSED_RAD, UNWATCHED, ROUNDED = 0.3, 0.3, 0.01, 6
+MOST_ROWS = 1 << 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,15 +123,29 @@ def nearest_rows(own: Tables, region: Region, watched: Collection[int]) -> Table
 
 
 def same_robots(table: Tables) -> Tables:
-    """The rows (a batch) that are the same robot as a table's (a batch of one), itself first."""
-    found, joints, first = table, table.direction.shape[1], 0 if not table.modified[0] else 1
-    if table.beta.any():
-        return table
-    for link in range(joints - 1):
-        found = join([found, _x_turned(found, link, link + first)])
-    for joint in range(1 - first, joints - first):
-        found = join([found, _z_turned(found, joint, joint - 1 + first)])
+    """The rows (a batch) that are the same robot as a table's (a batch of one), itself first; of arms with more than
+    eight joints the first ``MOST_ROWS`` of them."""
+    found = table
+    for turn in _turns(table):
+        found = join([found, turn(found)]) if len(found) < MOST_ROWS else found
     return found
+
+
+def turned_once(table: Tables) -> Tables:
+    """Rows (a batch) of the same robot as a table's, with one axis turned round in each; itself first."""
+    return join([table, *(turn(table) for turn in _turns(table))])
+
+
+def _turns(table: Tables) -> list[Callable[[Tables], Tables]]:
+    """What turns an x axis or a z axis between base and flange round."""
+    joints, first = table.direction.shape[1], 0 if not table.modified[0] else 1
+    if table.beta.any():
+        return []
+    links = [partial(_x_turned, joint=link, row=link + first) for link in range(joints - 1)]
+    return [
+        *links,
+        *(partial(_z_turned, joint=joint, row=joint - 1 + first) for joint in range(1 - first, joints - first)),
+    ]
 
 
 def _x_turned(tables: Tables, joint: int, row: int) -> Tables:

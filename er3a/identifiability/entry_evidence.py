@@ -15,7 +15,9 @@ from er3a.kinematics.table_batch import Tables
 from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
 
-Status = Literal["settled", "weak", "contradicted", "consistent", "open", "gauge", "given"]
+Status = Literal["settled", "settled_up_to_signs", "weak", "contradicted", "consistent", "open", "gauge", "given"]
+"""``settled_up_to_signs``: every arm that evidence allows can be written with this value; but one of them moves
+otherwise than the table's, and can be written with another sign or half turn here as well."""
 TOLERANCE_MM, TOLERANCE_DEG = 5.0, 0.5
 """How far a settled entry may leave the tool off: what an arm of this size is off without calibration. What matters
 less is the business of a calibration and says nothing about the table."""
@@ -140,7 +142,16 @@ class Evidence(ByValue, Displayed):
         )
 
 
-_SHOWN: tuple[Status, ...] = ("contradicted", "open", "weak", "consistent", "gauge", "given", "settled")
+_SHOWN: tuple[Status, ...] = (
+    "contradicted",
+    "open",
+    "weak",
+    "consistent",
+    "gauge",
+    "given",
+    "settled_up_to_signs",
+    "settled",
+)
 
 
 def _in_short(names: list[str]) -> str:

@@ -18,7 +18,7 @@ from er3a.identifiability.alternatives import (
     open_table,
     with_readings,
 )
-from er3a.identifiability.continuous import Extent, Extents
+from er3a.identifiability.continuous import Extent, Extents, turned_once
 from er3a.identifiability.entries import (
     GROUP_OF,
     Gauge,
@@ -37,12 +37,14 @@ from er3a.identifiability.requirements import Asked, Requirement, requirements_o
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags
-from er3a.references.quantities import Limit, PoseOutside, Speed
+from er3a.references.quantities import Limit, PoseOutside, Speed, value_at
 from er3a.references.reference import Documents, Reference, conflicts
 from er3a.robots.robot import Robot
 
 LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
+OUTRIGHT_OR_NOT: tuple[Status, ...] = ("settled", "settled_up_to_signs")
 ROUNDING = 1e-9
+OF_SIGNS = ("a", "alpha", "d", "beta", "offset", "direction")
 WIDEST = 720.0
 FIRST_STEP, HALVINGS = 0.05, 12
 
@@ -79,7 +81,7 @@ def _past_poses(entry: TableNumber, independent: Sequence[Reference], low: float
     """A limit lies beyond every pose at which a document shows the arm."""
     for reference in independent:
         if isinstance(reference.quantity, PoseOutside):
-            angle = reference.quantity.pose[entry.joint - 1]
+            angle = value_at(reference.quantity.pose, entry.joint)
             if entry.column == "upper":
                 low = max(low, angle - reference.uncertainty)
             else:
@@ -272,7 +274,7 @@ class _Judge:
         elif entry.name in by_all:
             status = "open"
         elif not concerned and extents.met and self._small(extent):
-            status = "settled"
+            status = self._settled(own, [entry.name])
         return self._described(entry, status, extent, concerned, speaking)
 
     def _direction(self, entry: TableNumber) -> EntryEvidence:
@@ -294,9 +296,11 @@ class _Judge:
         else:
             doubtful = bool(own) and extents.met and extents.may_reverse(entry.joint)
             interval = (-1.0, 1.0) if doubtful else interval
-            status = "settled" if own and extents.met and not doubtful else "weak" if speaking or doubtful else "open"
+            status = "weak" if speaking or doubtful else "open"
+            if own and extents.met and not doubtful:
+                status = self._settled(own, [entry.name])
         off = _worst([each.off for each in concerned])
-        if status == "settled" and not speaking:
+        if status in OUTRIGHT_OR_NOT and not speaking:
             speaking = self._speaking_at(extents.met_by, entry, own)
         return self._described(entry, status, Extent(*interval, off, False), concerned, speaking)
 
@@ -353,9 +357,26 @@ class _Judge:
             by=self._documents(known),
             alternatives=tuple(readings),
             document=document_of(self.robot, entry),
-            off=NOT_OFF if status in ("settled", "gauge") else off,
+            off=NOT_OFF if status in (*OUTRIGHT_OR_NOT, "gauge") else off,
             at_least=extent.at_least and status == "weak",
         )
+
+    def _settled(self, own: tuple[int, ...], names: Sequence[str]) -> Status:
+        """Settled; but only up to signs where evidence allows another arm, for it can be written otherwise here."""
+        return "settled_up_to_signs" if self._alternatives_of(own) and self._rewritten & set(names) else "settled"
+
+    @cached_property
+    def _rewritten(self) -> set[str]:
+        """Entries that have another sign or half turn in other rows of the same robot."""
+        every, found = turned_once(self.table), set[str]()
+        for entry in self.entries:
+            if entry.column in OF_SIGNS:
+                values = getattr(every, entry.column)[:, entry.joint - 1]
+                off = values - values[0]
+                off = (off + np.pi) % (2 * np.pi) - np.pi if entry.unit == "deg" else off
+                if np.abs(off).max() > ROUNDING:
+                    found.add(entry.name)
+        return found
 
     def _small(self, extent: Extent) -> bool:
         """Whether what is left open moves the tool by less than the tolerance, as far as a finished search can tell."""
@@ -377,7 +398,7 @@ class _Judge:
         elif not speaking:
             status = "consistent" if everyone else "open"
         elif extents.met and self._small(extent):
-            status = "settled"
+            status = self._settled(own, [entry.name for entry, _ in factors])
         return EntryEvidence(
             entry=_sum_of(factors),
             value=sum(f * self.values[entry.name] for entry, f in factors),
@@ -387,7 +408,7 @@ class _Judge:
             by=self._documents(speaking or everyone),
             alternatives=(),
             document=document,
-            off=NOT_OFF if status == "settled" else extent.off,
+            off=NOT_OFF if status in OUTRIGHT_OR_NOT else extent.off,
             at_least=extent.at_least and status == "weak",
         )
 
@@ -516,15 +537,15 @@ def _worst(found: Sequence[ToolOff]) -> ToolOff:
 
 
 PartName = Literal["geometry", "zero_and_directions", "limits", "speeds"]
-PartStatus = Literal["settled", "consistent", "weak", "open", "contradicted", "absent"]
+PartStatus = Literal["settled", "settled_up_to_signs", "consistent", "weak", "open", "contradicted", "absent"]
 PART_OF_GROUP: dict[str, PartName] = {
     "dh": "geometry",
     "zero": "zero_and_directions",
     "limits": "limits",
     "speeds": "speeds",
 }
-GRAVEST: tuple[PartStatus, ...] = ("contradicted", "open", "weak", "consistent", "settled")
-SETTLED: tuple[Status, ...] = ("settled", "gauge", "given")
+GRAVEST: tuple[PartStatus, ...] = ("contradicted", "open", "weak", "consistent", "settled_up_to_signs", "settled")
+SETTLED: tuple[Status, ...] = (*OUTRIGHT_OR_NOT, "gauge", "given")
 MOST_COMBINED = 256
 
 
@@ -553,7 +574,7 @@ def parts_of(evidence: Evidence) -> tuple[PartEvidence, ...]:
     for part in PART_OF_GROUP.values():
         own = [each for each in (*evidence.entries, *evidence.combinations) if _part(each, columns) == part]
         unsettled = tuple(each for each in own if each.status not in SETTLED)
-        held = {each.status for each in unsettled}
+        held = {each.status for each in own}
         best: PartStatus = "settled" if own else "absent"
         status: PartStatus = next((each for each in GRAVEST if each in held), best)
         off = NOT_OFF

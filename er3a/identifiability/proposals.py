@@ -18,7 +18,7 @@ from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import join, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict, predict_tables
-from er3a.references.quantities import Limit, Point, Pose, Quantity, Side, Speed
+from er3a.references.quantities import FRAME_OF_POINT, Limit, Point, Pose, Quantity, Side, Speed
 from er3a.references.reference import Reference
 from er3a.references.seen import COARSE_DEG, SEEN, Manner, Seen, SeenMotion, TableEntry
 from er3a.references.subjects import EntryOfTable, JointLimit, JointSpeed, MotionOfJoint, ReferenceSubject
@@ -29,7 +29,7 @@ PLAIN_DEG = 50.0  # of the direction that is named, within which a motion is pla
 BENT_DEG = 45.0
 LENGTH_MM, ANGLE_DEG, LIMIT_DEG, SPEED_SHARE = 1.0, 0.5, 0.5, 0.02
 SHARE_OF_TOLERANCE = 0.4
-SETTLED = ("settled", "given", "gauge", "contradicted")
+SETTLED = ("settled", "settled_up_to_signs", "given", "gauge", "contradicted")
 WAYS_TO_LOOK: tuple[tuple[Point, Manner], ...] = (
     ("flange", "tilts"),
     ("flange", "moves"),
@@ -190,6 +190,8 @@ def _look(evidence: Evidence, entry: TableNumber) -> LookAtMotion | None:
     unaffected = len(others) + 1
     for pose in _poses(robot):
         for point, manner in WAYS_TO_LOOK:
+            if FRAME_OF_POINT[point] > robot.rows:
+                continue
             motions = [SeenMotion(pose, entry.joint, point, seen) for seen in SEEN]
             motions = [motion for motion in motions if motion.manner == manner]
             values = predict_tables(tables, robot, motions)

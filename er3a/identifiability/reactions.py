@@ -13,7 +13,7 @@ from er3a.identifiability.requirements import FollowedExtreme
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import Extreme, PoseOutside, Quantity, Speed
+from er3a.references.quantities import Extreme, PoseOutside, Quantity, Speed, value_at
 from er3a.references.reference import Documents, Reference, quantities_of
 from er3a.robots.robot import Robot
 
@@ -124,7 +124,7 @@ def _bounds(quantity: Quantity, entry: TableNumber) -> bool:
     if isinstance(quantity, Speed):
         return entry.column == "speed" and entry.joint == quantity.joint
     if isinstance(quantity, PoseOutside):
-        angle = quantity.pose[entry.joint - 1]
+        angle = value_at(quantity.pose, entry.joint)
         return (entry.column == "upper" and angle > 0) or (entry.column == "lower" and angle < 0)
     return False
 

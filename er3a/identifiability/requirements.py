@@ -43,6 +43,7 @@ from er3a.references.quantities import (
     AxisCoordinate,
     AxisDistance,
     Extreme,
+    FlangeTurn,
     Limit,
     ModelState,
     PointCoordinate,
@@ -54,6 +55,7 @@ from er3a.references.quantities import (
     Speed,
     TurnedApart,
     nearest_on_line,
+    rotation_vectors_deg,
 )
 from er3a.references.reference import Reference, conflicts
 from er3a.robots.robot import Robot
@@ -105,7 +107,8 @@ def _kind(quantity: Quantity, expected: float) -> str:
         return "" if expected else "angle"
     if isinstance(quantity, SegmentAngle):
         return "" if expected else "segment"
-    return {AxisCoordinate: "axis", PointCoordinate: "point", SectionCoordinate: "section"}.get(type(quantity), "")
+    kinds = {AxisCoordinate: "axis", FlangeTurn: "turn", PointCoordinate: "point", SectionCoordinate: "section"}
+    return kinds.get(type(quantity), "")
 
 
 def _reader(quantities: list[Quantity], expected: Reals, states: TablesState) -> Reader:
@@ -116,6 +119,8 @@ def _reader(quantities: list[Quantity], expected: Reals, states: TablesState) ->
         return _segments([each for each in quantities if isinstance(each, SegmentAngle)])
     if isinstance(first, AxisCoordinate):
         return _axis_points([each for each in quantities if isinstance(each, AxisCoordinate)], expected)
+    if isinstance(first, FlangeTurn):
+        return _turns([each for each in quantities if isinstance(each, FlangeTurn)], expected, states)
     if isinstance(first, PointCoordinate):
         return _points([each for each in quantities if isinstance(each, PointCoordinate)], expected, states)
     if isinstance(first, SectionCoordinate):
@@ -167,6 +172,21 @@ def _points(quantities: list[PointCoordinate], expected: Reals, states: TablesSt
 
     def read(state: ModelState) -> Reals:
         off: Reals = (state.frames[:, places, frames, coordinates, 3] * MM - expected)[..., None]
+        return off
+
+    return read
+
+
+def _turns(quantities: list[FlangeTurn], expected: Reals, states: TablesState) -> Reader:
+    seen = [(states.index[each.pose], each.stated) for each in quantities]
+    turns = list(dict.fromkeys(seen))
+    places, stated = np.array([place for place, _ in turns]), np.array([each for _, each in turns])
+    which = np.array([turns.index(each) for each in seen])
+    coordinates = np.array([COORDINATES.index(each.coordinate) for each in quantities])
+
+    def read(state: ModelState) -> Reals:
+        R = state.frames[:, places, FRAME_OF_POINT["flange"], :3, :3] @ stated.transpose(0, 2, 1)
+        off: Reals = (rotation_vectors_deg(R)[:, which, coordinates] - expected)[..., None]
         return off
 
     return read

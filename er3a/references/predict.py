@@ -174,6 +174,7 @@ def state_of(
         speed=robot.speed,
         extremes=extremes,
         axes=axes,
+        slides=robot.slides,
         columns={name: getattr(robot, name) for name in TABLE_COLUMNS}
         | {"twist": robot.alpha[1:] if robot.convention == "modified" else robot.alpha[:-1]},
     )
@@ -220,6 +221,7 @@ class TablesState:
             upper=tables.upper,
             speed=self.robot.speed,
             extremes={},
+            slides=self.robot.slides,
             columns={name: getattr(tables, name) for name in TABLE_COLUMNS}
             | {"twist": np.where(tables.modified[:, None], tables.alpha[:, 1:], tables.alpha[:, :-1])},
         )

@@ -16,12 +16,14 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal, cast
 
 import numpy as np
+import scipy
 
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 
 Pose = tuple[float, ...]
 """Joint values as they are written: deg, or mm of joints that slide."""
 Vector = tuple[float, float, float]
+Rotation3 = tuple[Vector, Vector, Vector]
 Unit = Literal["mm", "deg", "deg/s"]
 Coordinate = Literal["x", "y", "z"]
 SectionAxis = Literal["x", "z"]
@@ -31,6 +33,7 @@ Side = Literal["lower", "upper"]
 Extremity = Literal["greatest", "least"]
 ZERO_POSE: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MM = 1000.0
+NEARLY_OPPOSITE = 1e-5
 SECTION_AXES: tuple[SectionAxis, ...] = ("x", "z")
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
 FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": -1}
@@ -47,6 +50,7 @@ class ModelState:
     direction, lower, upper, speed : (..., 6), of the robot
     extremes : value (mm) of each :class:`Extreme` that was searched for
     columns : (..., 6) each, of the table: a, d in m, alpha, offset in rad; ``twist`` (..., 5), between joint axes
+    slides : (n,), joints whose limits are in m; None where all turn
     axes : the joints' axis lines in the zero pose, if they were measured on the model; else those of the frames
     """
 
@@ -59,6 +63,7 @@ class ModelState:
     extremes: Mapping[Quantity, float]
     axes: AxisLines | None = None
     columns: Mapping[str, Reals] = field(default_factory=dict)
+    slides: Flags | None = None
 
     def at(self, pose: Pose) -> Reals:
         """Frames (..., 7, 4, 4) at a pose."""
@@ -163,6 +168,11 @@ class QuantityAtPose(Quantity):
         return self.pose
 
 
+def value_at(pose: Pose, joint: int) -> float:
+    """What a pose has of a joint, counted from 1, deg or mm; 0 of one that it does not name."""
+    return pose[joint - 1] if joint <= len(pose) else 0.0
+
+
 @dataclass(frozen=True)
 class PointCoordinate(QuantityAtPose):
     """A coordinate (base frame) of the flange or the wrist centre at a pose."""
@@ -176,6 +186,30 @@ class PointCoordinate(QuantityAtPose):
     @property
     def vector(self) -> Hashable:
         return self.pose, self.point
+
+
+@dataclass(frozen=True)
+class FlangeTurn(QuantityAtPose):
+    """A coordinate (base frame) of the rotation vector from a stated orientation of the flange to the arm's.
+
+    ``stated`` : rows of its rotation matrix. The vector's length is the angle between both, 0 where they agree.
+    """
+
+    stated: Rotation3 = field(compare=False)
+    coordinate: Coordinate
+    unit: ClassVar[Unit] = "deg"
+
+    def value(self, state: ModelState) -> Reals:
+        R = state.at(self.pose)[..., FRAME_OF_POINT["flange"], :3, :3]
+        return rotation_vectors_deg(R @ np.array(self.stated).T)[..., COORDINATES.index(self.coordinate)]
+
+    @property
+    def vector(self) -> Hashable:
+        return FlangeTurn, self.pose
+
+    def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+        turn = np.array(self.stated) @ np.array(cast(FlangeTurn, other).stated).T
+        return abs(float(rotation_vectors_deg(turn)[COORDINATES.index(self.coordinate)]))
 
 
 @dataclass(frozen=True)
@@ -266,15 +300,18 @@ class Speed(Quantity):
 
 @dataclass(frozen=True)
 class PoseOutside(QuantityAtPose):
-    """How far a pose lies outside the joint limits: greatest excess of a joint, 0 inside."""
+    """How far a pose lies outside the joint limits: greatest excess of a joint (mm of one that slides), 0 inside."""
 
     unit: ClassVar[Unit] = "deg"
 
     def value(self, state: ModelState) -> Reals:
         joints = state.lower.shape[-1]
-        q = np.radians([*self.pose, *ZERO_POSE, *ZERO_POSE][:joints])
-        excess: Reals = np.maximum(np.maximum(state.lower - q, q - state.upper).max(axis=-1), 0.0)
-        return np.degrees(excess)
+        slides = np.zeros(joints, dtype=bool) if state.slides is None else state.slides
+        written = np.array([value_at(self.pose, joint) for joint in range(1, joints + 1)])
+        q = np.where(slides, written / MM, np.radians(written))
+        beyond = np.maximum(state.lower - q, q - state.upper)
+        excess: Reals = np.maximum(np.where(slides, beyond * MM, np.degrees(beyond)).max(axis=-1), 0.0)
+        return excess
 
 
 @dataclass(frozen=True)
@@ -345,6 +382,19 @@ def angle_between(a: Reals, b: Reals, signed: bool) -> Reals:
     """Angle in deg; of lines (at most 90) if not signed."""
     cross, dot = _cross(a, b), _dot(a, b)
     return np.degrees(np.arctan2(np.sqrt(_dot(cross, cross)), dot if signed else np.abs(dot)))
+
+
+def rotation_vectors_deg(R: Reals) -> Reals:
+    """Rotation vectors (..., 3) in deg, at most 180 long, of rotation matrices (..., 3, 3)."""
+    skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
+    cosine = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1.0  # this and the sine twice
+    sine = np.sqrt(_dot(skew, skew))
+    per_sine = np.arctan2(sine, cosine) / np.where(sine > 0, sine, 1.0)
+    vectors: Reals = np.degrees(np.where(sine > 0, per_sine, 0.5)[..., None] * skew)
+    opposite = (cosine < 0) & (sine < NEARLY_OPPOSITE)  # the skew part has few digits left there
+    if opposite.any():
+        vectors[opposite] = scipy.spatial.transform.Rotation.from_matrix(R[opposite]).as_rotvec(degrees=True)
+    return vectors
 
 
 class TurnedApart:

@@ -18,11 +18,13 @@ from er3a.references.quantities import (
     AxisCoordinate,
     AxisDistance,
     Extremity,
+    FlangeTurn,
     Limit,
     Point,
     PointCoordinate,
     Pose,
     PoseOutside,
+    Rotation3,
     SectionAxis,
     SectionCoordinate,
     SectionExtent,
@@ -44,6 +46,7 @@ from er3a.references.subjects import (
     JointLimit,
     JointSpeed,
     MotionOfJoint,
+    OrientationAtPose,
     PointAtPose,
     PoseExcess,
     Reach,
@@ -81,16 +84,17 @@ GROUPS: dict[str, Group] = {
 class AxisRow(Row):
     """The line of a joint's axis in the zero pose.
 
-    ``point_mm`` is where the axis meets the next part of the arm: axis 1 the mounting plane, axes 2, 3 and 5 the arm's
-    plane of symmetry, axes 4 and 6 axis 5. Sliding it along the axis changes no check. ``signed``: ``direction`` is
-    that of positive rotation (right hand), else just the line's.
+    ``point_mm`` is None of a joint that slides, whose axis has no place. Else it is where the axis meets the next part
+    of the arm: axis 1 the mounting plane, axes 2, 3 and 5 the arm's plane of symmetry, axes 4 and 6 axis 5. Sliding it
+    along the axis changes no check. ``signed``: ``direction`` is that of positive rotation (right hand), else just the
+    line's.
     """
 
     kind: ClassVar[str] = "axes"
     groups: ClassVar[tuple[str, ...]] = ("axes",)
     joint: int
     direction: Vector
-    point_mm: Vector
+    point_mm: Vector | None
     signed: bool
     uncertainty_mm: float
     uncertainty_deg: float
@@ -98,16 +102,16 @@ class AxisRow(Row):
     def scalars(self) -> Iterator[Scalar]:
         angle = AxisAngle(self.joint, self.direction, self.signed)
         yield AxisDirection(self.joint, self.signed), "axes", angle, 0.0, self.uncertainty_deg
-        for coordinate, along, expected in zip(COORDINATES, self.direction, self.point_mm):
-            if abs(along) < ALONG:
+        for coordinate, along, expected in zip(COORDINATES, self.direction, self.point_mm or ()):
+            if self.point_mm and abs(along) < ALONG:
                 quantity = AxisCoordinate(self.joint, coordinate, self.point_mm)
                 yield AxisPosition(self.joint, coordinate), "axes", quantity, expected, self.uncertainty_mm
 
 
 @dataclass(frozen=True)
 class PositionRow(Row):
-    """Flange or wrist centre at a pose; None for coordinates that aren't given. Without any, the row says only that the
-    pose lies within the limits."""
+    """Flange or wrist centre at a pose; None for coordinates, and the flange's orientation (rows of its rotation
+    matrix), that aren't given. Without any, the row says only that the pose lies within the limits."""
 
     kind: ClassVar[str] = "positions"
     groups: ClassVar[tuple[str, ...]] = ("zero_pose", "key_poses")
@@ -116,6 +120,8 @@ class PositionRow(Row):
     pose: Pose
     xyz_mm: tuple[float | None, float | None, float | None]
     uncertainty_mm: float
+    orientation: Rotation3 | None = None
+    uncertainty_deg: float = 0.0
 
     @property
     def group(self) -> str:
@@ -128,7 +134,11 @@ class PositionRow(Row):
                 subject = PointAtPose(self.name, self.point, coordinate)
                 quantity = PointCoordinate(self.pose, self.point, coordinate)
                 yield subject, self.group, quantity, expected, self.uncertainty_mm
-        if self.xyz_mm == (None, None, None):
+        if self.orientation is not None:
+            for coordinate in COORDINATES:
+                turn = FlangeTurn(self.pose, self.orientation, coordinate)
+                yield OrientationAtPose(self.name, coordinate), self.group, turn, 0.0, self.uncertainty_deg
+        if self.xyz_mm == (None, None, None) and self.orientation is None:
             yield self.within_limits()
 
     def within_limits(self) -> Scalar:

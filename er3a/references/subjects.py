@@ -57,6 +57,15 @@ class PointAtPose(Subject):
 
 
 @dataclass(frozen=True)
+class OrientationAtPose(Subject):
+    """How the flange is oriented at a pose that the source names."""
+
+    pose: str
+    coordinate: Coordinate | None
+    code: Literal["orientation_at_pose"] = "orientation_at_pose"
+
+
+@dataclass(frozen=True)
 class PoseExcess(Subject):
     """How far a pose that the source names lies outside the limits."""
 
@@ -141,6 +150,7 @@ ReferenceSubject = (
     AxisDirection
     | AxisPosition
     | PointAtPose
+    | OrientationAtPose
     | PoseExcess
     | SegmentInclination
     | DrawingCorner

@@ -45,6 +45,9 @@ def import_urdf(
     *,
     base: Annotated[str | None, typer.Option(help="the link at which the arm begins; the root by default")] = None,
     tip: Annotated[str | None, typer.Option(help="the link at which it ends, if the file leaves a choice")] = None,
+    references: Annotated[
+        Path | None, typer.Option(help="also write what the URDF says as a reference set: a new folder")
+    ] = None,
     snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
     split: Split = False,
     xacro: Xacro = None,
@@ -52,6 +55,7 @@ def import_urdf(
 ):
     """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
     from er3a.files.robot_writer import write_robot
+    from er3a.files.urdf_references import write_urdf_references
     from er3a.formats.urdf import import_urdf as read_urdf
     from er3a.formats.xacro import plain_urdf
     from er3a.robots.robot import robot_name
@@ -59,15 +63,24 @@ def import_urdf(
     with shown_work(f"{file}: the arm is read") as at, plain_urdf(file, xacro or ()) as plain:
         shown = split and (lambda mesh: at(f"{mesh}: split into convex pieces"))
         imported = read_urdf(plain, base=base, tip=tip, snap=snap, split=shown)
+        if references:
+            write_urdf_references(plain, references, base=base, tip=tip)
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(imported.robot.replace(name=output.stem), output)
     for note in imported.notes:
         print_note(note)
     if as_json:
-        print_json({"output": str(output), "misfit_mm": imported.misfit_m * 1000, "notes": imported.notes})
+        print_json(
+            {"output": str(output), "misfit_mm": imported.misfit_m * 1000, "notes": imported.notes}
+            | ({"references": str(references)} if references else {})
+        )
         return
     print(f"{output}: written; differs from the URDF by at most {imported.misfit_m * 1000:.2g} mm on random poses")
+    if references:
+        print(
+            f"{references}: references written; `references: [{references.name}]` in a robot file holds it against them"
+        )
 
 
 @app.command(rich_help_panel=ROBOT_FILES)

@@ -125,7 +125,10 @@ TEXTS = texts(
             "the base is defined elsewhere: the arm stands ({x:g}, {y:g}, {z:g}) mm from there, turned by {turn_deg:g} "
             "deg"
         ),
-        "flange_elsewhere": "the flange is defined elsewhere: ({x:g}, {y:g}, {z:g}) mm from there",
+        "flange_elsewhere#shifted": "the flange is defined elsewhere: ({x:g}, {y:g}, {z:g}) mm from there",
+        "flange_elsewhere#turned": (
+            "the flange is defined elsewhere: ({x:g}, {y:g}, {z:g}) mm from there, turned by {turn_deg:g} deg"
+        ),
         "flange_position_decides#share": (
             "the flange's position at joints ({pose}) deg would distinguish {share:.0%} of the pairs, by up to {most}"
         ),
@@ -304,7 +307,7 @@ def _(found: BaseElsewhere) -> str:
 @say.register
 def _(found: FlangeElsewhere) -> str:
     x, y, z = found.shift_mm
-    return say_as(found, x=x, y=y, z=z)
+    return say_as(found, "turned" if found.turn_deg >= LEAST_SHOWN else "shifted", x=x, y=y, z=z)
 
 
 @say.register

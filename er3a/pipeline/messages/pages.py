@@ -131,14 +131,15 @@ def decision(
     table: str,
     failed: Sequence[str],
     instead: str | None = None,
-    geometry: tuple[int, int] | None = None,
+    geometry: tuple[int, int, int] | None = None,
     *,
     same_arm: bool = False,
 ) -> str:
     """What to do with a robot's model, from validation's status and the titles of the stages that failed.
 
-    ``instead`` is a model of the same arm that evidence does not contradict; ``geometry``: how many of how many lengths
-    and twists of a table that is not contradicted independent documents settle; ``same_arm``: the evidence is of this
+    ``instead`` is a model of the same arm that evidence does not contradict; ``geometry``: how many lengths and
+    twists of a table that is not contradicted independent documents settle, how many more up to signs, and of how many;
+    ``same_arm``: the evidence is of this
     arm, defined otherwise.
     """
     if table == "not_examined":
@@ -155,14 +156,22 @@ def decision(
         return tr(
             "Use it: every entry that moves the tool is settled by independent documents, and nothing here fails."
         )
-    if table == "caution" and geometry and not geometry[0]:
+    if table == "caution" and geometry and not any(geometry[:2]):
         return tr("Not proven: nothing contradicts its table, but no independent document settles any of its geometry.")
+    if table == "caution" and geometry and geometry[1]:
+        return tr(
+            "Use it with care: nothing contradicts its table, and {settled} of {entries} entries of its geometry are "
+            "settled, {signs} of them only up to signs, but not the whole table.",
+            settled=geometry[0] + geometry[1],
+            signs=geometry[1],
+            entries=geometry[2],
+        )
     if table == "caution" and geometry:
         return tr(
             "Use it with care: nothing contradicts its table, and {settled} of {entries} entries of its geometry are "
             "settled, but not the whole table.",
             settled=geometry[0],
-            entries=geometry[1],
+            entries=geometry[2],
         )
     if table == "caution":
         return tr("Use it with care: nothing contradicts its table, but part of it is not settled.")

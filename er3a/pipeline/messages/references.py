@@ -13,6 +13,7 @@ from er3a.references.subjects import (
     DrawingCorner,
     EntryOfTable,
     MotionOfJoint,
+    OrientationAtPose,
     PointAtPose,
     PoseExcess,
     Reach,
@@ -45,6 +46,7 @@ check_complete("words for groups of references", GROUPS, GROUP_WORDS)
 check_complete("words for groups that a set lacks", GROUPS, MISSING_WORDS)
 STATUS_WORDS = {
     "settled": N_("settled"),
+    "settled_up_to_signs": N_("settled up to signs"),
     "weak": N_("weak"),
     "contradicted": N_("contradicted"),
     "consistent": N_("consistent"),
@@ -55,6 +57,10 @@ STATUS_WORDS = {
 }
 STATUS_MEANINGS = {
     "settled": N_("what independent documents leave open moves the tool by less than the tolerance"),
+    "settled_up_to_signs": N_(
+        "as settled, but its sign or half turn hangs on entries that are open: with another value there the same arm "
+        "can be written otherwise here"
+    ),
     "weak": N_(
         "independent documents depend on it, but what they leave open moves the tool by more than the tolerance"
     ),
@@ -103,6 +109,7 @@ TEXTS = texts(
         "motion#clockwise_looking_right": "the tool turns clockwise as seen looking right",
         "motion#clockwise_looking_forward": "the tool turns clockwise as seen looking forward",
         "motion#clockwise_looking_back": "the tool turns clockwise as seen looking back",
+        "orientation_at_pose": "orientation of the flange",
         "pose_excess": "outside the limits by",
         "at_pose#quoted": "{seen} ({own_pose})",
         "axis_position": "axis {joint}",
@@ -150,7 +157,7 @@ TEXTS = texts(
 
 def quoted(subject: Subject) -> str:
     """A subject within a sentence: the pose behind what is seen there."""
-    if isinstance(subject, PointAtPose | PoseExcess):
+    if isinstance(subject, PointAtPose | OrientationAtPose | PoseExcess):
         return sentence("at_pose#quoted", seen=_seen(subject), own_pose=own_title(subject.pose))
     return say(subject)
 
@@ -161,7 +168,7 @@ def _(found: AxisPosition) -> str:
 
 
 @say.register
-def _(found: PointAtPose | PoseExcess) -> str:
+def _(found: PointAtPose | OrientationAtPose | PoseExcess) -> str:
     return sentence("at_pose#row", own_pose=own_title(found.pose), seen=_seen(found))
 
 
@@ -199,7 +206,9 @@ def motion_seen(found: MotionOfJoint) -> str:
     return sentence(f"motion#{found.seen}", point=word("point", POINT_WORDS, found.point))
 
 
-def _seen(subject: PointAtPose | PoseExcess) -> str:
+def _seen(subject: PointAtPose | OrientationAtPose | PoseExcess) -> str:
+    if isinstance(subject, OrientationAtPose):
+        return _with_coordinate(say_as(subject), subject.coordinate)
     if isinstance(subject, PoseExcess):
         return say_as(subject)
     return _with_coordinate(word("point", POINT_WORDS, subject.point), subject.coordinate)

@@ -126,6 +126,7 @@ TEXTS = texts(
         ),
         "validation.left_open#conflicting": "{count} undecided, as documents contradict each other",
         "part_found#settled": "{part}: {settled} of {entries} entries settled",
+        "part_found#up_to_signs": "{count} more up to signs",
         "part_found#excluded": "excluded: {names}",
         "part_found#open": "open: {names}",
         "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
@@ -195,7 +196,7 @@ def _of_claims(found: JudgedTable) -> list[str]:
 def _(found: LeftOpen) -> str:
     parts = [say(part) for part in found.parts if part.status != "settled"]
     sentences = [_what_speaks(found.counts), say_as(found, "parts", parts=joined(parts)) if parts else ""]
-    if found.tolerance and any(part.settled for part in found.parts):
+    if found.tolerance and any(part.settled or part.up_to_signs for part in found.parts):
         sentences.append(
             say_as(found, "tolerance", mm=as_text(found.tolerance.mm, "g"), deg=as_text(found.tolerance.deg, "g"))
         )
@@ -230,7 +231,8 @@ def _(found: PartFound) -> str:
     counts = say_as(found, "settled", part=part, settled=settled)
     excluded = say_as(found, "excluded", names=shortened(found.contradicted))
     left = say_as(found, "open", names=shortened(found.open))
-    parts = [counts, excluded if found.contradicted else "", left if found.open else ""]
+    signs = say_as(found, "up_to_signs", count=found.up_to_signs) if found.up_to_signs else ""
+    parts = [counts, signs, excluded if found.contradicted else "", left if found.open else ""]
     return joined(parts, ", ")
 
 

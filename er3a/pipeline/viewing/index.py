@@ -542,8 +542,11 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     }
 
 
-def _geometry(finding: object) -> tuple[int, int] | None:
-    """How many of how many entries of a table's geometry are settled, where only part of it is."""
+def _geometry(finding: object) -> tuple[int, int, int] | None:
+    """How many entries of a table's geometry are settled, how many more up to signs, and of how many, where only
+    part of it is."""
     if not isinstance(finding, LeftOpen):
         return None
-    return next(((part.settled, part.entries) for part in finding.parts if part.part == "geometry"), None)
+    return next(
+        ((part.settled, part.up_to_signs, part.entries) for part in finding.parts if part.part == "geometry"), None
+    )

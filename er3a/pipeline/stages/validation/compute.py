@@ -161,12 +161,13 @@ def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> Axes:
     rows = []
     for references in sets:
         for row in references.of(AxisRow):
-            stated = np.array(row.point_mm)
+            found = circles.axes.point_mm[row.joint - 1]
+            stated = found if row.point_mm is None else np.array(row.point_mm)
             direction = circles.axes.direction[row.joint - 1]
-            nearest = nearest_on_line(direction, circles.axes.point_mm[row.joint - 1], stated)
+            nearest = nearest_on_line(direction, found, stated)
             angle = float(angle_between(direction, np.array(row.direction), row.signed))
             distance = float(np.linalg.norm(nearest - stated))
-            head = (references.name, row.source, row.grade, row.joint, row.direction, row.point_mm)
+            head = (references.name, row.source, row.grade, row.joint, row.direction, stated)
             rows.append((*head, direction, nearest, angle, distance, row.uncertainty_deg, row.uncertainty_mm))
     return Axes.of_rows(rows)
 
@@ -292,7 +293,7 @@ def compute(study: Study, name: str) -> ValidationResults:
     sets = [load_references(reference) for reference in robot.references]
     check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
 
-    plain = is_six_turning(robot)
+    turning, six = is_turning(robot), is_six_turning(robot)
     stated = [quantity for references in sets for quantity in quantities_of(references.checkable)]
     sought = [quantity for quantity in stated if isinstance(quantity, Extreme)]
     wanted = dict.fromkeys([*always_searched(robot), *sought])
@@ -306,7 +307,7 @@ def compute(study: Study, name: str) -> ValidationResults:
         state = state_of(robot, quantities, extremes=values, axes=circles.axes)
         bases = (
             bases_of(robot, references.checkable, references.documents)
-            if plain
+            if turning
             else undeclared_bases(references.checkable)
         )
         judged, contradictions = checks_of_set(references, read(quantities, state), bases, robot.joints)
@@ -317,13 +318,13 @@ def compute(study: Study, name: str) -> ValidationResults:
     checks += trip_checks
 
     axes, poses = axes_table(circles, sets), key_poses_table(robot, sets, extremes)
-    diagnoses, residuals = diagnose_sets(robot, sets if plain else [])
-    calibrations, corrections = calibrate_from_sets(robot, sets if plain else [])
+    diagnoses, residuals = diagnose_sets(robot, sets if turning else [])
+    calibrations, corrections = calibrate_from_sets(robot, sets if six else [])
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(robot, sets, checks, poses, found)
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
     reach = {name: values[quantity] for name, quantity in reaches.items() if quantity in values}
-    evidence = evidence_of_table(robot, sets) if plain else None
+    evidence = evidence_of_table(robot, sets) if turning else None
     counts = counts_of(checks)
     summary = ValidationSummary(
         verdict=verdict_of(checks, conflicts, summaries, found, evidence),
@@ -345,7 +346,7 @@ def compute(study: Study, name: str) -> ValidationResults:
         checks=Checks.of_records(checks),
         axes=axes,
         key_poses=poses,
-        section=section_table(robot, extremes) if plain else Section.empty(),
+        section=section_table(robot, extremes) if six else Section.empty(),
         residuals=residuals,
         corrections=corrections,
     )
@@ -369,9 +370,14 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEviden
     )
 
 
+def is_turning(robot: Robot) -> bool:
+    """Whether the arm is one of those that diagnosis and evidence are made for: joints that turn, one for each row."""
+    return not robot.sliding.any() and robot.coupling is None
+
+
 def is_six_turning(robot: Robot) -> bool:
-    """Whether the arm is one of those that diagnosis, calibration and evidence are made for."""
-    return robot.rows == robot.joints == SIX and not robot.sliding.any() and robot.coupling is None
+    """Whether the arm is one of those that calibration from references is made for."""
+    return robot.rows == SIX and is_turning(robot)
 
 
 def always_searched(robot: Robot) -> tuple[AxisDistance, ...]:

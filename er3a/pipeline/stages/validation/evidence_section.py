@@ -20,6 +20,7 @@ from er3a.robots.robot import Robot
 
 MARKS: Mapping[Status, str] = {
     "settled": "✓",
+    "settled_up_to_signs": "±",
     "weak": "~",
     "contradicted": "✗",
     "consistent": "=",
@@ -27,6 +28,7 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
+SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",
     "alpha": "α (°)",
@@ -132,7 +134,7 @@ def evidence_section(evidence: TableEvidence | None) -> EvidenceSection | None:
     kinds = [kind for kind in COLUMNS if any(f"{kind}{joint}" in by_name for joint in joints)]
     everything = [*evidence.entries, *evidence.combinations]
     numbers = [each for each in everything if each.value is not None]
-    left = [each for each in numbers if each.status not in ("settled", "gauge")]
+    left = [each for each in numbers if each.status not in SETTLED]
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = dict.fromkeys(each.status for each in numbers)
     return EvidenceSection(
@@ -148,7 +150,7 @@ def evidence_section(evidence: TableEvidence | None) -> EvidenceSection | None:
         open_columns=[tr(column) for column in DETAIL_COLUMNS],
         settled_columns=[tr(column) for column in DETAIL_COLUMNS[:-1]],
         open_rows=[[*_row(each), proposals.get(each.entry, "–")] for each in left],
-        settled_rows=[_row(each) for each in numbers if each.status in ("settled", "gauge")],
+        settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         unmet=not evidence.table_meets and evidence.other is None,
         other=_other(evidence) if evidence.other else None,
         tolerance=tr(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from er3a.diagnosis.conclusions import TooSmallToTell
-from er3a.diagnosis.faults import CONVENTIONS
+from er3a.diagnosis.faults import CONVENTIONS, WrongLimit
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName, PartStatus, parts_of, together
@@ -80,6 +80,7 @@ def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[
         status=status,
         entries=sum(each.status != "gauge" for each in own),
         settled=len(named("settled")),
+        up_to_signs=len(named("settled_up_to_signs")),
         contradicted=named("contradicted"),
         open=named("open"),
         off=off,
@@ -99,7 +100,7 @@ def set_summaries(
         counts = counts_of(check for check in checks if check.reference_set == references.name)
         weighing = counts.independent, counts.consistency
         failed, total = (sum(getattr(each, name) for each in weighing) for name in ("failed", "total"))
-        diagnosis = diagnoses.get(references.name)  # there is none of arms with other than six turning joints
+        diagnosis = diagnoses.get(references.name)  # there is none of arms with joints that slide or are coupled
         conclusion = diagnosis.conclusion if diagnosis else None
         found.append(
             SetSummary(
@@ -257,7 +258,8 @@ def _missed(
         return AnotherArm(**common, described=own.described)
     found = named.get(quoted.reference_set)
     faults = () if found is None or isinstance(found, TooSmallToTell) else found.faults
-    chosen = bool(faults) and all(isinstance(fault, CONVENTIONS) for fault in faults)
+    chosen = any(isinstance(fault, CONVENTIONS) for fault in faults)
+    chosen &= all(isinstance(fault, (*CONVENTIONS, WrongLimit)) for fault in faults)
     return DefinedOtherwise(**common) if chosen else Contradicted(**common)
 
 

@@ -1,0 +1,130 @@
+"""A URDF as a reference set: what it says of an arm, for tables that others made to be held against."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from er3a.errors import InputError
+from er3a.files.kept_files import write_atomically
+from er3a.files.reference_sets import FILE, load_references
+from er3a.formats.urdf import UrdfStatements, urdf_statements
+from er3a.geometry.transforms import rpy_of
+from er3a.numerics.arrays import Reals
+from er3a.references.quantities import MM, ZERO_POSE
+from er3a.robots.robot import robot_name
+
+DIGITS_MM, DIGITS_DEG, DIGITS_AXIS = 6, 7, 12
+LEAST_MM, LEAST_DEG = 0.1, 0.02  # tables are printed to 0.1 mm
+Table = list[Sequence[object]]
+
+
+def write_urdf_references(
+    path: str | Path,
+    folder: str | Path,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    title: str = "",
+    half_widths: tuple[float, float] = (LEAST_MM, LEAST_DEG),
+) -> list[Path]:
+    """Write axes, flange poses with orientation, limits and speeds as a URDF has them, with their document.
+
+    The flange is the tip; half-widths follow from the digits that the URDF prints. What it does not state is left out:
+    limits of continuous joints, and those of joints that slide, which references don't know.
+
+    Parameters
+    ----------
+    path : a URDF; base, tip : links at which the arm begins and ends; title : of the document
+    folder : made if it is not there
+    half_widths : mm and deg, the least
+
+    Returns
+    -------
+    files : that were written; :class:`InputError` for a URDF that can't be read and for a folder that holds references
+    """
+    path, folder = Path(path), Path(folder)
+    if held := sorted(each.name for each in folder.glob("*.csv")):
+        raise InputError(folder, None, f"holds references already ({', '.join(held)})", "Name an empty or a new folder")
+    found = urdf_statements(path, base=base, tip=tip)
+    document = robot_name(path)
+    mm = max(half_widths[0], float(np.ceil(found.half_width_m * MM * 1e3)) / 1e3)
+    deg = max(half_widths[1], float(np.ceil(np.degrees(found.half_width_rad) * 1e3)) / 1e3)
+    behind = (f"{path.name}, chain to the tip", "export", document)
+    tables: dict[str, Table] = {
+        FILE: [("name", "title", "publisher", "derived_from"), (document, title or f"URDF {path.name}", path.name, "")],
+        "axes.csv": _axes(found, (mm, deg), behind),
+        "positions.csv": _positions(found, (mm, deg), behind),
+        "limits.csv": _limits(found, behind),
+        "speeds.csv": _speeds(found, behind),
+    }
+    written = []
+    for name, rows in tables.items():
+        if len(rows) > 1:
+            text = io.StringIO()
+            csv.writer(text, lineterminator="\n").writerows(rows)
+            write_atomically(folder / name, partial(Path.write_text, data=text.getvalue(), encoding="utf-8"))
+            written.append(folder / name)
+    load_references(folder)
+    return written
+
+
+SOURCE = ("source", "grade", "origin", "units_checked")
+
+
+def _rows(header: Sequence[str], rows: Sequence[Sequence[object]], behind: Sequence[str]) -> Table:
+    return [(*header, *SOURCE), *((*row, *behind, "yes") for row in rows)]
+
+
+def _axes(found: UrdfStatements, half_widths: tuple[float, float], behind: Sequence[str]) -> Table:
+    header = ("joint", "direction_x", "direction_y", "direction_z", "x_mm", "y_mm", "z_mm", "signed")
+    rows = []
+    for joint, (direction, point) in enumerate(zip(found.directions, found.points), 1):
+        place = ("", "", "") if found.sliding[joint - 1] else _written(MM * point, DIGITS_MM)
+        rows.append((joint, *_written(direction, DIGITS_AXIS), *place, "yes", *half_widths))
+    return _rows((*header, "uncertainty_mm", "uncertainty_deg"), rows, behind)
+
+
+def _positions(found: UrdfStatements, half_widths: tuple[float, float], behind: Sequence[str]) -> Table:
+    joints = found.q.shape[1]
+    further = max(joints, len(ZERO_POSE))
+    header = ("name", "point", *(f"q{joint}_deg" for joint in range(1, further + 1)), "x_mm", "y_mm", "z_mm")
+    rows = []
+    for place, (q, T) in enumerate(zip(found.q, found.flanges)):
+        pose = [*_written(np.where(found.sliding, MM * q, np.degrees(q)), DIGITS_MM), *[0.0] * (further - joints)]
+        turn = _written(np.degrees(rpy_of(T)), DIGITS_DEG)
+        name = "zero pose" if not place else f"pose {place}"
+        rows.append((name, "flange", *pose, *_written(MM * T[:3, 3], DIGITS_MM), half_widths[0], *turn, half_widths[1]))
+    header = (*header, "uncertainty_mm", "roll_deg", "pitch_deg", "yaw_deg", "uncertainty_deg")
+    return _rows(header, rows, behind)
+
+
+def _limits(found: UrdfStatements, behind: Sequence[str]) -> Table:
+    stated = np.isfinite(found.lower) & np.isfinite(found.upper) & ~found.sliding & (found.lower < found.upper)
+    rows = [
+        (joint + 1, *_written(np.degrees([found.lower[joint], found.upper[joint]]), DIGITS_MM), LIMITS_DEG)
+        for joint in np.flatnonzero(stated).tolist()
+    ]
+    return _rows(("joint", "lower_deg", "upper_deg", "uncertainty_deg"), rows, behind)
+
+
+def _speeds(found: UrdfStatements, behind: Sequence[str]) -> Table:
+    stated = np.isfinite(found.speed) & ~found.sliding & (found.speed > 0)
+    rows = [
+        (joint + 1, *_written(np.degrees(found.speed[[joint]]), DIGITS_MM), LIMITS_DEG)
+        for joint in np.flatnonzero(stated).tolist()
+    ]
+    return _rows(("joint", "speed_deg_s", "uncertainty_deg_s"), rows, behind)
+
+
+LIMITS_DEG = 0.05  # three decimals of a radian, as URDFs print limits
+
+
+def _written(values: Reals, digits: int) -> list[float]:
+    """Plain numbers without a negative zero."""
+    return (np.round(np.asarray(values, float), digits) + 0.0).tolist()

@@ -1,0 +1,126 @@
+"""Flange poses with orientation, in every way of writing one, and what a URDF says as a reference set; the URDF's own
+kinematics are read from its XML, without er3a."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import er3a
+from er3a.errors import InputError
+from er3a.files.reference_sets import check_reference_file, load_references
+from er3a.files.robot_library import load_robot
+from er3a.files.urdf_references import write_urdf_references
+from er3a.formats.urdf import export_urdf
+from er3a.geometry.transforms import rot_x, rot_z, translation
+from er3a.identifiability.evidence import evidence_of
+from er3a.references.predict import predict
+from er3a.references.reference import expected_of
+from er3a.references.rows import PositionRow
+from testing.published_tables import urdf_flange
+
+HEADER = "name,point,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,uncertainty_mm,"
+BEHIND = "source,grade,origin"
+TURN = Rotation.from_euler("xyz", [12.3, -45.6, 78.9], degrees=True)
+WRITTEN = {
+    "roll_deg,pitch_deg,yaw_deg": TURN.as_euler("xyz", degrees=True),
+    "qw,qx,qy,qz": TURN.as_quat(scalar_first=True),
+    "rx_deg,ry_deg,rz_deg": TURN.as_rotvec(degrees=True),
+    "nx,ny,nz,ox,oy,oz,ax,ay,az": TURN.as_matrix().T.ravel(),
+}
+
+
+def one_row(folder: Path, columns: str, values: str, point: str = "flange") -> Path:
+    path = folder / "positions.csv"
+    row = f"key,{point},10,20,30,40,50,60,,,,0.1,{values},s,official,sheet"
+    path.write_text(f"{HEADER}{columns},{BEHIND}\n{row}\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("columns", WRITTEN)
+def test_every_way_of_writing_an_orientation_is_the_same(tmp_path, columns):
+    (row,) = check_reference_file(one_row(tmp_path, columns, ",".join(f"{v:.6f}" for v in WRITTEN[columns])))
+    assert isinstance(row, PositionRow)
+    apart = Rotation.from_matrix(row.orientation) * TURN.inv()
+    assert apart.magnitude() < 1e-5
+    assert 0 < row.uncertainty_deg < 1e-3
+    assert {each.unit for each in row.references()} == {"deg"}
+
+
+@pytest.mark.parametrize(
+    ("columns", "values", "point", "text"),
+    [
+        ("qw,qx,qy,qz", "1,1,0,0", "flange", "column qw: the quaternion has length 1.41421"),
+        ("qw,qx,qy,qz", "1,,0,0", "flange", "column qx: empty"),
+        ("nx,ny,nz,ox,oy,oz,ax,ay,az", "1,0,0,0,1,0,0,0,-1", "flange", "column nx: these columns are no rotation"),
+        ("roll_deg,pitch_deg,yaw_deg", "10,20,30", "wrist_centre", "column point: an orientation of the wrist_centre"),
+        ("roll_deg,pitch_deg,yaw_deg,qw,qx,qy,qz", "10,20,30,1,0,0,0", "flange", "written in two ways"),
+    ],
+)
+def test_an_orientation_that_is_none_is_one_clear_error(tmp_path, columns, values, point, text):
+    with pytest.raises(InputError, match=text):
+        check_reference_file(one_row(tmp_path, columns, values, point))
+
+
+def some_arm(joints: int, sliding: tuple[int, ...] = ()) -> er3a.Robot:
+    random = np.random.default_rng(joints)
+    slides = np.isin(np.arange(joints), sliding)
+    return er3a.Robot(
+        name="arm",
+        title="arm",
+        convention="standard",
+        a=random.uniform(0.1, 0.4, joints),
+        alpha=random.choice([-1.5, 0.7, 1.2], joints),
+        d=random.uniform(0.1, 0.3, joints),
+        offset=random.uniform(-1, 1, joints),
+        direction=random.choice([-1.0, 1.0], joints),
+        lower=np.where(slides, 0.0, -2.5),
+        upper=np.where(slides, 0.4, 2.0),
+        sliding=slides,
+        base=translation(0.1, 0.2, 0.3) @ rot_x(0.4),
+        flange=rot_z(0.3) @ translation(0, 0.1, 0.1),
+    )
+
+
+@pytest.mark.parametrize(("joints", "sliding"), [(1, ()), (3, ()), (4, (2,)), (7, ()), (10, (0,))])
+def test_a_urdf_as_references_is_met_by_its_arm_and_missed_by_others(tmp_path, joints, sliding):
+    arm, urdf = some_arm(joints, sliding), tmp_path / "arm.urdf"
+    urdf.write_text(export_urdf(arm), encoding="utf-8")
+    folder = tmp_path / "refs"
+    written = {path.name for path in write_urdf_references(urdf, folder)}
+    assert written >= {"documents.csv", "axes.csv", "positions.csv"}
+    found = load_references(folder, arm)
+    for row in found.of(PositionRow):
+        q = np.array([*row.pose, *[0.0] * joints][:joints])
+        T = urdf_flange(urdf, "base", "flange", np.where(arm.slides, q / 1000, np.radians(q)))
+        assert row.xyz_mm == pytest.approx(1000 * T[:3, 3], abs=1e-5)
+        assert np.allclose(row.orientation, T[:3, :3], atol=1e-7)
+    expected, uncertainty = expected_of(found.checkable)
+    assert np.all(np.abs(predict(arm, found.checkable) - expected) <= uncertainty)
+    last = arm.offset.copy()
+    last[-1] += np.radians(1.0)
+    missed = np.abs(predict(arm.replace(offset=last), found.checkable) - expected) > uncertainty
+    assert any("orientation" in each.subject.code for each, own in zip(found.checkable, missed) if own)
+    with pytest.raises(InputError, match="holds references already"):
+        write_urdf_references(urdf, folder)
+
+
+@pytest.mark.long
+def test_the_last_offset_and_alpha_are_settled_or_contradicted_like_others(tmp_path):
+    right = load_robot("lbr_iiwa_14").without_tool()
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(export_urdf(right), encoding="utf-8")
+    write_urdf_references(urdf, tmp_path / "refs")
+    found = load_references(tmp_path / "refs", right)
+    names = ["offset7", "alpha7", "direction7"]
+    sound = evidence_of(right, found.references, found.documents, only=names)
+    assert [sound[name].status for name in names] == ["settled"] * 3
+    for column in ("offset", "alpha"):
+        wrong = getattr(right, column).copy()
+        wrong[6] += 0.5
+        robot = right.replace(**{column: wrong})
+        assert evidence_of(robot, found.references, found.documents, only=names)[f"{column}7"].status == "contradicted"
+        assert er3a.diagnose(robot, found)[0].explains
