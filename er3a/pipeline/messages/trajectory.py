@@ -7,6 +7,7 @@ from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_, with_unit
+from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import Plural, joined, listed, say, sentence, texts, word
 from er3a.pipeline.stages.trajectory.model import (
@@ -165,6 +166,9 @@ def event_distance(event: Singularity) -> str:
     if event.distance_mm is not None:
         return f"{event.distance_mm:.3g} mm"
     return sentence("smallest_singular_value", value=event.smallest_singular_value)
+
+
+names_in_words("strategies", "trajectory.strategy", STRATEGIES)
 
 
 def strategy_word(name: StrategyName) -> str:

@@ -29,12 +29,12 @@ from er3a.kinematics.neighbours import neighbours
 from er3a.kinematics.round_trips import MOST_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Method, Solutions, Target, TargetOutcome
+from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Iteration, Method, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.progress import shown_progress
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.inverse.entry import InverseSettings
@@ -72,6 +72,7 @@ from er3a.pipeline.stages.inverse.model import (
     UnsolvedTarget,
     VisitOrder,
 )
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, shown
@@ -420,9 +421,43 @@ def compute(study: Study, name: str) -> InverseResults:
         targets=results,
         sequence=sequence(robot, targets, solved, limits_of(robot, motion).acceleration),
         round_trips=_round_trips(trips) if trips else None,
+        not_examined=(
+            *_left_out(robot, results, many, settings.mix, trips),
+            *left_out_of_collisions(bodies_of(robot, scene), scene),
+            *left_out_without_tool(robot),
+        ),
     )
     number_of_solutions = solution_map(robot, settings.map_cells, scene) if has_branches(robot) else MapRows.empty()
     return InverseResults(summary, solutions, RankingRows.stacked(ranked), number_of_solutions)
+
+
+def _left_out(
+    robot: Robot,
+    targets: Sequence[TargetResult],
+    many: bool,
+    mix: Mapping[RuleName, float],
+    trips: BatchRoundTrips | None,
+) -> Iterator[LeftOut]:
+    """What the number of targets, the settings and the kind of arm leave out."""
+    if uncertain := tuple(each.name for each in targets if not _is_certain(each.method)):
+        yield LeftOut("uncertain_solutions", uncertain)
+    if trips is None:
+        yield LeftOut("all_solutions")
+    else:
+        yield LeftOut("round_trips", amount=trips.poses)
+    if many:
+        yield LeftOut("turns", amount=MANY_TARGETS)
+    if unadvised := tuple(each.name for each in targets if each.obstacle and not each.advice):
+        yield LeftOut("advice", unadvised)
+    known = available_rules(robot)
+    if unknown := tuple(rule for rule in mix if rule not in known):
+        yield LeftOut("rules", unknown)
+    yield LeftOut("ways_between")
+
+
+def _is_certain(method: Method) -> bool:
+    """Whether the solutions that it found are all."""
+    return method.certain if isinstance(method, ByClass) else not isinstance(method, Iteration)
 
 
 def _verdict(

@@ -24,7 +24,7 @@ from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates, left_out_without_tool
 from er3a.pipeline.stages.trajectory.judgement import (
     Judgement,
     Surroundings,
@@ -449,6 +449,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
             *left_out_of_collisions(surroundings.bodies, scene, settings.penetration_tolerance_mm),
             *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
             *_left_out(paths, skipped, only),
+            *left_out_without_tool(robot),
             LeftOut("torques"),
         ),
     )
@@ -463,11 +464,13 @@ def compute(study: Study, name: str) -> TrajectoryResults:
 
 
 def _left_out(paths: list[PathSummary], skipped: list[PathNotFollowed], only: StrategyName | None) -> Iterator[LeftOut]:
-    """Paths that were not followed, stretches that bounds leave open, strategies that the study does not ask for."""
+    """Paths that were not followed or planned, stretches that bounds leave open, strategies not asked for."""
     if skipped:
         yield LeftOut("paths", tuple(path.name for path in skipped))
     if open_ := tuple(path.name for path in paths if path.undecided):
         yield LeftOut("path_stretches", open_)
+    if unplanned := tuple(path.name for path in paths if path.verdict == "none found"):
+        yield LeftOut("plans", unplanned)
     if only:
         yield LeftOut("strategies", tuple(name for name in get_args(StrategyName) if name != only))
 
