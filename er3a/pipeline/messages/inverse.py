@@ -86,12 +86,13 @@ TEXTS = texts(
         "reach_missing#near": "{gap_mm:.2g} mm out of reach",
         "reach_missing#far": "{gap_mm:.0f} mm out of reach",
         "turning_does_not_help": (
-            "Turning the tool does not help: no orientation tried at this position has a solution."
+            "Turning the tool does not help: no orientation tried at this position has a solution that keeps a margin."
         ),
         "shifting_does_not_help": (
-            "Moving the part alone does not help: no position tried has a solution with this orientation."
+            "Moving the part alone does not help: no position tried has a solution with this orientation that keeps a "
+            "margin."
         ),
-        "move_obstacle": "Move the part, the obstacle or the base: the joint limits allow this pose.",
+        "move_obstacle": "Move the part, the obstacle or the base: the arm alone can take this pose with margin.",
         "near_limit": "Little margin: one joint is {margin_deg:.2g} deg from its limit.",
         "sum_in_short#above": "{sum} {excess:.1f} above",
         "sum_in_short#below": "{sum} {excess:.1f} below",
@@ -109,12 +110,14 @@ TEXTS = texts(
         "turn_in_short#above": "J{joint} {excess:.1f} above",
         "turn_in_short#below": "J{joint} {excess:.1f} below",
         "turn_tool": (
-            "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the limits, "
-            "the nearest one found {least_turn_deg:.1f} deg away."
+            "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the limits. "
+            "With roll, pitch, yaw = {roll:.2f}, {pitch:.2f}, {yaw:.2f} deg, {least_turn_deg:.1f} deg away, the arm "
+            "keeps {margin_deg:g} deg from its limits and {clearance_mm:g} mm from what it may not touch."
         ),
         "shift_tool": (
-            "Move the part or the base: with the tool's orientation kept, a shift of {shift_mm:.0f} mm to ({x:.0f}, "
-            "{y:.0f}, {z:.0f}) mm is enough."
+            "Move the part or the base: with the tool's orientation kept and the tool at ({x:.1f}, {y:.1f}, {z:.1f}) "
+            "mm, a shift of {shift_mm:.0f} mm, the arm keeps {margin_deg:g} deg from its limits and {clearance_mm:g} "
+            "mm from what it may not touch."
         ),
     }
 )
@@ -190,7 +193,8 @@ def _in_short(found: Exceeded) -> str:
 
 @say.register
 def _(found: TurnTool) -> str:
-    return say_as(found, share=100 * found.orientation_ratio)
+    roll, pitch, yaw = found.to_deg
+    return say_as(found, share=100 * found.orientation_ratio, roll=roll, pitch=pitch, yaw=yaw)
 
 
 @say.register

@@ -27,7 +27,7 @@ from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.pages import GRADE_NAMES, Caveat, caveat, glossary
-from er3a.pipeline.messages.say import bracketed, joined, say, say_all, word
+from er3a.pipeline.messages.say import bracketed, say, say_all, word
 from er3a.pipeline.results import Provenance, Stored, read_status
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study

@@ -25,7 +25,7 @@ from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.neighbours import neighbours
+from er3a.kinematics.neighbours import Usable, neighbours
 from er3a.kinematics.round_trips import MOST_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
@@ -102,11 +102,12 @@ def solve_target(
     scene: Scene | None = None,
     many: bool = False,
     advise: bool = True,
+    clearance: float = 0.0,
 ) -> SolvedTarget:
     """Solve, choose, explain; solutions that collide with the scene or with themselves are not chosen.
 
     One of ``many``: only the turn nearest to the reference is kept of each arm. With ``advise`` what would help a pose
-    without solution is looked for.
+    without solution is looked for: poses where the arm keeps a ``clearance`` (m) and ``LITTLE_MARGIN_DEG``.
     """
     solutions = inverse(robot, target.T, target.q_ref, self_motion_rows=True)
     if many:
@@ -121,13 +122,17 @@ def solve_target(
     advice: tuple[Advice, ...] = ()
     if chosen is not None:
         advice = _what_to_know(rows, chosen)
-    elif isinstance(choice.reason, AllCollide):
-        obstacle, advice = BranchesCollide(len(within)), (MoveObstacle(),)
     else:
-        obstacle = _obstacle(robot, target, solutions, len(found))
+        if isinstance(choice.reason, AllCollide):
+            obstacle = BranchesCollide(len(within))
+            alone = scene is not None and _usable(robot, None, clearance)(solutions.q[solutions.within_limits]).any()
+            advice = (MoveObstacle(),) if alone else ()
+        else:
+            obstacle = _obstacle(robot, target, solutions, len(found))
         if advise and has_branches(robot):
-            near = stated(NeighbourPoses, neighbours(robot, target.T, random))
-            advice = _what_would_help(near)
+            usable = _usable(robot, scene, clearance)
+            near = stated(NeighbourPoses, neighbours(robot, target.T, random, usable))
+            advice = (*advice, *_what_would_help(near, clearance))
     quaternion = scipy.spatial.transform.Rotation.from_matrix(target.T[:3, :3]).as_quat(
         canonical=True, scalar_first=True
     )
@@ -259,13 +264,26 @@ def _outcome(obstacle: Obstacle | None) -> TargetOutcome:
             return "unreachable"
 
 
-def _what_would_help(near: NeighbourPoses) -> tuple[Advice, ...]:
+def _usable(robot: Robot, scene: Scene | None, clearance: float) -> Usable:
+    """Which arms could be advised: with little margin neither to the limits nor to what they may not touch."""
+    bodies = bodies_of(robot, scene)
+
+    def usable(q: Reals) -> Flags:
+        kept: Flags = limit_margin(robot, q) >= np.radians(LITTLE_MARGIN_DEG)
+        kept[kept] = bodies.free(q[kept], clearance)
+        return kept
+
+    return usable
+
+
+def _what_would_help(near: NeighbourPoses, clearance: float) -> tuple[Advice, ...]:
     turn: Advice = TurningDoesNotHelp()
-    if near.least_turn_deg is not None:
-        turn = TurnTool(near.orientation_ratio, near.least_turn_deg)
+    if near.least_turn_deg is not None and near.turned_to_deg is not None:
+        kept = LITTLE_MARGIN_DEG, 1000 * clearance
+        turn = TurnTool(near.orientation_ratio, near.least_turn_deg, near.turned_to_deg, *kept)
     shift: Advice = ShiftingDoesNotHelp()
     if near.least_shift_mm is not None and near.shifted_to_mm is not None:
-        shift = ShiftTool(near.least_shift_mm, near.shifted_to_mm)
+        shift = ShiftTool(near.least_shift_mm, near.shifted_to_mm, LITTLE_MARGIN_DEG, 1000 * clearance)
     return turn, shift
 
 
@@ -395,11 +413,15 @@ def compute(study: Study, name: str) -> InverseResults:
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
     scene_file = study.scene(name, STAGE)
     scene = load_scene(scene_file) if scene_file else None
+    assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
+    clearance = (motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm) / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()
     with shown_progress(len(targets), f"{name}: targets solved") as advance:
         for number, target in enumerate(targets):
             random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
-            solved.append(solve_target(robot, target, random, scene, many, not many or advised < MOST_ADVISED))
+            solved.append(
+                solve_target(robot, target, random, scene, many, not many or advised < MOST_ADVISED, clearance)
+            )
             advised += solved[-1].result.neighbours is not None
             advance(1)
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
@@ -413,7 +435,7 @@ def compute(study: Study, name: str) -> InverseResults:
     summary = InverseSummary(
         verdict=_verdict(results, worst, trips, scene is not None)
         .without(bodies_of(robot, scene).unexamined)
-        .resting_on(shapes_assumed(robot, study.section(TrajectorySettings).assumed_margin_mm / 1000, {})),
+        .resting_on(assumed),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,
