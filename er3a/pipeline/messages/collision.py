@@ -43,6 +43,7 @@ TEXTS = texts(
     {
         "carried_and_solid": "{carried} and {solid}",
         "pair_overlaps": "{pair} overlap by {depth_mm:.1f} mm",
+        "pair_too_near": "{pair} come within {clearance_mm:.1f} mm; {margin_mm:g} mm are to be kept",
         "link_pair": "{first} and {second}",
         "link_and_solid": "{link} and {solid}",
         "carried_and_link": "{link} and {carried}",
