@@ -114,7 +114,7 @@ def _turned_on(robot: Robot, T: Reals, turned_to: Reals, usable: Usable) -> Real
     poses = _turned(T, turn / angle * (angle + SPARE_TURNS)[:, None])
     poses = transform(poses[:, :3, 3], np.round(rpy_of(poses) / SHOWN_ANGLE) * SHOWN_ANGLE)
     kept = np.flatnonzero(solvable(robot, poses, usable))
-    return poses[kept[0]] if len(kept) else None
+    return np.asarray(poses[kept[0]]) if len(kept) else None
 
 
 def _shifted_on(robot: Robot, T: Reals, shifted_to: Reals, usable: Usable) -> Reals | None:
@@ -123,7 +123,7 @@ def _shifted_on(robot: Robot, T: Reals, shifted_to: Reals, usable: Usable) -> Re
     points = shifted_to + shift / np.linalg.norm(shift) * SPARE_SHIFTS[:, None]
     points = np.round(points / SHOWN_LENGTH) * SHOWN_LENGTH
     kept = np.flatnonzero(solvable(robot, _shifted(T, points), usable))
-    return points[kept[0]] if len(kept) else None
+    return np.asarray(points[kept[0]]) if len(kept) else None
 
 
 def _least_turn(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:

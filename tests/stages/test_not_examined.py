@@ -20,6 +20,7 @@ from er3a.pipeline.stages.trajectory.model import RESULTS
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.stages.validation.compute import compute as validation
 from er3a.pipeline.stages.workspace.compute import compute as workspace
+from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.study import Study, load_study
 from er3a.references.rows import GROUPS
 
@@ -164,7 +165,7 @@ def test_validation_of_another_arm_names_diagnosis(study):
 @pytest.mark.long
 def test_workspace_names_what_samples_and_budgets_leave_open(study):
     small = {"samples": 3000, "blocks": 1, "cells_across": 8, "proof_cells": 50, "volume_points": 100}
-    little = {"directions": 12, "proof_poses": 1, "scene": None}
+    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
     results = workspace(changed(study, workspace=small, capability=little), ROBOT)
     found, summary = subjects(results), results.summary
     assert found["joint_vectors"].amount == 3000

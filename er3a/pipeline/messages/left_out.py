@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 from er3a.pipeline.messages.say import joined, sentence, texts, word
 from er3a.pipeline.results import LeftOut, LeftOutSubject
@@ -71,11 +72,12 @@ TEXTS = texts(
 
 
 _words: dict[LeftOutSubject, tuple[str, Mapping[str, str]]] = {}
+NameT = TypeVar("NameT", bound=str)
 
 
-def names_in_words(subject: LeftOutSubject, code: str, words: Mapping[str, str]) -> None:
+def names_in_words(subject: LeftOutSubject, code: str, words: Mapping[NameT, str]) -> None:
     """Say a subject's names by a table of words marked with ``N_``; a stage's messages call this."""
-    _words[subject] = code, words
+    _words[subject] = code, {str(name): text for name, text in words.items()}
 
 
 def left_out_names(found: LeftOut) -> str:

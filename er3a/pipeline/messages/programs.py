@@ -185,7 +185,11 @@ TEXTS = texts(
             "the arm has no closed-form inverse: the line was not followed, only its target was checked"
         ),
         "may_move": "not understood, and may move the arm: {text}",
-        "never_reached": "no branch of the program leads to this motion; it was not checked",
+        "never_reached": by(
+            "moves",
+            true="no branch of the program leads to this motion; it was not checked",
+            false="no branch of the program leads to this instruction, which may move the arm; it was not checked",
+        ),
         "not_come_to": "not checked: the program was not followed as far as this motion",
         "both_sides_checked": "both sides were checked: {condition}",
         "not_followed_to_end": by(
