@@ -146,7 +146,7 @@ def _least_turn(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
         ok = solvable(robot, _turned(T, about * middle[:, None]), usable)
         low, high = np.where(ok, low, middle), np.where(ok, middle, high)
     least = int(high.argmin())
-    return _turned(T, (about[least] * high[least])[None])[0]
+    return np.asarray(_turned(T, (about[least] * high[least])[None])[0])
 
 
 def _nearest_position(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:

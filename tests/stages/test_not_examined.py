@@ -179,6 +179,9 @@ def test_workspace_names_what_samples_and_budgets_leave_open(study):
         assert found["sampled_places"].amount == placed.fitting - placed.fitting_proven
     assert found["between_places"].amount == pytest.approx(1000 * max(placed.spacing_m))
     assert summary.verdict.shapes is not None
+    assert placed.margin_mm == summary.verdict.shapes.margin_mm == 20
+    assert placed.places
+    assert all(place.clearance_mm >= 20 for place in placed.places)  # by distances in full, at all that was asked
 
 
 def test_names_are_words():
