@@ -185,7 +185,7 @@ def body_word(name: str) -> str:
 
 
 def why(
-    state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str, assumed: bool
+    state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str, *, assumed: bool
 ) -> str:
     """Why a pair is watched or not.
 

@@ -272,7 +272,7 @@ def _matrix(robot: Robot, rows: MatrixRows, assumed: bool) -> list[list[str]]:
                 int(rows.boxes[k]),
                 _angles(robot, rows.witness_deg[k]),
                 rows.reason[k],
-                assumed,
+                assumed=assumed,
             ),
         ]
         for k in order

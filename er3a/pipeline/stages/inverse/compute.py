@@ -100,6 +100,7 @@ def solve_target(
     target: Target,
     random: np.random.Generator,
     scene: Scene | None = None,
+    *,
     many: bool = False,
     advise: bool = True,
     clearance: float = 0.0,
@@ -419,9 +420,8 @@ def compute(study: Study, name: str) -> InverseResults:
     with shown_progress(len(targets), f"{name}: targets solved") as advance:
         for number, target in enumerate(targets):
             random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
-            solved.append(
-                solve_target(robot, target, random, scene, many, not many or advised < MOST_ADVISED, clearance)
-            )
+            advise = not many or advised < MOST_ADVISED
+            solved.append(solve_target(robot, target, random, scene, many=many, advise=advise, clearance=clearance))
             advised += solved[-1].result.neighbours is not None
             advance(1)
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]

@@ -202,7 +202,7 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
     tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin / 1000, proven=proven)
     vertices, triangles = table_rows.void_surfaces(voids)
     return WorkspaceResults(
-        summary=_summary(study, robot, samples, proven, voids, tool, scene),
+        summary=_summary(study, robot, samples, proven, voids, tool, scene=scene),
         cells=table_rows.cells(tally, void_numbers(in_cloud, tally.counts, samples.inside)),
         section=table_rows.section(section_cells(tally, grid)),
         side_view=table_rows.side_view(side_views(robot, tally, grid, draw)),
@@ -240,6 +240,7 @@ def _summary(
     proven: Proven,
     voids: Sequence[Void],
     tool: ToolCapability,
+    *,
     scene: Scene | None,
 ) -> WorkspaceSummary:
     settings, grid, tally, hull = study.section(WorkspaceSettings), samples.grid, samples.tally, samples.hull

@@ -236,7 +236,9 @@ def tool_capability(
         coarse=plan.coarse,
         clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
-    placement, places = _placed(robot, settings, task, plan, scene, margin, float(found.manipulability.max()))
+    placement, places = _placed(
+        robot, settings, task, plan, scene=scene, margin=margin, best=float(found.manipulability.max())
+    )
     return ToolCapability(
         summary, placement, table_rows.capability(middles, found, tried, frame.bar > 0), places, bodies.unexamined
     )
@@ -252,6 +254,7 @@ def _placed(
     settings: CapabilitySettings,
     task: Task,
     plan: CapabilityPlan,
+    *,
     scene: Scene | None,
     margin: float,
     best: float,
@@ -272,7 +275,7 @@ def _placed(
     placement = find_places(
         robot, task, asked.roll, plan.lattice, LISTED, settings.proof_poses, free=free, in_cone=asked.in_cone
     )
-    placed = _placement_summary(robot, settings.placement, task, placement, best, scene, margin)
+    placed = _placement_summary(robot, settings.placement, task, placement, best, scene=scene, margin=margin)
     arms = _arms_at(within, free, task, asked, placement)
     listed = tuple(_with_nearest(place, bodies, q) for place, q in zip(placed.places, arms))
     return replace(placed, places=listed), table_rows.places(placement.best_turns)
@@ -331,6 +334,7 @@ def _placement_summary(
     task: Task,
     placement: BoxPlacement,
     best: float,
+    *,
     scene: Scene | None,
     margin: float,
 ) -> PlacementSummary:
