@@ -77,7 +77,7 @@ def test_shape_of_a_summary(tmp_path, study):
             )
         ],
         "code": code_digest(f"{STAGE.package}.compute"),
-        "config": study.settings("er3_600", "capability") | study.settings("er3_600", "workspace"),
+        "config": study.computed_from("er3_600", "workspace"),
         "seed": study.seed,
     }
 

@@ -12,6 +12,8 @@ import numpy as np
 from er3a.collision.distances import (
     CYLINDER,
     FREE,
+    HALF_SPACE,
+    Layout,
     cylinder_points,
     measure,
     overlap_depth,
@@ -147,12 +149,17 @@ class Bodies:
         which_overlap(self.layout, q, found)
         return found
 
-    def free(self, q: Reals) -> Flags:
-        """Whether nothing overlaps, (N,), in arms (N, n)."""
+    def free(self, q: Reals, margin: float = 0.0) -> Flags:
+        """Whether nothing overlaps, (N,), in arms (N, n), and what no joint holds together is a margin (m) apart."""
         q = np.ascontiguousarray(q, float)
         found = np.zeros((len(q), 1), bool)
         which_overlap(self.layout, q, found)
-        return np.asarray(~found[:, 0])
+        clear = np.asarray(~found[:, 0])
+        if margin > 0:
+            near = np.zeros((int(clear.sum()), 1), bool)
+            which_overlap(_grown(self.layout, margin / 2), q[clear], near)
+            clear[clear] = ~near[:, 0]
+        return clear
 
     def surface_points(self, q: Reals, pair: int) -> Reals:
         """The points (2, 3), m, on the surfaces of a pair's bodies that are nearest, for an arm (n,)."""
@@ -183,3 +190,19 @@ def _named(first: Body, second: Body) -> Pair:
     if second.link < 0:
         return LinkAndSolid(first.link, second.name) if is_link[0] else CarriedAndSolid(first.name, second.name)
     return LinkPair(first.link, second.link) if is_link[1] else CarriedAndLink(second.name, first.link)
+
+
+def _grown(layout: Layout, by: float) -> Layout:
+    """The pairs that no joint holds together, of bodies that are larger by so much (m) all around."""
+    solid, apart = layout.kind != HALF_SPACE, ~layout.joined
+    points = layout.points.copy()
+    points[layout.start[:-1][~solid] + 1, 0] += by
+    return layout._replace(
+        points=points,
+        radius=layout.radius + by * solid,
+        reach=layout.reach + by,
+        first=layout.first[apart],
+        second=layout.second[apart],
+        joined=layout.joined[apart],
+        inner=layout.inner[apart],
+    )

@@ -98,6 +98,16 @@ class PairOverlaps:
 
 
 @dataclass(frozen=True)
+class PairTooNear:
+    """Two bodies come nearer to each other than the margin that is to be kept."""
+
+    pair: Pair
+    clearance_mm: float
+    margin_mm: float
+    code: Literal["pair_too_near"] = "pair_too_near"
+
+
+@dataclass(frozen=True)
 class PairsUnexamined:
     """Pairs whose collisions were not looked at, because their shapes overlap in all joint vectors tried
     and so can't be right."""

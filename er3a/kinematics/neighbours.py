@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
+from er3a.geometry.transforms import rpy_of, transform
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
@@ -17,6 +19,16 @@ TURN_STEPS = 90
 HALVINGS = 12
 RANDOM_ORIENTATIONS = 4000
 COARSE_GRID, FINE_GRID, REFINEMENTS = 25, 9, 5
+
+
+SPARE_TURNS, SPARE_SHIFTS = np.radians([1.0, 2.0, 5.0, 10.0]), np.array([5.0, 10.0, 20.0, 50.0]) / 1000
+"""By how much beyond the least one an advised turn (rad) or shift (m) goes: the first that is usable."""
+SHOWN_ANGLE, SHOWN_LENGTH = np.radians(0.01), 1e-4
+"""To which advised poses are rounded, so that they can be written down."""
+CHUNK = 512
+
+Usable = Callable[[Reals], Flags]
+"""Which arms (N, n), rad, within the limits count, (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,69 +42,136 @@ class Neighbours:
     ----------
     orientation_ratio : part of 4000 random tool orientations at the target's position that have a solution
     least_turn : rad, least rotation of the tool found that has one, position kept; None if none has
+    turned_to : (3,), rad, roll, pitch and yaw where that turn ends; None if none has
     least_shift : m, least shift of the tool found that has one, orientation kept; None if none has
     shifted_to : (3,), m, where that shift ends; None if none has
     """
 
     orientation_ratio: float
     least_turn: float | None
+    turned_to: Reals | None
     least_shift: float | None
     shifted_to: Reals | None
 
 
-def solvable(robot: Robot, T: Reals) -> Flags:
-    """Whether poses (N, 4, 4) have a solution within the limits, (N,)."""
-    found: Flags = np.any(inverse_batch(robot, T).within_limits, axis=1)
-    return found
+def solvable(robot: Robot, T: Reals, usable: Usable | None = None) -> Flags:
+    """Whether poses (N, 4, 4) have a solution within the limits that is usable, (N,)."""
+    found = inverse_batch(robot, T)
+    kept = found.within_limits.copy()
+    if usable is not None:
+        kept[kept] = usable(found.q[kept])
+    solved: Flags = np.any(kept, axis=1)
+    return solved
 
 
-def neighbours(robot: Robot, T: Reals, random: np.random.Generator) -> Neighbours:
-    """Search around a pose (4, 4) of the tool."""
+def neighbours(robot: Robot, T: Reals, random: np.random.Generator, usable: Usable | None = None) -> Neighbours:
+    """Search around a pose (4, 4) of the tool.
+
+    Parameters
+    ----------
+    usable : which arms count. With it poses are such as can be advised: they lie by one of ``SPARE_TURNS`` or
+        ``SPARE_SHIFTS`` further on than the least that is usable, and are so as rounded to what is shown
+    """
     turned = np.tile(T, (RANDOM_ORIENTATIONS, 1, 1))
     turned[:, :3, :3] = scipy.spatial.transform.Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()
-    shifted_to = _nearest_position(robot, T)
+    turned_to, shifted_to = _least_turn(robot, T, usable), _nearest_position(robot, T, usable)
+    if usable is not None:
+        turned_to = None if turned_to is None else _turned_on(robot, T, turned_to, usable)
+        shifted_to = None if shifted_to is None else _shifted_on(robot, T, shifted_to, usable)
     return Neighbours(
         orientation_ratio=float(solvable(robot, turned).mean()),
-        least_turn=_least_turn(robot, T),
+        least_turn=None if turned_to is None else float(np.linalg.norm(_turn(T, turned_to))),
+        turned_to=None if turned_to is None else rpy_of(turned_to),
         least_shift=None if shifted_to is None else float(np.linalg.norm(shifted_to - T[:3, 3])),
         shifted_to=shifted_to,
     )
 
 
-def _least_turn(robot: Robot, T: Reals) -> float | None:
+def _turn(T: Reals, turned_to: Reals) -> Reals:
+    """The rotation vector (3,) from a pose's orientation to another's."""
+    R: Reals = turned_to[:3, :3] @ T[:3, :3].T
+    return np.asarray(scipy.spatial.transform.Rotation.from_matrix(R).as_rotvec(), float)
+
+
+def _turned(T: Reals, turns: Reals) -> Reals:
+    """Poses (N, 4, 4) turned by rotation vectors (N, 3)."""
+    poses = np.tile(T, (len(turns), 1, 1))
+    poses[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(turns).as_matrix() @ T[:3, :3]
+    return poses
+
+
+def _shifted(T: Reals, points: Reals) -> Reals:
+    """Poses (N, 4, 4) at other points (N, 3)."""
+    poses = np.tile(T, (len(points), 1, 1))
+    poses[:, :3, 3] = points
+    return poses
+
+
+def _turned_on(robot: Robot, T: Reals, turned_to: Reals, usable: Usable) -> Reals | None:
+    """The pose turned a little further and rounded; None where that is not usable."""
+    turn = _turn(T, turned_to)
+    angle = float(np.linalg.norm(turn))
+    poses = _turned(T, turn / angle * (angle + SPARE_TURNS)[:, None])
+    poses = transform(poses[:, :3, 3], np.round(rpy_of(poses) / SHOWN_ANGLE) * SHOWN_ANGLE)
+    kept = np.flatnonzero(solvable(robot, poses, usable))
+    return np.asarray(poses[kept[0]]) if len(kept) else None
+
+
+def _shifted_on(robot: Robot, T: Reals, shifted_to: Reals, usable: Usable) -> Reals | None:
+    """The position shifted a little further and rounded; None where that is not usable."""
+    shift = shifted_to - T[:3, 3]
+    points = shifted_to + shift / np.linalg.norm(shift) * SPARE_SHIFTS[:, None]
+    points = np.round(points / SHOWN_LENGTH) * SHOWN_LENGTH
+    kept = np.flatnonzero(solvable(robot, _shifted(T, points), usable))
+    return np.asarray(points[kept[0]]) if len(kept) else None
+
+
+def _least_turn(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
+    """The pose (4, 4) turned by as little as has a usable solution."""
     axes, angles = fibonacci_sphere(DIRECTIONS, turned_back=True), np.linspace(0, np.pi, TURN_STEPS + 1)[1:]
-
-    def turned_ok(about: Reals, by: Reals) -> Flags:
-        poses = np.tile(T, (len(about), 1, 1))
-        poses[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(about * by[:, None]).as_matrix() @ T[:3, :3]
-        return solvable(robot, poses)
-
-    found = turned_ok(np.repeat(axes, TURN_STEPS, axis=0), np.tile(angles, DIRECTIONS)).reshape(DIRECTIONS, TURN_STEPS)
-    if not found.any():
+    turns = angles[:, None, None] * axes
+    within = solvable(robot, _turned(T, turns.reshape(-1, 3))).reshape(TURN_STEPS, DIRECTIONS)
+    for step in np.flatnonzero(within.any(axis=1)):
+        about = axes[within[step]]
+        if usable is not None:
+            about = about[solvable(robot, _turned(T, angles[step] * about), usable)]
+        if len(about):
+            break
+    else:
         return None
-    first = np.where(found.any(axis=1), found.argmax(axis=1), TURN_STEPS)
-    about = axes[first == first.min()]
-    high = np.full(len(about), angles[first.min()])
+    high = np.full(len(about), angles[step])
     low = high - angles[0]
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        ok = turned_ok(about, middle)
+        ok = solvable(robot, _turned(T, about * middle[:, None]), usable)
         low, high = np.where(ok, low, middle), np.where(ok, middle, high)
-    return float(high.min())
+    least = int(high.argmin())
+    return np.asarray(_turned(T, (about[least] * high[least])[None])[0])
 
 
-def _nearest_position(robot: Robot, T: Reals) -> Reals | None:
-    """Position (3,) nearest to that of T which has a solution with its orientation, on a grid refined step by step."""
+def _nearest_position(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
+    """Position (3,) nearest to that of T with a usable solution in its orientation, on a grid refined step by step."""
     half = np.abs(robot.a).sum() + np.abs(robot.d).sum() + np.linalg.norm(robot.last_to_tool[:3, 3])
     centre, count = robot.base[:3, 3], COARSE_GRID
     for _ in range(1 + REFINEMENTS):
         ticks = np.linspace(-half, half, count)
         points = centre + np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-        poses = np.tile(T, (len(points), 1, 1))
-        poses[:, :3, 3] = points
-        points = points[solvable(robot, poses)]
-        if not len(points):
+        points = points[solvable(robot, _shifted(T, points))]
+        points = points[np.linalg.norm(points - T[:3, 3], axis=1).argsort(kind="stable")]
+        nearest = _first_usable(robot, T, points, usable)
+        if nearest is None:
             return None
-        centre = points[np.linalg.norm(points - T[:3, 3], axis=1).argmin()]
-        half, count = ticks[1] - ticks[0], FINE_GRID
+        centre, half, count = nearest, ticks[1] - ticks[0], FINE_GRID
     return centre
+
+
+def _first_usable(robot: Robot, T: Reals, points: Reals, usable: Usable | None) -> Reals | None:
+    """The first of points (N, 3) with a usable solution; None if there is none."""
+    if usable is None:
+        return points[0] if len(points) else None
+    for start in range(0, len(points), CHUNK):
+        part = points[start : start + CHUNK]
+        kept = np.flatnonzero(solvable(robot, _shifted(T, part), usable))
+        if len(kept):
+            return np.asarray(part[kept[0]])
+    return None

@@ -294,8 +294,10 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
         if ending.kind not in ("end", "repeats", "joins"):
             stopped = NotFollowedToEnd(ending.kind, ending.limit)
             found.append(LocatedFinding(level_of(stopped), stopped, ending.place))
-    for place in _unreached(execution):
-        missed = NeverReached() if execution.complete else MotionNotReached()
+    unmet = dict.fromkeys(place for place in execution.unmet if place.file == program.file)
+    unreached = dict.fromkeys(_unreached(execution))
+    for place in dict.fromkeys([*unreached, *unmet]):
+        missed: CheckFinding = NeverReached(place in unreached) if execution.complete else MotionNotReached()
         found.append(LocatedFinding(level_of(missed), missed, place))
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:

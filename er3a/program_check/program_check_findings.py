@@ -354,8 +354,10 @@ class MovesBesideProgram:
 
 @dataclass(frozen=True)
 class NeverReached:
-    """A motion that no way through the program comes to, so that it was not examined."""
+    """A motion that no way through the program comes to, so that it was not examined; or, if it ``moves`` not for sure,
+    an instruction that is not understood."""
 
+    moves: bool = True
     code: Literal["never_reached"] = "never_reached"
 
 

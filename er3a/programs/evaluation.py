@@ -451,10 +451,12 @@ class Dialect(Functions, Protocol):
     ----------
     modal : variables that motions depend on without naming them
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
+    setters : functions that are not in the program, move nothing, and set what motions depend on
     """
 
     modal: frozenset[str]
     local_by_default: bool
+    setters: frozenset[str]
 
     def begin(self, memory: ProgramMemory) -> None:
         """Variables that are there from the start."""

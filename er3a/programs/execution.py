@@ -84,11 +84,13 @@ class Execution(ByValue):
     ----------
     steps : of all ways; each names the one before it
     endings : one for each way
+    unmet : instructions that are no motions, may move the arm for all that is known, and were not carried out
     """
 
     program: Program
     steps: tuple[Step, ...]
     endings: tuple[Ending, ...]
+    unmet: tuple[Place, ...] = ()
 
     @property
     def complete(self) -> bool:

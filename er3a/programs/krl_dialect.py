@@ -435,6 +435,7 @@ class KrlDialect:
 
     modal = frozenset((*MODAL, *MODAL_DATA))
     local_by_default = False
+    setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
     first_index = 1
 

@@ -236,15 +236,25 @@ def _moving(program: Program, dialect: Dialect) -> set[str]:
 
 def _moves(operation: Operation, moving: set[str], dialect: Dialect) -> bool:
     match operation:
-        case Move():
+        case Move() | Fixed(instruction=ArmMotion()):
             return True
-        case Fixed(instruction=instruction):
-            return isinstance(instruction, ArmMotion) or (isinstance(instruction, Unknown) and instruction.may_move)
         case Doing(what=what) if not (isinstance(what, Invocation) and dialect.harmless(what)):
             return True
         case Call(routine=routine) if routine in moving:
             return True
         case Beside(what=what) if what.function in moving:
+            return True
+    return _may_move(operation, dialect)
+
+
+def _may_move(operation: Operation, dialect: Dialect) -> bool:
+    """Whether an operation that is no motion may move the arm for all that is known."""
+    match operation:
+        case Fixed(instruction=Unknown(may_move=may_move)):
+            return may_move
+        case Doing(what=Invocation() as call) if dialect.harmless(call) or call.function in dialect.setters:
+            pass
+        case Doing():
             return True
     return bool(strange_call(operation, dialect))
 
@@ -482,6 +492,7 @@ class Machine:
         self.deciding_names: list[str] = []  # of those, whole
         self.quiet = quiet_branches(program, dialect)
         self.moving = _moving(program, dialect)
+        self.passed: set[tuple[str, int]] = set()
         self.strange: dict[tuple[str, int], str] = {
             (name, at): text
             for name, routine in program.routines.items()
@@ -513,7 +524,16 @@ class Machine:
             self.waiting.append(RunWay([frame], memory))
         while self.waiting:
             self._follow(self.waiting.pop())
-        return Execution(self.program, tuple(self.steps), tuple(self.endings))
+        return Execution(self.program, tuple(self.steps), tuple(self.endings), self._unmet())
+
+    def _unmet(self) -> tuple[Place, ...]:
+        """Instructions that are no motions, may move the arm for all that is known, and were not carried out."""
+        return tuple(
+            operation.place
+            for routine in self.program.routines.values()
+            for at, operation in enumerate(routine.code)
+            if (routine.name, at) not in self.passed and _may_move(operation, self.dialect)
+        )
 
     def _follow(self, way: RunWay) -> None:
         """Follow one way to its end."""
@@ -538,6 +558,7 @@ class Machine:
             back = False
             at = frame.at
             frame.at += 1
+            self.passed.add((frame.routine.name, at))
             if (strange := self.strange.get((frame.routine.name, at))) is not None:
                 self._note(way, operation.place, Unknown(strange))
                 way.memory.here = Position()

@@ -49,6 +49,7 @@ class RplDialect:
 
     modal: frozenset[str] = frozenset()
     local_by_default = False
+    setters: frozenset[str] = frozenset()
     whole_division = True
     first_index = 1
 

@@ -172,6 +172,7 @@ class UrScriptDialect:
 
     modal = frozenset(("%tcp",))
     local_by_default = True
+    setters = frozenset(("set_tcp",))
     whole_division = False
     first_index = 0
 

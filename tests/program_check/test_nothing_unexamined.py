@@ -530,3 +530,29 @@ def test_pairs_of_bodies_are_named_in_the_order_in_which_they_touch(tmp_path):
 def text_of_joints(q) -> str:
     """Joint angles in rad as URScript has them."""
     return "[" + ", ".join(f"{angle:.9f}" for angle in q) + "]"
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "lines"),
+    [
+        (
+            f"movej({NEAR_TEXT})\nmode = 0\nif mode == 1:\n  force_mode(p[0,0,0,0,0,0])\n  x = go_home(3)\nend\n",
+            "a.script",
+            [4, 5],
+        ),
+        (f'def f():\n  speedj([1,0,0,0,0,0], 1)\nend\ntextmsg("x")\nmovej({NEAR_TEXT})\n', "a.script", [2]),
+        (krl(f"PTP {axes(NEAR)}\nHALT_HERE=FALSE\nRETURN\nGO_HOME( )\nx=GO_FAR( )\n"), "a.src", [5, 6]),
+    ],
+)
+def test_what_may_move_and_is_never_reached_is_named_and_does_not_pass(tmp_path, text, name, lines):
+    found = check(tmp_path, text, name)
+    assert set(lines) <= set(codes(found)["never_reached"])
+    assert set(lines) <= {each.place.line for each in found.not_examined if each.what == "motion"}
+    assert found.level in ("caution", "fail")
+
+
+def test_what_is_harmless_and_never_reached_is_not_named(tmp_path):
+    text = f"movej({NEAR_TEXT})\nmode = 0\nif mode == 1:\n  set_digital_out(1, True)\n  set_tcp(p[0,0,0,0,0,0])\nend\n"
+    assert "never_reached" not in codes(check(tmp_path, text))
+    hidden = krl(f"PTP {axes(NEAR)}\nRETURN\nBAS(#VEL_PTP,10)\n$OUT[1]=TRUE\nWAIT SEC 1\n")
+    assert "never_reached" not in codes(check(tmp_path, hidden, "a.src"))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from typing import get_args
 
+import numpy as np
 import pytest
 
-from er3a.pipeline.messages.programs import REMEDIES, remedies, remedy
+from er3a.files.robot_library import load_robot
+from er3a.pipeline.messages.programs import PACED, REMEDIES, remedies, remedy
+from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.program_check.program_check_findings import (
     NOTES,
     AcceleratesMoreThanAssumed,
@@ -14,6 +18,9 @@ from er3a.program_check.program_check_findings import (
     FasterThanAssumed,
     ZoneTooLarge,
 )
+from er3a.programs.languages import read_program
+
+ROBOT = load_robot("er3a_c60")
 
 
 @pytest.mark.parametrize("kind", get_args(CheckFinding), ids=lambda kind: kind.__name__)
@@ -28,11 +35,33 @@ def test_no_remedy_is_for_what_is_never_found():
 def test_of_speeds_the_lowest_is_told_and_each_thing_once():
     fast = [FasterThanAssumed(1, 358.1, 180.0), FasterThanAssumed(4, 3786.6, 360.0)]
     told = remedies([*fast, AcceleratesMoreThanAssumed(1, 9.0, 8.0), AcceleratesMoreThanAssumed(2, 9.0, 8.0)])
-    assert told == [
-        "Lower the speed of this line to 9.5 % of its own or less.",
-        "Lower acceleration and speed of this line.",
-    ]
+    assert told == ["Lower the speed of this line to 9.5 % of its own or less, and its acceleration to 0.9 %."]
     assert 0.095 * 3786.6 <= 360.0 < 0.096 * 3786.6
+
+
+START = "[0.3, -0.3, -0.2, 0.0, -1.0, 0.0]"
+
+
+@pytest.mark.parametrize("acceleration", [40, 400, 2000])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "movel(pose_trans(get_forward_kin({start}), p[0, 0, -0.02, 0, 0, 0]), a={a}, v={v})",
+        "movej([0.9, -0.3, -0.2, 0.3, -1.0, 0.0], a={a}, v={v})",
+    ],
+)
+def test_a_line_at_the_pace_advised_passes(tmp_path, line, acceleration):
+    """Also where the speed is never reached, so that lowering it alone would change nothing."""
+
+    def found(a: float, v: float):
+        text = f"def a():\n  movej({START}, a=1, v=0.5)\n  {line.format(start=START, a=a, v=v)}\nend\n"
+        (tmp_path / "a.script").write_text(text)
+        check = check_program(read_program(tmp_path / "a.script"), ROBOT, CheckOptions(start=np.zeros(6)))
+        return [at.finding for at in check.findings if at.place.line == 3]
+
+    (text,) = [each for each in remedies(found(acceleration, 8.0)) if "acceleration" in each]
+    speed, acc = (float(percent) / 100 for percent in re.findall(r"([\d.]+) %", text))
+    assert not [each for each in found(acceleration * acc, 8.0 * speed) if isinstance(each, PACED)]
 
 
 def test_a_zone_may_take_half_of_the_shorter_motion():

@@ -414,7 +414,7 @@ def test_of_many_targets_one_turn_of_each_branch_is_kept_and_the_page_says_so(tm
             own = rows.q_deg[rows.branch == branch]
             nearest = own[np.abs(own).max(axis=1).argmin()]
             np.testing.assert_allclose(kept.q_deg[kept.branch == branch], nearest[None], atol=1e-9)
-    asked = [target for target in few.summary.targets if target.outcome in ("unreachable", "leaves limits")]
+    asked = [target for target in few.summary.targets if target.obstacle]
     assert sum(target.neighbours is not None for target in asked) == 2 < len(asked)
     run.show("report", "inverse", study, "er3a_c60", tmp_path / "few", tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")

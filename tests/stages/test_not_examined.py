@@ -9,14 +9,20 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.pipeline.messages.left_out import left_out_text
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.results import LeftOut, LeftOutSubject, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
+from er3a.pipeline.stages.inverse.compute import compute as inverse
 from er3a.pipeline.stages.programs.compute import compute as programs
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as trajectory
 from er3a.pipeline.stages.trajectory.model import RESULTS
 from er3a.pipeline.stages.trajectory.report import report
+from er3a.pipeline.stages.validation.compute import compute as validation
+from er3a.pipeline.stages.workspace.compute import compute as workspace
+from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.study import Study, load_study
+from er3a.references.rows import GROUPS
 
 ROBOT = "er3a_c60"
 
@@ -83,6 +89,164 @@ def test_free_space_names_its_samples(study, tmp_path):
     assert found["joint_vectors"].amount == 1000
     assert found["lost_cells"].amount >= 0
     assert found["joined_pairs"].names
+
+
+def test_free_space_names_targets_and_paths_without_clearance(study, tmp_path):
+    quick = {"samples": 1000, "cells_across": 4, "rounds": 0, "neighbours": 1}
+    targets = {"kind": "targets", "targets": [{"name": "far", "xyz_mm": [9000, 0, 0], "rpy_deg": [0, 0, 0]}]}
+    (tmp_path / "targets.yaml").write_text(yaml.safe_dump(targets))
+    entry = {"paths": one_path(tmp_path), "targets": str(tmp_path / "targets.yaml")}
+    results = collision(changed(study, entry, collision=quick), ROBOT)
+    found, places = subjects(results), results.summary.places
+    assert found["targets"].names == ("far",)
+    assert found["within_cells"].amount == pytest.approx(1000 * places.cell_m)
+    assert found["lost_cells"].amount == places.reached - places.clear
+    assert found["unjoined_cells"].amount == places.clear - places.joined
+
+
+def test_loops_cut_off_by_their_limits_do_not_pass(study, tmp_path):
+    """The joint leaves its limits in a round that the settings leave out."""
+    text = "def a():\n  i = 0\n  while i < 60:\n    i = i + 1\n    movej([0, 0, 0, 0, 0.1 * i, 0])\n  end\nend\n"
+    (tmp_path / "a.script").write_text(text)
+    listed = {"kind": "programs", "programs": [{"name": "job", "title": "Job", "file": str(tmp_path / "a.script")}]}
+    (tmp_path / "programs.yaml").write_text(json.dumps(listed))
+    entry = {"programs": str(tmp_path / "programs.yaml")}
+    assert programs(changed(study, entry), ROBOT).summary.verdict.status == "fail"
+    for few in ({"loop_rounds": 3}, {"most_steps": 100}):
+        results = programs(changed(study, entry, programs=few), ROBOT)
+        if results.summary.verdict.status != "fail":
+            assert "program_lines" in subjects(results), few
+            assert results.summary.verdict.status == "caution", few
+
+
+def test_targets_name_what_rests_on_samples_rules_and_obstacles(study, tmp_path):
+    """The one target lies inside a table that no scene holds."""
+    targets = {"kind": "targets", "targets": [{"name": "a", "q_deg": [0, -10, -10, 0, -70, 0]}]}
+    (tmp_path / "targets.yaml").write_text(yaml.safe_dump(targets))
+    few = {"round_trips": 3, "map_cells": 8, "mix": {"time": 1}, "scene": None}
+    results = inverse(changed(study, {"targets": str(tmp_path / "targets.yaml")}, inverse=few), ROBOT)
+    found = subjects(results)
+    assert found["round_trips"].amount == 3
+    assert ("rules" in found) == (not np.isfinite(study.robot(ROBOT).speed).all())
+    assert {"obstacles", "carried", "ways_between", "bare_links", "tool"} <= found.keys()
+    assert "shallow_overlaps" not in found
+
+
+def test_validation_names_what_no_reference_states(study, tmp_path):
+    """A table whose speeds and limits nobody can judge."""
+    content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8")) | {"references": []}
+    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    few = {"round_trips": 400, "reach_starts": 2}
+    results = validation(changed(study, {"file": str(tmp_path / f"{ROBOT}.yaml")}, validation=few), ROBOT)
+    found = subjects(results)
+    assert results.summary.verdict.status == "no_reference"
+    assert found["references"].names == tuple(GROUPS)
+    assert found["table_entries"].names == ()
+    assert found["round_trips"].amount == 400
+    assert found["near_singular_poses"].amount == results.summary.round_trips.near_singular > 0
+    assert found["reach_starts"].amount == 2
+    assert {"more_faults", "the_arm_itself"} <= found.keys()
+    assert "diagnosis" not in found
+
+
+@pytest.mark.long
+def test_validation_of_another_arm_names_diagnosis(study):
+    few = {"round_trips": 5, "reach_starts": 2}
+    seven = {"targets": "data/targets/lbr_iiwa_14.yaml", "paths": "data/paths/lbr_iiwa_14.yaml"}
+    entry = study.robots[ROBOT].model_copy(update=seven)
+    made = study.model_copy(
+        update={"robots": {"lbr_iiwa_14": entry}, "validation": study.validation.model_copy(update=few)}
+    )
+    found = subjects(validation(made, "lbr_iiwa_14"))
+    assert "diagnosis" in found
+    assert "more_faults" not in found
+
+
+@pytest.mark.long
+def test_workspace_names_what_samples_and_budgets_leave_open(study):
+    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "proof_cells": 50, "volume_points": 100}
+    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
+    results = workspace(changed(study, workspace=small, capability=little), ROBOT)
+    found, summary = subjects(results), results.summary
+    assert found["joint_vectors"].amount == 3000
+    volume, core = summary.volume_m3, summary.capability.core_m3
+    assert found["undecided_volume"].amount == pytest.approx(1000 * (volume.upper - volume.lower))
+    assert found["undecided_core"].amount == pytest.approx(1000 * (core.upper - core.lower))
+    assert found["tool_directions"].amount == 12
+    assert {"obstacles", "colliding_reach", "carried", "tool"} <= found.keys()
+    placed = summary.placement
+    if placed.fitting > placed.fitting_proven:
+        assert found["sampled_places"].amount == placed.fitting - placed.fitting_proven
+    assert found["between_places"].amount == pytest.approx(1000 * max(placed.spacing_m))
+    assert summary.verdict.shapes is not None
+    assert placed.margin_mm == summary.verdict.shapes.margin_mm == 20
+    assert placed.places
+    assert all(place.clearance_mm >= 20 for place in placed.places)  # by distances in full, at all that was asked
+
+
+def test_names_are_words():
+    import er3a.pipeline.messages.inverse
+    import er3a.pipeline.messages.trajectory
+    import er3a.pipeline.messages.validation  # noqa: F401
+
+    assert left_out_names(LeftOut("references", ("zero_pose", "speeds"))) == "zero pose, speeds"
+    assert left_out_names(LeftOut("strategies", ("slow",))) == "slow down on the path"
+    assert left_out_names(LeftOut("paths", ("a_path",))) == "a_path"
+
+
+LEFT_OUT_BY_SETTINGS = {
+    "validation": {"round_trips": "round_trips", "reach_starts": "reach_starts"},
+    "workspace": {"samples": "joint_vectors", "proof_cells": "undecided_volume"},
+    "capability": {
+        "directions": "tool_directions",
+        "rolls": "tool_directions",
+        "proof_poses": "undecided_core",
+        "scene": "obstacles",
+        "placement": "between_places",
+    },
+    "collision": {
+        "samples": "joint_vectors",
+        "cells_across": "within_cells",
+        "rounds": "lost_cells",
+        "neighbours": "unjoined_cells",
+        "scene": "obstacles",
+        "penetration_tolerance_mm": "shallow_overlaps",
+    },
+    "inverse": {"round_trips": "round_trips", "scene": "obstacles", "mix": "rules"},
+    "trajectory": {
+        "avoidance": "strategies",
+        "checks_per_sample": "path_stretches",
+        "assumed_speed_deg_s": "own_speeds",
+        "assumed_speed_mm_s": "own_speeds",
+        "jerk_deg_s3": "jerk",
+        "scene": "obstacles",
+        "penetration_tolerance_mm": "shallow_overlaps",
+    },
+    "programs": {"most_steps": "program_lines", "most_branches": "program_lines", "loop_rounds": "program_lines"},
+}
+LEAVE_NOTHING_OUT = {
+    "workspace": ("sampling", "blocks", "cells_across", "hull_directions", "cloud_points", "volume_points"),
+    "inverse": ("map_cells",),
+    "trajectory": (
+        *("near_wrist_deg", "near_elbow_deg", "near_shoulder_mm", "acceleration_time_s", "acceleration_deg_s2"),
+        *("assumed_margin_mm", "programs", "write_unsafe"),
+    ),
+    "programs": ("tool_speed_mm_s", "tool_acceleration_mm_s2", "joint_speed_percent"),
+}
+"""Thresholds, what is drawn, and what verdicts and findings say of themselves."""
+ELSEWHERE = ("dynamics", "vision")
+
+
+def test_every_setting_is_known_to_leave_something_out_or_nothing():
+    """A new setting has to be entered above, and what it leaves out in its stage's list."""
+    for stage in STAGES.values():
+        for key, model in stage.settings.items():
+            if key in ELSEWHERE:
+                continue
+            known = {*LEFT_OUT_BY_SETTINGS[key], *LEAVE_NOTHING_OUT.get(key, ())}
+            assert set(model.model_fields) == known, key
+    for found in LEFT_OUT_BY_SETTINGS.values():
+        assert set(found.values()) <= set(LeftOutSubject.__args__)
 
 
 def test_the_table_closes_the_page_and_stands_in_the_summary(study, small_results, tmp_path):

@@ -195,7 +195,8 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert path.chosen.usable
         assert path.chosen.motion.max_joint_speed_ratio <= 1 + 1e-6
         assert path.chosen.motion.max_joint_acceleration_ratio <= 1 + 1e-6
-        assert path.chosen.motion.clearance_mm > 0
+        assert path.chosen.motion.clearance_mm >= 20
+        assert f"keeps {int(10 * path.chosen.motion.clearance_mm) / 10:.1f} mm of clearance" in advice(path)
         stop = tried(path, "stop")
         assert not stop.usable
         assert 0 < stop.motion.done_ratio < 1

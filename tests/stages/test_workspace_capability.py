@@ -47,7 +47,8 @@ def done() -> ToolCapability:
 
 def context_of(robot: Robot, found: ToolCapability) -> dict:
     """What the page takes, of results that hold nothing else."""
-    summary = SimpleNamespace(capability=found.capability, placement=found.placement)
+    verdict = SimpleNamespace(shapes=None)
+    summary = SimpleNamespace(capability=found.capability, placement=found.placement, verdict=verdict)
     return capability_context(robot, SimpleNamespace(summary=summary, capability=found.cells, places=found.places))
 
 

@@ -43,6 +43,7 @@ TEXTS = texts(
     {
         "carried_and_solid": "{carried} and {solid}",
         "pair_overlaps": "{pair} overlap by {depth_mm:.1f} mm",
+        "pair_too_near": "{pair} come within {clearance_mm:.1f} mm; {margin_mm:g} mm are to be kept",
         "link_pair": "{first} and {second}",
         "link_and_solid": "{link} and {solid}",
         "carried_and_link": "{link} and {carried}",
@@ -60,7 +61,12 @@ TEXTS = texts(
         "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes, and so not settled: {names}.",
         "link#base": "base",
         "link#number": "link {number}",
-        "collision.never_free": "No joint vector within the limits is collision-free (proven): {pairs} always overlap.",
+        "collision.never_free#given": (
+            "No joint vector within the limits is collision-free (proven): {pairs} always overlap."
+        ),
+        "collision.never_free#assumed": (
+            "No joint vector within the limits is free of collisions of the assumed shapes: {pairs} always overlap."
+        ),
         "collision.shapes_overlap": (
             "The shapes of {pairs} overlap in every joint vector tried ({count}), which no joint between them "
             "explains: an error of the shapes, not of the arm. Correct their size, unit or placement in the robot's "
@@ -131,7 +137,7 @@ def _link(number: int) -> str:
 
 @say.register
 def _(found: NeverFree) -> str:
-    return say_as(found, pairs=joined(listed(found.pairs[:NAMED]), ", "))
+    return say_as(found, "assumed" if found.assumed else "given", pairs=joined(listed(found.pairs[:NAMED]), ", "))
 
 
 @say.register
@@ -178,14 +184,23 @@ def body_word(name: str) -> str:
     return sentence("link#number", number=number) if number != name else own_title(name)
 
 
-def why(state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str) -> str:
+def why(
+    state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str, *, assumed: bool
+) -> str:
     """Why a pair is watched or not.
 
     Parameters
     ----------
+    assumed : whether no document gives the shapes
     witness : joint values with their units; empty where there are none
     """
     match state:
+        case "never" if assumed:
+            return tr(
+                "The assumed shapes are at least {least:.1f} mm apart in every pose ({boxes} boxes).",
+                least=least_mm,
+                boxes=boxes,
+            )
         case "never":
             return tr(
                 "At least {least:.1f} mm apart in every pose; proven with {boxes} boxes.", least=least_mm, boxes=boxes

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.pipeline.messages.expectations import demonstrated
-from er3a.pipeline.messages.kinematics import sum_of_joints
+from er3a.pipeline.messages.kinematics import RULE_NAMES, sum_of_joints
 from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts
 from er3a.pipeline.stages.expectations import Demonstration
 from er3a.pipeline.stages.inverse.model import (
@@ -20,6 +21,7 @@ from er3a.pipeline.stages.inverse.model import (
 from er3a.robots.joint_limits import CombinationExceeded, Exceeded, LimitsExceeded, SlideExceeded
 
 NAMED = 3
+names_in_words("rules", "rule", RULE_NAMES)
 FIGURES = {
     "targets_solved": N_("targets solved"),
     "solutions_of_random_pose": N_("solutions of a random reachable pose, mean"),
@@ -84,12 +86,13 @@ TEXTS = texts(
         "reach_missing#near": "{gap_mm:.2g} mm out of reach",
         "reach_missing#far": "{gap_mm:.0f} mm out of reach",
         "turning_does_not_help": (
-            "Turning the tool does not help: no orientation tried at this position has a solution."
+            "Turning the tool does not help: no orientation tried at this position has a solution that keeps a margin."
         ),
         "shifting_does_not_help": (
-            "Moving the part alone does not help: no position tried has a solution with this orientation."
+            "Moving the part alone does not help: no position tried has a solution with this orientation that keeps a "
+            "margin."
         ),
-        "move_obstacle": "Move the part, the obstacle or the base: the joint limits allow this pose.",
+        "move_obstacle": "Move the part, the obstacle or the base: the arm alone can take this pose with margin.",
         "near_limit": "Little margin: one joint is {margin_deg:.2g} deg from its limit.",
         "sum_in_short#above": "{sum} {excess:.1f} above",
         "sum_in_short#below": "{sum} {excess:.1f} below",
@@ -107,12 +110,14 @@ TEXTS = texts(
         "turn_in_short#above": "J{joint} {excess:.1f} above",
         "turn_in_short#below": "J{joint} {excess:.1f} below",
         "turn_tool": (
-            "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the limits, "
-            "the nearest one found {least_turn_deg:.1f} deg away."
+            "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the limits. "
+            "With roll, pitch, yaw = {roll:.2f}, {pitch:.2f}, {yaw:.2f} deg, {least_turn_deg:.1f} deg away, the arm "
+            "keeps {margin_deg:g} deg from its limits and {clearance_mm:g} mm from what it may not touch."
         ),
         "shift_tool": (
-            "Move the part or the base: with the tool's orientation kept, a shift of {shift_mm:.0f} mm to ({x:.0f}, "
-            "{y:.0f}, {z:.0f}) mm is enough."
+            "Move the part or the base: with the tool's orientation kept and the tool at ({x:.1f}, {y:.1f}, {z:.1f}) "
+            "mm, a shift of {shift_mm:.0f} mm, the arm keeps {margin_deg:g} deg from its limits and {clearance_mm:g} "
+            "mm from what it may not touch."
         ),
     }
 )
@@ -188,7 +193,8 @@ def _in_short(found: Exceeded) -> str:
 
 @say.register
 def _(found: TurnTool) -> str:
-    return say_as(found, share=100 * found.orientation_ratio)
+    roll, pitch, yaw = found.to_deg
+    return say_as(found, share=100 * found.orientation_ratio, roll=roll, pitch=pitch, yaw=yaw)
 
 
 @say.register

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.messages.say import sentence, texts
-from er3a.pipeline.results import LeftOut
+from collections.abc import Mapping
+from typing import TypeVar
+
+from er3a.pipeline.messages.say import joined, sentence, texts, word
+from er3a.pipeline.results import LeftOut, LeftOutSubject
 
 TEXTS = texts(
     {
@@ -44,8 +47,62 @@ TEXTS = texts(
         "left_out.touched_points": "where the arm really touches what the camera sees: no touched points are given",
         "left_out.detections": "whether detected objects are where the detector says, within the deviations stated",
         "left_out.gripped_parts": "collisions of the objects themselves and of a part in the gripper",
+        "left_out.unjoined_cells": (
+            "whether {amount:,.0f} clear cells can be reached from home: no chain of straight joint moves was found"
+        ),
+        "left_out.within_cells": "places within a cell of {amount:.0f} mm beside the one that an arm was found for",
+        "left_out.targets": "targets without a solution within the limits",
+        "left_out.turns": "other turns of the joints in solutions of targets, as there are many targets",
+        "left_out.carried": "what the flange carries hits: no shape of a tool or workpiece is given",
+        "left_out.tool": "a tool: none is given, and the flange's centre stands for its tip",
+        "left_out.plans": "motions for which the planner found none within its tries; there may be one",
+        "left_out.references": "quantities that no reference states, or for which the robot's file gives no value",
+        "left_out.table_entries": "entries of the table that independent references don't settle",
+        "left_out.diagnosis": "which entry is wrong: diagnosis is for arms whose joints all turn",
+        "left_out.more_faults": "tables with more wrong entries than one or two",
+        "left_out.calibration": "corrections of the table: the positions of these reference sets are not enough",
+        "left_out.round_trips": "poses other than {amount:,.0f} random ones that were solved back",
+        "left_out.near_singular_poses": "joint values at {amount:,.0f} random poses near singularities",
+        "left_out.all_solutions": "whether the solutions found are all: no method here finds those of this arm",
+        "left_out.reach_starts": "greatest and least reach that searches from {amount:,.0f} starts don't find",
+        "left_out.the_arm_itself": "how the arm at hand differs from its table; a calibration measures that",
+        "left_out.uncertain_solutions": "whether the solutions found are all",
+        "left_out.advice": "what would help at targets without a solution",
+        "left_out.rules": "rules of the mix for which the robot's file has no data",
+        "left_out.ways_between": "motions from one target to the next",
+        "left_out.colliding_reach": (
+            "collisions, in reach, voids and tool directions: arms count there that touch themselves or obstacles"
+        ),
+        "left_out.undecided_volume": "{amount:.3g} L that the proof of the reached volume leaves undecided",
+        "left_out.area": "the area that the tool point reaches: none was computed, or one of its bounds",
+        "left_out.sampled_voids": "whether {amount:.0f} voids that are known from samples only are empty",
+        "left_out.tool_directions": "tool directions between the {amount:,.0f} that were asked in each cell",
+        "left_out.capability": "tool directions, and where a box can stand",
+        "left_out.core": "where the tool reaches all directions",
+        "left_out.undecided_core": "{amount:.3g} L of which it is undecided whether the tool reaches all directions",
+        "left_out.places": "where the box can stand: a pose takes too long with this arm",
+        "left_out.sampled_places": (
+            "points and directions between those asked, at {amount:,.0f} places for the box that pass by samples only"
+        ),
+        "left_out.between_places": "places for the box between grid points {amount:.0f} mm apart",
+        "left_out.placed_box": "collisions with the box where it is placed",
     }
 )
+
+
+_words: dict[LeftOutSubject, tuple[str, Mapping[str, str]]] = {}
+NameT = TypeVar("NameT", bound=str)
+
+
+def names_in_words(subject: LeftOutSubject, code: str, words: Mapping[NameT, str]) -> None:
+    """Say a subject's names by a table of words marked with ``N_``; a stage's messages call this."""
+    _words[subject] = code, {str(name): text for name, text in words.items()}
+
+
+def left_out_names(found: LeftOut) -> str:
+    """Of which, in the language in use."""
+    code, words = _words.get(found.subject, ("", {}))
+    return joined([word(code, words, name) for name in found.names], ", ")
 
 
 def left_out_text(found: LeftOut) -> str:

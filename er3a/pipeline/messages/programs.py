@@ -18,6 +18,7 @@ from er3a.pipeline.stages.programs.model import ProgramCounts, ProgramSummary
 from er3a.planning.intervals import TooFast
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.program_check_findings import (
+    AcceleratesMoreThanAssumed,
     CheckFinding,
     FasterThanAssumed,
     Level,
@@ -60,7 +61,6 @@ REMEDIES: dict[str, str] = {
     "target_out_of_reach": NEARER,
     "way_out_of_reach": NEARER,
     "configuration_ends": N_("Go there by a joint move, or begin the line in another configuration."),
-    "accelerates_more_than_assumed": N_("Lower acceleration and speed of this line."),
     "more_than_full_speed": N_("Ask for 100 % at most."),
     "configuration_changes": N_(
         "If the change is not meant, give the target's configuration or joint angles; if it is, make it where there "
@@ -120,6 +120,7 @@ STOPPED: dict[EndKind, str] = {
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
 }
+PACED = (TooFast, FasterThanAssumed, AcceleratesMoreThanAssumed)
 MOST_PAIRS = 3  # that are named of a collision
 FIGURES = {
     "programs_passed": N_("Programs that pass"),
@@ -191,7 +192,11 @@ TEXTS = texts(
             "the arm has no closed-form inverse: the line was not followed, only its target was checked"
         ),
         "may_move": "not understood, and may move the arm: {text}",
-        "never_reached": "no branch of the program leads to this motion; it was not checked",
+        "never_reached": by(
+            "moves",
+            true="no branch of the program leads to this motion; it was not checked",
+            false="no branch of the program leads to this instruction, which may move the arm; it was not checked",
+        ),
         "not_come_to": "not checked: the program was not followed as far as this motion",
         "both_sides_checked": "both sides were checked: {condition}",
         "not_followed_to_end": by(
@@ -303,7 +308,10 @@ TEXTS = texts(
         ),
         "written_unsafe": "the path {path} is not safe: {verdict}",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
-        "remedy.slower": "Lower the speed of this line to {percent:g} % of its own or less.",
+        "remedy.slower": (
+            "Lower the speed of this line to {percent:g} % of its own or less, and its acceleration to "
+            "{acceleration:g} %."
+        ),
         "programs.waits": Plural("count", "and {count} wait for a signal", "and {count} waits for signals"),
     }
 )
@@ -464,8 +472,8 @@ def _(found: NotFollowedToEnd) -> str:
 
 
 @remedy.register
-def _(found: TooFast | FasterThanAssumed) -> str:
-    return _slower(_allowed(found))
+def _(found: TooFast | FasterThanAssumed | AcceleratesMoreThanAssumed) -> str:
+    return _slower(_pace(found))
 
 
 @remedy.register
@@ -473,23 +481,29 @@ def _(found: ZoneTooLarge) -> str:
     return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
 
 
-def _allowed(found: TooFast | FasterThanAssumed) -> float:
-    """The share of its speed that the joint can do."""
-    return (found.limit_deg_s if isinstance(found, TooFast) else found.assumed_deg_s) / found.needed_deg_s
+def _pace(found: TooFast | FasterThanAssumed | AcceleratesMoreThanAssumed) -> float:
+    """The share of its pace at which the joint keeps its limit: speeds go with it, accelerations with its square."""
+    match found:
+        case TooFast():
+            return found.limit_deg_s / found.needed_deg_s
+        case FasterThanAssumed():
+            return found.assumed_deg_s / found.needed_deg_s
+        case AcceleratesMoreThanAssumed():
+            return math.sqrt(found.assumed_deg_s2 / found.needed_deg_s2)
 
 
-def _slower(share: float) -> str:
-    percent = math.floor(1000 * share) / 10
-    return sentence("remedy.slower", percent=percent)
+def _slower(pace: float) -> str:
+    """The same motion at another pace: a lower speed alone is no help where it is not reached."""
+    percent = math.floor(1000 * pace) / 10
+    return sentence("remedy.slower", percent=percent, acceleration=math.floor(percent**2 / 10) / 10)
 
 
 def remedies(findings: Iterable[CheckFinding]) -> list[str]:
-    """What to do about findings at one line, each thing once; of speeds the lowest."""
+    """What to do about findings at one line, each thing once; of paces the lowest."""
     checked = list(findings)
-    slowest = min(
-        (each for each in checked if isinstance(each, TooFast | FasterThanAssumed)), key=_allowed, default=None
-    )
-    kept = [each for each in checked if not isinstance(each, TooFast | FasterThanAssumed) or each is slowest]
+    paced = [each for each in checked if isinstance(each, PACED)]
+    slowest = min(paced, key=_pace, default=None)
+    kept = [each for each in checked if not isinstance(each, PACED) or each is slowest]
     return list(dict.fromkeys(text for each in kept if (text := remedy(each))))
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES
 from er3a.pipeline.messages.language import N_, with_unit
+from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import Plural, joined, listed, say, sentence, texts, word
 from er3a.pipeline.stages.trajectory.model import (
@@ -105,6 +108,7 @@ TEXTS = texts(
             "that it hits: {pair} touch at {contact} mm"
         ),
         "advice.chosen": "{way}: {tool}, and {time}",
+        "advice.chosen#clear": "{way}: {tool}, {time}, and the arm keeps {clearance:.1f} mm of clearance",
         "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
         "advice.tool#none": "the tool stays on the path",
         "advice.tool#far": "the tool leaves the path by {far} mm",
@@ -165,6 +169,9 @@ def event_distance(event: Singularity) -> str:
     if event.distance_mm is not None:
         return f"{event.distance_mm:.3g} mm"
     return sentence("smallest_singular_value", value=event.smallest_singular_value)
+
+
+names_in_words("strategies", "trajectory.strategy", STRATEGIES)
 
 
 def strategy_word(name: StrategyName) -> str:
@@ -340,7 +347,10 @@ def _chosen(tried: TriedStrategy, programmed_s: float) -> str:
         raise ValueError(f"{tried.name} was chosen and has no motion")
     tool = _leaves(motion.max_deviation_mm, motion.max_deviation_deg)
     cost = {"tool": tool, "time": _takes(motion.duration_s - programmed_s)}
-    return sentence("advice.chosen", way=word("advice", ADVICE, tried.name), **cost)
+    way = word("advice", ADVICE, tried.name)
+    if motion.clearance_mm is None:
+        return sentence("advice.chosen", way=way, **cost)
+    return sentence("advice.chosen#clear", way=way, clearance=math.floor(10 * motion.clearance_mm) / 10, **cost)
 
 
 def _leaves(far_mm: float, turned_deg: float) -> str:

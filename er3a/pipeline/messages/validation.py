@@ -9,6 +9,7 @@ from er3a.diagnosis.conclusions import TooSmallToTell
 from er3a.diagnosis.faults import ReversedDirection, WrongOffset
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.messages.language import N_, as_text, own_title, with_unit
+from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_WORDS, quoted
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
@@ -63,6 +64,7 @@ GRADES = {
     "inferred": N_("inferred, not stated"),
 }
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
+names_in_words("references", "reference.group", GROUP_WORDS)
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
 
 

@@ -11,14 +11,17 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.numerics.arrays import Flags
 from er3a.pipeline.results import LeftOut, LeftOutSubject
+from er3a.robots.robot import Robot
 
 
-def left_out_of_collisions(bodies: Bodies, scene: Scene | None, tolerance_mm: float) -> tuple[LeftOut, ...]:
+def left_out_of_collisions(
+    bodies: Bodies, scene: Scene | None, tolerance_mm: float | None = None
+) -> tuple[LeftOut, ...]:
     """What a check for collisions does not see.
 
     Parameters
     ----------
-    tolerance_mm : of overlaps that may go unnoticed between points of a motion
+    tolerance_mm : of overlaps that may go unnoticed between points of a motion; None where only points are checked
     """
 
     def pairs(state: PairState) -> tuple[str, ...]:
@@ -32,7 +35,14 @@ def left_out_of_collisions(bodies: Bodies, scene: Scene | None, tolerance_mm: fl
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]
     obstacles = [LeftOut("obstacles")] if scene is None else []
-    return (*obstacles, *listed, LeftOut("shallow_overlaps", amount=tolerance_mm))
+    carried = [] if scene is not None and scene.carried else [LeftOut("carried")]
+    shallow = [] if tolerance_mm is None else [LeftOut("shallow_overlaps", amount=tolerance_mm)]
+    return (*obstacles, *carried, *listed, *shallow)
+
+
+def left_out_without_tool(robot: Robot) -> tuple[LeftOut, ...]:
+    """That the flange's centre stands for a tool's tip, if the robot's file gives no tool."""
+    return () if "tool" in robot.sources or not np.array_equal(robot.tool, np.eye(4)) else (LeftOut("tool"),)
 
 
 def left_out_of_rates(speed_known: Flags, jerk: bool) -> tuple[LeftOut, ...]:

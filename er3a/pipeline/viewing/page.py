@@ -27,9 +27,9 @@ from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.left_out import left_out_text
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.pages import GRADE_NAMES, Caveat, caveat, glossary
-from er3a.pipeline.messages.say import bracketed, joined, say_all, word
+from er3a.pipeline.messages.say import bracketed, say, say_all, word
 from er3a.pipeline.results import Provenance, Stored, read_status
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -164,7 +164,8 @@ class Head:
     ``finding`` is what the sentence says; ``caveats`` by the stage that it rests on: what to know first;
     ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to. ``not_examined``: what
     the verdict leaves out, and of which. ``numerics``: figures that speak of the computation, not of the arm.
-    ``links``: addresses that words of the text lead to.
+    ``links``: addresses that words of the text lead to. ``banner`` says on what assumed shapes all rests; ``text`` ends
+    with it.
     """
 
     robot: str
@@ -179,6 +180,12 @@ class Head:
     not_examined: tuple[tuple[str, str], ...] = ()
     numerics: tuple[ShownFigure, ...] = ()
     links: Mapping[str, str] = field(default_factory=dict)
+    banner: str = ""
+
+    @property
+    def own_text(self) -> str:
+        """The verdict's text without what stands in the banner."""
+        return self.text.removesuffix(self.banner).rstrip()
 
 
 def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
@@ -203,7 +210,8 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     meant = len(getattr(verdict.finding, "demonstrations", ()))
     text = say_all(verdict.findings)
-    missed = tuple((left_out_text(each), joined(each.names, ", ")) for each in stored.results.summary.not_examined)
+    missed = tuple((left_out_text(each), left_out_names(each)) for each in stored.results.summary.not_examined)
+    banner = say(verdict.shapes) if verdict.shapes else ""
     return Head(
         stored.robot,
         stage,
@@ -216,6 +224,7 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
         verdict.finding,
         missed,
         tuple(figure for figure in shown if figure.name in NUMERICS),
+        banner=banner,
     )
 
 

@@ -164,6 +164,7 @@ class RapidDialect:
 
     modal = frozenset(MODAL)
     local_by_default = False
+    setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF"))
     whole_division = False
     first_index = 1
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -46,7 +46,7 @@ from er3a.pipeline.stages.collision.model import (
     ShapesOverlap,
     TargetClearances,
 )
-from er3a.pipeline.stages.left_out import left_out_of_collisions
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
 from er3a.pipeline.study import Study
@@ -160,7 +160,8 @@ def compute(study: Study, name: str) -> CollisionResults:
         places.joined[:] = joined_to_home(bodies, places, home, settings.neighbours)
     targets, at_targets = target_clearances(robot, bodies, study.entry(name).targets)
     tolerance = settings.penetration_tolerance_mm / 1000
-    paths, on_paths = path_clearances(study_motions(study, name, CHECKS), bodies, tolerance)
+    motions = list(study_motions(study, name, CHECKS))
+    paths, on_paths = path_clearances(motions, bodies, tolerance)
     pairs = _pair_shares(bodies, space)
     mounting = tuple(stated(Mounting, contact) for contact in base_contacts(robot, scene))
     matrix = _matrix(bodies)
@@ -192,6 +193,10 @@ def compute(study: Study, name: str) -> CollisionResults:
                 *left_out_of_collisions(bodies, scene, settings.penetration_tolerance_mm),
                 LeftOut("joint_vectors", amount=settings.samples),
                 LeftOut("lost_cells", amount=places_found.reached - places_found.clear),
+                LeftOut("unjoined_cells", amount=places_found.clear - places_found.joined),
+                LeftOut("within_cells", amount=1000 * places_found.cell_m),
+                *_left_out(study, name, targets, motions),
+                *left_out_without_tool(robot),
             ),
         ),
         matrix=matrix,
@@ -202,6 +207,17 @@ def compute(study: Study, name: str) -> CollisionResults:
         targets=targets,
         paths=paths,
     )
+
+
+def _left_out(study: Study, name: str, found: TargetClearances, motions: list[ListedMotion]) -> Iterator[LeftOut]:
+    """Targets and paths that no clearance is known of, and turns that many targets leave out."""
+    targets = load_targets(study.entry(name).targets, study.robot(name))
+    if unsolved := tuple(target.name for target in targets if not (found.target == target.name).any()):
+        yield LeftOut("targets", unsolved)
+    if len(targets) > MANY_TARGETS:
+        yield LeftOut("turns", amount=MANY_TARGETS)
+    if skipped := tuple(each.name for each in motions if each.motion is None):
+        yield LeftOut("paths", skipped)
 
 
 def _matrix(bodies: Bodies) -> MatrixRows:
@@ -263,7 +279,7 @@ def _verdict(
     pairs: PairShares, mounting: tuple[Mounting, ...], known: ShapesOverlap | HomeCollides | None, found: FreeSpace
 ) -> Verdict[NeverFree | ShapesOverlap | BaseInSolid | HomeCollides | FreeSpace]:
     if pairs.always.any():
-        return Verdict("fail", NeverFree(tuple(pairs.between[pairs.always])))
+        return Verdict("fail", NeverFree(tuple(pairs.between[pairs.always]), found.assumed))
     if inside := tuple(contact.solid for contact in mounting if contact.inside):
         return Verdict("fail", BaseInSolid(inside))
     if known:

@@ -14,9 +14,13 @@ from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_j
 
 @dataclass(frozen=True)
 class NeverFree:
-    """Pairs that overlap in every joint vector within the limits, proven: the arm can't be used like this."""
+    """Pairs that overlap in every joint vector within the limits, proven: the arm can't be used like this.
+
+    ``assumed``: whether no document gives the shapes, so that it is proven of assumed ones only.
+    """
 
     pairs: tuple[Pair, ...]
+    assumed: bool
     code: Literal["collision.never_free"] = "collision.never_free"
 
 

@@ -209,7 +209,7 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         command=run_command(study, f"{name}/collision.html"),
         robot=robot,
         robot_pages=study.pages(name),
-        matrix=_matrix(robot, results.matrix),
+        matrix=_matrix(robot, results.matrix, results.summary.verdict.shapes is not None),
         tried=TRIED,
         by_pair=by_pair(results.pairs),
         pairs=_pairs(results.pairs),
@@ -272,7 +272,7 @@ def _distances(rows: PathClearances) -> list[Mark]:
     ]
 
 
-def _matrix(robot: Robot, rows: MatrixRows) -> list[list[str]]:
+def _matrix(robot: Robot, rows: MatrixRows, assumed: bool) -> list[list[str]]:
     order = sorted(range(len(rows)), key=lambda k: STATES.index(rows.state[k]))
     return [
         [
@@ -286,6 +286,7 @@ def _matrix(robot: Robot, rows: MatrixRows) -> list[list[str]]:
                 int(rows.boxes[k]),
                 _angles(robot, rows.witness_deg[k]),
                 rows.reason[k],
+                assumed=assumed,
             ),
         ]
         for k in order

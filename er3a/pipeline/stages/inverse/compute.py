@@ -25,16 +25,16 @@ from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.families import Family
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.neighbours import neighbours
+from er3a.kinematics.neighbours import Usable, neighbours
 from er3a.kinematics.round_trips import MOST_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Method, Solutions, Target, TargetOutcome
+from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Iteration, Method, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.progress import shown_progress
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.inverse.entry import InverseSettings
@@ -72,6 +72,7 @@ from er3a.pipeline.stages.inverse.model import (
     UnsolvedTarget,
     VisitOrder,
 )
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, shown
@@ -99,13 +100,15 @@ def solve_target(
     target: Target,
     random: np.random.Generator,
     scene: Scene | None = None,
+    *,
     many: bool = False,
     advise: bool = True,
+    clearance: float = 0.0,
 ) -> SolvedTarget:
     """Solve, choose, explain; solutions that collide with the scene or with themselves are not chosen.
 
     One of ``many``: only the turn nearest to the reference is kept of each arm. With ``advise`` what would help a pose
-    without solution is looked for.
+    without solution is looked for: poses where the arm keeps a ``clearance`` (m) and ``LITTLE_MARGIN_DEG``.
     """
     solutions = inverse(robot, target.T, target.q_ref, self_motion_rows=True)
     if many:
@@ -120,13 +123,17 @@ def solve_target(
     advice: tuple[Advice, ...] = ()
     if chosen is not None:
         advice = _what_to_know(rows, chosen)
-    elif isinstance(choice.reason, AllCollide):
-        obstacle, advice = BranchesCollide(len(within)), (MoveObstacle(),)
     else:
-        obstacle = _obstacle(robot, target, solutions, len(found))
+        if isinstance(choice.reason, AllCollide):
+            obstacle = BranchesCollide(len(within))
+            alone = scene is not None and _usable(robot, None, clearance)(solutions.q[solutions.within_limits]).any()
+            advice = (MoveObstacle(),) if alone else ()
+        else:
+            obstacle = _obstacle(robot, target, solutions, len(found))
         if advise and has_branches(robot):
-            near = stated(NeighbourPoses, neighbours(robot, target.T, random))
-            advice = _what_would_help(near)
+            usable = _usable(robot, scene, clearance)
+            near = stated(NeighbourPoses, neighbours(robot, target.T, random, usable))
+            advice = (*advice, *_what_would_help(near, clearance))
     quaternion = scipy.spatial.transform.Rotation.from_matrix(target.T[:3, :3]).as_quat(
         canonical=True, scalar_first=True
     )
@@ -258,13 +265,26 @@ def _outcome(obstacle: Obstacle | None) -> TargetOutcome:
             return "unreachable"
 
 
-def _what_would_help(near: NeighbourPoses) -> tuple[Advice, ...]:
+def _usable(robot: Robot, scene: Scene | None, clearance: float) -> Usable:
+    """Which arms could be advised: with little margin neither to the limits nor to what they may not touch."""
+    bodies = bodies_of(robot, scene)
+
+    def usable(q: Reals) -> Flags:
+        kept: Flags = limit_margin(robot, q) >= np.radians(LITTLE_MARGIN_DEG)
+        kept[kept] = bodies.free(q[kept], clearance)
+        return kept
+
+    return usable
+
+
+def _what_would_help(near: NeighbourPoses, clearance: float) -> tuple[Advice, ...]:
     turn: Advice = TurningDoesNotHelp()
-    if near.least_turn_deg is not None:
-        turn = TurnTool(near.orientation_ratio, near.least_turn_deg)
+    if near.least_turn_deg is not None and near.turned_to_deg is not None:
+        kept = LITTLE_MARGIN_DEG, 1000 * clearance
+        turn = TurnTool(near.orientation_ratio, near.least_turn_deg, near.turned_to_deg, *kept)
     shift: Advice = ShiftingDoesNotHelp()
     if near.least_shift_mm is not None and near.shifted_to_mm is not None:
-        shift = ShiftTool(near.least_shift_mm, near.shifted_to_mm)
+        shift = ShiftTool(near.least_shift_mm, near.shifted_to_mm, LITTLE_MARGIN_DEG, 1000 * clearance)
     return turn, shift
 
 
@@ -394,11 +414,14 @@ def compute(study: Study, name: str) -> InverseResults:
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
     scene_file = study.scene(name, STAGE)
     scene = load_scene(scene_file) if scene_file else None
+    assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
+    clearance = (motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm) / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()
     with shown_progress(len(targets), f"{name}: targets solved") as advance:
         for number, target in enumerate(targets):
             random = np.random.default_rng([study.seed, ADVICE_STREAM, number])
-            solved.append(solve_target(robot, target, random, scene, many, not many or advised < MOST_ADVISED))
+            advise = not many or advised < MOST_ADVISED
+            solved.append(solve_target(robot, target, random, scene, many=many, advise=advise, clearance=clearance))
             advised += solved[-1].result.neighbours is not None
             advance(1)
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
@@ -412,7 +435,7 @@ def compute(study: Study, name: str) -> InverseResults:
     summary = InverseSummary(
         verdict=_verdict(results, worst, trips, scene is not None)
         .without(bodies_of(robot, scene).unexamined)
-        .resting_on(shapes_assumed(robot, study.section(TrajectorySettings).assumed_margin_mm / 1000, {})),
+        .resting_on(assumed),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,
@@ -420,9 +443,43 @@ def compute(study: Study, name: str) -> InverseResults:
         targets=results,
         sequence=sequence(robot, targets, solved, limits_of(robot, motion).acceleration),
         round_trips=_round_trips(trips) if trips else None,
+        not_examined=(
+            *_left_out(robot, results, many, settings.mix, trips),
+            *left_out_of_collisions(bodies_of(robot, scene), scene),
+            *left_out_without_tool(robot),
+        ),
     )
     number_of_solutions = solution_map(robot, settings.map_cells, scene) if has_branches(robot) else MapRows.empty()
     return InverseResults(summary, solutions, RankingRows.stacked(ranked), number_of_solutions)
+
+
+def _left_out(
+    robot: Robot,
+    targets: Sequence[TargetResult],
+    many: bool,
+    mix: Mapping[RuleName, float],
+    trips: BatchRoundTrips | None,
+) -> Iterator[LeftOut]:
+    """What the number of targets, the settings and the kind of arm leave out."""
+    if uncertain := tuple(each.name for each in targets if not _is_certain(each.method)):
+        yield LeftOut("uncertain_solutions", uncertain)
+    if trips is None:
+        yield LeftOut("all_solutions")
+    else:
+        yield LeftOut("round_trips", amount=trips.poses)
+    if many:
+        yield LeftOut("turns", amount=MANY_TARGETS)
+    if unadvised := tuple(each.name for each in targets if each.obstacle and not each.advice):
+        yield LeftOut("advice", unadvised)
+    known = available_rules(robot)
+    if unknown := tuple(rule for rule in mix if rule not in known):
+        yield LeftOut("rules", unknown)
+    yield LeftOut("ways_between")
+
+
+def _is_certain(method: Method) -> bool:
+    """Whether the solutions that it found are all."""
+    return method.certain if isinstance(method, ByClass) else not isinstance(method, Iteration)
 
 
 def _verdict(

@@ -61,10 +61,19 @@ Obstacle = NothingFound | TiltMissing | ReachMissing | BranchesLeaveLimits | Bra
 
 @dataclass(frozen=True)
 class TurnTool:
-    """Turning the tool helps: part of random orientations that have a solution, and the least turn found."""
+    """Turning the tool helps: part of random orientations that have a solution, and the least turn found.
+
+    Attributes
+    ----------
+    to_deg : roll, pitch and yaw where it ends
+    margin_deg, clearance_mm : what the arm keeps there from the limits, and from what it may not touch
+    """
 
     orientation_ratio: float
     least_turn_deg: float
+    to_deg: tuple[float, float, float]
+    margin_deg: float
+    clearance_mm: float
     code: Literal["turn_tool"] = "turn_tool"
 
 
@@ -77,10 +86,12 @@ class TurningDoesNotHelp:
 
 @dataclass(frozen=True)
 class ShiftTool:
-    """Moving the part or the base helps: the least shift of the tool found, and where it ends."""
+    """Moving the part or the base helps: the least shift of the tool found, and where it ends; see `TurnTool`."""
 
     shift_mm: float
     to_mm: tuple[float, float, float]
+    margin_deg: float
+    clearance_mm: float
     code: Literal["shift_tool"] = "shift_tool"
 
 
@@ -93,7 +104,7 @@ class ShiftingDoesNotHelp:
 
 @dataclass(frozen=True)
 class MoveObstacle:
-    """Only what is around the arm is in the way."""
+    """Only what is around the arm is in the way: without it a solution keeps its margins."""
 
     code: Literal["move_obstacle"] = "move_obstacle"
 
@@ -186,6 +197,7 @@ class NeighbourPoses:
 
     orientation_ratio: float
     least_turn_deg: float | None
+    turned_to_deg: tuple[float, float, float] | None
     least_shift_mm: float | None
     shifted_to_mm: tuple[float, float, float] | None
 

@@ -565,7 +565,7 @@ def _outcomes(targets: Iterable[TargetResult]) -> str:
 
 def _not_advised(targets: Iterable[TargetResult]) -> int:
     """How many targets without solution were not looked at for what would help, where others were."""
-    without = [target.neighbours for target in targets if target.outcome in ("unreachable", "leaves limits")]
+    without = [target.neighbours for target in targets if target.obstacle]
     return without.count(None) if any(without) else 0
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import PairOverlaps
+from er3a.collision.pairs import PairOverlaps, PairTooNear
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.configuration import branch_labels
@@ -24,7 +24,7 @@ from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates, left_out_without_tool
 from er3a.pipeline.stages.trajectory.judgement import (
     Judgement,
     Surroundings,
@@ -133,11 +133,11 @@ class AvoidanceTask:
         collides = bool(along.contacts)
         if (collides or found.beyond or found.limits) and motion.no_way is None and self.only in (None, "planned"):
             results += self._planned(motion)
-        met = {result.name: self._meets(result.cost) for result in results if result.cost}
+        margin = self._margin_of(along)
+        met = {result.name: self._meets(result.cost, margin) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
-        roomy = [result for result in free if self._keeps_margin(met[result.name][1] if result.name in met else None)]
-        chosen = best(roomy, meets) or best(free, meets)
+        chosen = best(free, meets)
         tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
@@ -193,8 +193,9 @@ class AvoidanceTask:
             StrategyResult("slow", StrategyCost(slower, 1.0, nothing, nothing, speed, acceleration, False))
         ]
 
-    def _meets(self, cost: StrategyCost) -> tuple[PairOverlaps | None, float | None]:
-        """The deepest overlap on a motion, and its least clearance in mm (None if nothing can meet)."""
+    def _meets(self, cost: StrategyCost, margin: float) -> tuple[PairOverlaps | PairTooNear | None, float | None]:
+        """The deepest overlap on a motion, or what comes nearer than a margin (m), and its least clearance in mm (None
+        if nothing can meet)."""
         curve = cost.motion.curve
         grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
         along = clearance_along(
@@ -203,10 +204,15 @@ class AvoidanceTask:
         least = least_clearance(along)
         if least is None:
             return None, None
-        return PairOverlaps(least.between, -least.least_mm) if along.contacts else None, least.least_mm
+        if along.contacts:
+            return PairOverlaps(least.between, -least.least_mm), least.least_mm
+        near = least.least_mm < 1000 * margin
+        return PairTooNear(least.between, least.least_mm, 1000 * margin) if near else None, least.least_mm
 
-    def _keeps_margin(self, clearance_mm: float | None) -> bool:
-        return clearance_mm is None or clearance_mm >= 1000 * self.margin
+    def _margin_of(self, along: ClearanceAlong) -> float:
+        """The margin (m) that a motion is to keep which has the ends of a path: no more than these ends have."""
+        ends = along.distance[[0, -1]]
+        return float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))
 
     def _tables(self, motion: Motion, results: list[StrategyResult], quickest: Timed | None) -> Iterator[AvoidanceRows]:
         for result in results:
@@ -272,7 +278,9 @@ def _quickest(segment: SingularSegment) -> Timed | None:
         return None
 
 
-def _tried(result: StrategyResult, meets: PairOverlaps | None, clearance_mm: float | None) -> TriedStrategy:
+def _tried(
+    result: StrategyResult, meets: PairOverlaps | PairTooNear | None, clearance_mm: float | None
+) -> TriedStrategy:
     reasons = (*result.reasons, meets) if meets else result.reasons
     motion = _motion(result.cost, clearance_mm) if result.cost else None
     return TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
@@ -449,6 +457,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
             *left_out_of_collisions(surroundings.bodies, scene, settings.penetration_tolerance_mm),
             *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
             *_left_out(paths, skipped, only),
+            *left_out_without_tool(robot),
             LeftOut("torques"),
         ),
     )
@@ -463,11 +472,13 @@ def compute(study: Study, name: str) -> TrajectoryResults:
 
 
 def _left_out(paths: list[PathSummary], skipped: list[PathNotFollowed], only: StrategyName | None) -> Iterator[LeftOut]:
-    """Paths that were not followed, stretches that bounds leave open, strategies that the study does not ask for."""
+    """Paths that were not followed or planned, stretches that bounds leave open, strategies not asked for."""
     if skipped:
         yield LeftOut("paths", tuple(path.name for path in skipped))
     if open_ := tuple(path.name for path in paths if path.undecided):
         yield LeftOut("path_stretches", open_)
+    if unplanned := tuple(path.name for path in paths if path.verdict == "none found"):
+        yield LeftOut("plans", unplanned)
     if only:
         yield LeftOut("strategies", tuple(name for name in get_args(StrategyName) if name != only))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
-from er3a.collision.pairs import Pair, PairOverlaps
+from er3a.collision.pairs import Pair, PairOverlaps, PairTooNear
 from er3a.findings import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
@@ -246,7 +246,7 @@ class TriedStrategy:
 
     name: StrategyName
     usable: bool
-    reasons: tuple[NotUsable | PairOverlaps, ...]
+    reasons: tuple[NotUsable | PairOverlaps | PairTooNear, ...]
     motion: StrategyMotion | None
 
 

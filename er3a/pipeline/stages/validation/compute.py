@@ -19,10 +19,13 @@ from er3a.identifiability.proposals import proposals_of
 from er3a.identifiability.reactions import bases_of, undeclared_bases
 from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.forward import frames
+from er3a.kinematics.round_trips import MOST_BY_CLASS
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
+from er3a.pipeline.results import LeftOut
+from er3a.pipeline.stages.validation.checks import GROUP as ROUND_TRIPS
 from er3a.pipeline.stages.validation.checks import checks_of_set, round_trip_checks, table_checks
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.model import (
@@ -40,7 +43,9 @@ from er3a.pipeline.stages.validation.model import (
     NamedPose,
     OtherTableFound,
     RankedHypothesis,
+    ReferenceCheck,
     Residuals,
+    RoundTripErrors,
     Section,
     SetCalibration,
     SetDiagnosis,
@@ -49,6 +54,7 @@ from er3a.pipeline.stages.validation.model import (
     Unjudged,
     ValidationResults,
     ValidationSummary,
+    WholeGroup,
 )
 from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.stages.validation.verdict import (
@@ -79,7 +85,7 @@ from er3a.references.quantities import (
     section_of,
 )
 from er3a.references.reference import Documents, ReferenceSet, expected_of, quantities_of, vectors_of
-from er3a.references.rows import AxisRow, EnvelopeRow, PositionRow
+from er3a.references.rows import GROUPS, AxisRow, EnvelopeRow, PositionRow
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Grade, Robot
@@ -340,6 +346,7 @@ def compute(study: Study, name: str) -> ValidationResults:
         section_origin_mm=_section_origin_mm(robot),
         counts=counts,
         evidence=evidence,
+        not_examined=tuple(_left_out(settings, checks, diagnoses if turning else None, calibrations, trips, evidence)),
     )
     return ValidationResults(
         summary=summary,
@@ -350,6 +357,47 @@ def compute(study: Study, name: str) -> ValidationResults:
         residuals=residuals,
         corrections=corrections,
     )
+
+
+def _left_out(
+    settings: ValidationSettings,
+    checks: list[Check],
+    diagnoses: tuple[SetDiagnosis, ...] | None,
+    calibrations: tuple[SetCalibration, ...],
+    trips: RoundTripErrors | None,
+    evidence: TableEvidence | None,
+) -> Iterator[LeftOut]:
+    """What references, settings and the kind of arm leave out; ``diagnoses``: None where none are made."""
+    judged = {check.subject for check in checks if isinstance(check, ReferenceCheck)}
+    groups = {check.group for check in checks if isinstance(check, ReferenceCheck)}
+    missing = {
+        check.group
+        for check in checks
+        if isinstance(check, Unjudged)
+        and check.group in GROUPS
+        and (check.group not in groups if isinstance(check.subject, WholeGroup) else check.subject not in judged)
+    }
+    if unstated := tuple(group for group in GROUPS if group in missing or group not in groups):
+        yield LeftOut("references", unstated)
+    entries = evidence.entries if evidence else ()
+    doubtful = tuple(each.entry for each in entries if each.status not in ("settled", "gauge", "given"))
+    if doubtful or evidence is None:
+        yield LeftOut("table_entries", doubtful)
+    if diagnoses is None:
+        yield LeftOut("diagnosis")
+    else:
+        yield LeftOut("more_faults")
+    if uncalibrated := tuple(each.reference_set for each in calibrations if not isinstance(each.result, Calibrated)):
+        yield LeftOut("calibration", uncalibrated)
+    unsolved = [check for check in checks if isinstance(check, Unjudged) and check.group == ROUND_TRIPS]
+    if unsolved:
+        yield LeftOut("all_solutions")
+    else:
+        yield LeftOut("round_trips", amount=settings.round_trips if trips else min(settings.round_trips, MOST_BY_CLASS))
+    if trips and trips.near_singular:
+        yield LeftOut("near_singular_poses", amount=trips.near_singular)
+    yield LeftOut("reach_starts", amount=settings.reach_starts)
+    yield LeftOut("the_arm_itself")
 
 
 def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEvidence | None:

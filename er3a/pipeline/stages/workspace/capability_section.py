@@ -405,6 +405,7 @@ def _placement_context(
     return {
         "nowhere": "",
         "placing_scene": placement.scene,
+        "placing_margin": fixed(placement.margin_mm, 0),
         "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
         "best_text": best_text(placement),
         "points_serving": placement.points_serving,
@@ -450,12 +451,12 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
             tr("Slices along the slide of joint 1: reached poses that can be held without collision")
             if capability.bar_m
             else tr("Slices across axis 1: reached poses that can be held without collision"),
-            _clear_caption(capability.clear),
+            _clear_caption(capability.clear, results.summary.verdict.shapes is not None),
         ),
     ]
 
 
-def _clear_caption(clear: ClearSummary) -> str:
+def _clear_caption(clear: ClearSummary, assumed: bool) -> str:
     if clear.scene is None:
         what = tr("An estimate: {share} % of the poses reached can be held without the arm touching itself.",
                   share=number(100 * clear.share, 2))  # fmt: skip
@@ -465,15 +466,26 @@ def _clear_caption(clear: ClearSummary) -> str:
             share=number(100 * clear.share, 2),
             scene=own_title(clear.scene),
         )
-    tried = tr(
-        "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"
-        " collision-free; in {without} cells and sectors none was found. Shares of so few tries distinguish "
-        "good regions from bad ones, not single cells.",
-        tries=clear.tries,
-        reached=number(clear.reached),
-        clear=number(clear.clear),
-        without=number(clear.without),
-    )
+    numbers = {
+        "tries": clear.tries,
+        "reached": number(clear.reached),
+        "clear": number(clear.clear),
+        "without": number(clear.without),
+    }
+    if assumed:
+        tried = tr(
+            "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them clear of "
+            "the assumed shapes; in {without} cells and sectors none was found. Shares of so few tries distinguish "
+            "good regions from bad ones, not single cells.",
+            **numbers,
+        )
+    else:
+        tried = tr(
+            "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"
+            " collision-free; in {without} cells and sectors none was found. Shares of so few tries distinguish "
+            "good regions from bad ones, not single cells.",
+            **numbers,
+        )
     return tr("{first} {rest}", first=what, rest=tried)
 
 

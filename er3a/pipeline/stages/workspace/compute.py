@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from er3a.collision.along import bodies_of
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import shapes_assumed
 from er3a.files.reference_sets import check_reference_file, reference_folder
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.si_units import stated
-from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.results import Figure, LeftOut, Verdict
+from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.workspace import table_rows
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
 from er3a.pipeline.stages.workspace.model import (
     AxisSummary,
     Bars,
     Bounds,
+    CapabilityMissing,
     CellCounts,
     Drawing,
     Flat,
@@ -28,6 +34,8 @@ from er3a.pipeline.stages.workspace.model import (
     HullTriangles,
     NoVoid,
     OnSurface,
+    PlacementSummary,
+    PlacementTooLong,
     ProofSummary,
     SectionFrame,
     Undersampled,
@@ -181,17 +189,20 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
     grid, draw, tally, hull = samples.grid, samples.draw, samples.tally, samples.hull
     in_cloud = find_voids(tally.counts, samples.inside)
     shoulder = shoulder_of(robot, grid)
-    settings = study.section(WorkspaceSettings)
+    settings, motion = study.section(WorkspaceSettings), study.section(TrajectorySettings)
     proven = prove_robot(robot, settings.proof_cells, settings.volume_points, study.seed)
     voids = proven_voids(robot, proven, hull, shoulder)
     if not proven.settles:
         voids += sampled_only(in_cloud, grid, shoulder, voids)
     scene_file = study.scene(name, "capability")
     scene = load_scene(scene_file) if scene_file else None
-    tool = tool_capability(robot, study.section(CapabilitySettings), grid.cell, scene, study.seed, proven=proven)
+    assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
+    margin = motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm
+    asked = study.section(CapabilitySettings)
+    tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin / 1000, proven=proven)
     vertices, triangles = table_rows.void_surfaces(voids)
     return WorkspaceResults(
-        summary=_summary(study, robot, samples, proven, voids, tool),
+        summary=_summary(study, robot, samples, proven, voids, tool, scene=scene),
         cells=table_rows.cells(tally, void_numbers(in_cloud, tally.counts, samples.inside)),
         section=table_rows.section(section_cells(tally, grid)),
         side_view=table_rows.side_view(side_views(robot, tally, grid, draw)),
@@ -223,7 +234,14 @@ def _samples(study: Study, robot: Robot, parts: Sequence[Path] | None) -> _Sampl
 
 
 def _summary(
-    study: Study, robot: Robot, samples: _Samples, proven: Proven, voids: Sequence[Void], tool: ToolCapability
+    study: Study,
+    robot: Robot,
+    samples: _Samples,
+    proven: Proven,
+    voids: Sequence[Void],
+    tool: ToolCapability,
+    *,
+    scene: Scene | None,
 ) -> WorkspaceSummary:
     settings, grid, tally, hull = study.section(WorkspaceSettings), samples.grid, samples.tally, samples.hull
     touched, unseen = tally.counts > 0, unseen_cells(tally.counts)
@@ -237,11 +255,13 @@ def _summary(
         judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
     if surface:
         judged = Verdict("caution", OnSurface(surface))
+    margin = study.section(TrajectorySettings).assumed_margin_mm / 1000
+    assumed = None if isinstance(tool.capability, CapabilityMissing) else shapes_assumed(robot, margin, {})
     guess = proven.estimate
     volume = Volume(lower, upper, guess.value, (guess.low, guess.high))
     reach = search_reach(robot, grid, samples.q_kept)
     return WorkspaceSummary(
-        verdict=judged.without(tool.unexamined),
+        verdict=judged.without(tool.unexamined).resting_on(assumed),
         figures=_figures(reach, voids, volume, hull, settings.samples, surface),
         samples=settings.samples,
         sampling=settings.sampling,
@@ -267,7 +287,44 @@ def _summary(
         pocket_block_m=pocket_block(proven),
         capability=tool.capability,
         placement=tool.placement,
+        not_examined=(
+            *_left_out(settings, volume, surface, voids, tool),
+            *left_out_of_collisions(bodies_of(robot, scene), scene),
+            *left_out_without_tool(robot),
+        ),
     )
+
+
+def _left_out(
+    settings: WorkspaceSettings, volume: Volume, surface: Surface | None, voids: Sequence[Void], tool: ToolCapability
+) -> Iterator[LeftOut]:
+    """What samples, budgets of proofs and the kind of arm leave out."""
+    yield LeftOut("joint_vectors", amount=settings.samples)
+    if surface is None and volume.upper > volume.lower:
+        yield LeftOut("undecided_volume", amount=1000 * (volume.upper - volume.lower))
+    if surface and (surface.lower is None or surface.upper is None):
+        yield LeftOut("area")
+    if sampled_voids := sum(void.status != "proven_empty" for void in voids):
+        yield LeftOut("sampled_voids", amount=sampled_voids)
+    yield LeftOut("colliding_reach")
+    found, placement = tool.capability, tool.placement
+    if isinstance(found, CapabilityMissing):
+        yield LeftOut("capability")
+        return
+    yield LeftOut("tool_directions", amount=found.directions)
+    if found.clear.without:
+        yield LeftOut("lost_cells", amount=found.clear.without)
+    if found.core_m3 is None:
+        yield LeftOut("core")
+    elif found.core_m3.upper > found.core_m3.lower:
+        yield LeftOut("undecided_core", amount=1000 * (found.core_m3.upper - found.core_m3.lower))
+    if isinstance(placement, PlacementTooLong):
+        yield LeftOut("places")
+    if isinstance(placement, PlacementSummary):
+        if placement.fitting > placement.fitting_proven:
+            yield LeftOut("sampled_places", amount=placement.fitting - placement.fitting_proven)
+        yield LeftOut("between_places", amount=1000 * max(placement.spacing_m))
+        yield LeftOut("placed_box")
 
 
 def _bars(proven: Proven) -> Bars | None:

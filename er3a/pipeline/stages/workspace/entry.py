@@ -13,6 +13,7 @@ from er3a.files.robot_file import Text
 from er3a.files.units import FARTHEST_MM, Triple, check_millimetres
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
+from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
 
 SAMPLES_PER_JOB = 1_000_000_000
@@ -104,7 +105,7 @@ STAGE = Stage(
     name="workspace",
     title=N_("workspace"),
     question=N_("What can it reach, where are the voids, and where can a pallet stand?"),
-    settings={"workspace": WorkspaceSettings, "capability": CapabilitySettings},
+    settings={"workspace": WorkspaceSettings, "capability": CapabilitySettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
     sampled=True,

@@ -510,9 +510,11 @@ class PlacementSummary:
     """Where the box can stand: numbers of lattice points and positions, and the best places.
 
     ``scene`` is the title of what the arm may not touch there; None in open space. Nor may it touch itself.
+    ``margin_mm`` is what it keeps from both.
     """
 
     scene: str | None
+    margin_mm: float
     task: TaskSummary
     spacing_m: Triple
     directions: int

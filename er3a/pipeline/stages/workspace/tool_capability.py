@@ -9,6 +9,7 @@ directions are fewer and cells are coarser.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -44,7 +45,17 @@ from er3a.workspace.cell_frame import cell_frame, is_quick
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import RING, cone_directions
 from er3a.workspace.orientations import AskedOrientations, asked_of
-from er3a.workspace.placement import MIXED, NO, Task, box_points, lattice_size, limited_joints, narrowed, serving_arms
+from er3a.workspace.placement import (
+    MIXED,
+    NO,
+    Free,
+    Task,
+    box_points,
+    lattice_size,
+    limited_joints,
+    narrowed,
+    serving_arms,
+)
 from er3a.workspace.placement_proof import BoxPlacement, find_places
 from er3a.workspace.proven import Proven
 from er3a.workspace.section_proof import ring_volumes
@@ -180,6 +191,7 @@ def tool_capability(
     scene: Scene | None = None,
     seed: int = 0,
     *,
+    margin: float = 0.0,
     proven: Proven | None = None,
 ) -> ToolCapability:
     """Work out what the tool can do.
@@ -190,6 +202,7 @@ def tool_capability(
         the plan of cells allows
     scene : what the arm may not touch where it serves the box, and in clear poses; nor may it touch itself
     seed : of the poses tried
+    margin : m, that the arm keeps from the scene and from itself where it serves the box
     proven : what is known of the reach; cells that are proven empty need not be asked
     """
     asked, lacks = asked_of(robot, settings.rolls), lacking_for_maps(robot)
@@ -223,7 +236,9 @@ def tool_capability(
         coarse=plan.coarse,
         clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
-    placement, places = _placed(robot, settings, task, plan, scene, float(found.manipulability.max()))
+    placement, places = _placed(
+        robot, settings, task, plan, scene=scene, margin=margin, best=float(found.manipulability.max())
+    )
     return ToolCapability(
         summary, placement, table_rows.capability(middles, found, tried, frame.bar > 0), places, bodies.unexamined
     )
@@ -235,20 +250,33 @@ def _rows(R: Reals) -> tuple[Triple, Triple, Triple]:
 
 
 def _placed(
-    robot: Robot, settings: CapabilitySettings, task: Task, plan: CapabilityPlan, scene: Scene | None, best: float
+    robot: Robot,
+    settings: CapabilitySettings,
+    task: Task,
+    plan: CapabilityPlan,
+    *,
+    scene: Scene | None,
+    margin: float,
+    best: float,
 ) -> tuple[Placement, BoxPlaces]:
-    """Where the box can stand; ``best`` is the arm's greatest manipulability, m^3."""
+    """Where the box can stand, the arm a margin (m) from what it may not touch.
+
+    Parameters
+    ----------
+    best : the arm's greatest manipulability, m^3
+    """
     asked = plan.asked
     if not asked.in_cone(np.zeros((1, 3)), task.axis, task.half_angle, task.step).shape[1]:
         return ToolPointsElsewhere(_task_summary(settings.placement), triple(asked.tool[:, 2])), BoxPlaces.empty()
     if plan.lattice is None:
         return PlacementTooLong(_task_summary(settings.placement)), BoxPlaces.empty()
-    bodies, within = Bodies(robot, scene), Bodies(narrowed(robot, task.margin), scene)
+    within = narrowed(robot, task.margin)
+    bodies, free = Bodies(robot, scene), partial(Bodies(within, scene).free, margin=margin)
     placement = find_places(
-        robot, task, asked.roll, plan.lattice, LISTED, settings.proof_poses, free=within.free, in_cone=asked.in_cone
+        robot, task, asked.roll, plan.lattice, LISTED, settings.proof_poses, free=free, in_cone=asked.in_cone
     )
-    placed = _placement_summary(robot, settings.placement, task, placement, best, scene)
-    arms = _arms_at(within, task, asked, placement)
+    placed = _placement_summary(robot, settings.placement, task, placement, best, scene=scene, margin=margin)
+    arms = _arms_at(within, free, task, asked, placement)
     listed = tuple(_with_nearest(place, bodies, q) for place, q in zip(placed.places, arms))
     return replace(placed, places=listed), table_rows.places(placement.best_turns)
 
@@ -301,12 +329,20 @@ def _task_summary(asked: BoxTask) -> TaskSummary:
 
 
 def _placement_summary(
-    robot: Robot, asked: BoxTask, task: Task, placement: BoxPlacement, best: float, scene: Scene | None
+    robot: Robot,
+    asked: BoxTask,
+    task: Task,
+    placement: BoxPlacement,
+    best: float,
+    *,
+    scene: Scene | None,
+    margin: float,
 ) -> PlacementSummary:
     """The placement as the summary has it; ``best`` is the arm's greatest manipulability, m^3."""
     places = placement.places
     return PlacementSummary(
         scene=scene.title if scene else None,
+        margin_mm=1000 * margin,
         task=_task_summary(asked),
         spacing_m=triple(placement.field.spacing),
         directions=len(cone_directions(task.axis, task.half_angle, task.step)),
@@ -347,19 +383,19 @@ def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> l
     ]
 
 
-def _arms_at(within: Bodies, task: Task, asked: AskedOrientations, placement: BoxPlacement) -> list[Reals]:
+def _arms_at(within: Robot, free: Free, task: Task, asked: AskedOrientations, placement: BoxPlacement) -> list[Reals]:
     """The arms (m, joints), rad, at each chosen place, over its lattice points and directions.
 
     Parameters
     ----------
-    within : of the robot with the limits that the places were found with
+    within : the robot with the limits that the places were found with; free : which arms count
     """
     arms = []
     for row, slot in zip(placement.chosen.row, placement.chosen.slot):
         box = task.box[[1, 0, 2]] if placement.places.turned[row] else task.box
         points = box_points(placement.field, box, placement.places.centre[row])
         rotations = asked.in_cone(points, task.axis, task.half_angle, task.step)
-        arms.append(serving_arms(within.robot, points, rotations, asked.roll, slot, within.free))
+        arms.append(serving_arms(within, points, rotations, asked.roll, slot, free))
     return arms
 
 
