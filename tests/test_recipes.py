@@ -332,7 +332,7 @@ from __future__ import annotations
 
 import re
 
-from er3a.programs.language import SIX_ANGLES, Language
+from er3a.programs.program_language import SIX_ANGLES, Language
 from er3a.programs.plain.reader import read_plain
 from er3a.programs.plain.writer import PlainWriter
 from er3a.programs.rpl_dialect import RplDialect

@@ -59,7 +59,7 @@ class Proposal:
 
 
 @dataclass(frozen=True)
-class Beyond:
+class OutOfMeasured:
     """A joint that proposals take ``above`` or below a value (deg or mm) at which measurements end."""
 
     joint: int
@@ -94,7 +94,7 @@ class Plan:
     lacking: tuple[str, ...]
     held: tuple[Held, ...]
     proposals: tuple[Proposal, ...]
-    beyond: tuple[Beyond, ...]
+    beyond: tuple[OutOfMeasured, ...]
     widths: tuple[Width, ...]
 
 
@@ -206,7 +206,9 @@ def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObser
         lengths = np.array([measurements[k].length_mm or 0.0 for k in rows]) / 1000
         first = own[: len(own) // 2] if kind == "pair" else own
         around = _points(robot, own[: len(first)], seen)
-        second, size, done = _touching(robot, own[-len(first) :], seen, kind, x[rows], lengths, around)
+        second, size, done = _touching(
+            robot, own[-len(first) :], seen, kind=kind, x=x[rows], lengths=lengths, others=around
+        )
         for k in np.flatnonzero(done):
             if kind == "pair":
                 label, length = f"next {len(options) + 1}", 1000 * float(size[k])
@@ -217,7 +219,7 @@ def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObser
 
 
 def _touching(
-    robot: Robot, q: Reals, seen: PointObservations, kind: TouchKind, x: Reals, lengths: Reals, others: Reals
+    robot: Robot, q: Reals, seen: PointObservations, *, kind: TouchKind, x: Reals, lengths: Reals, others: Reals
 ) -> tuple[Reals, Reals, Flags]:
     """Joint values (N, n) near to others that touch what points x (P, 3), m, have touched, or are at a pair's length
     from ``others`` (N, 3); lengths (N,), m, and whether each does, free of collision and within limits."""
@@ -267,15 +269,15 @@ def _pose(robot: Robot, q: Reals) -> Pose:
     return tuple(np.round(shown(robot, q), 3).tolist())
 
 
-def _beyond(measurements: Sequence[Measurement], proposals: Sequence[Proposal]) -> tuple[Beyond, ...]:
+def _beyond(measurements: Sequence[Measurement], proposals: Sequence[Proposal]) -> tuple[OutOfMeasured, ...]:
     old = np.array([each.pose for each in measurements], dtype=float)
     new = np.array([each.pose for each in proposals], dtype=float).reshape(-1, old.shape[1])
     found = []
     for joint, (before, after) in enumerate(zip(old.T, new.T)):
         if len(after) and after.max() > before.max() + BEYOND:
-            found.append(Beyond(joint + 1, True, float(before.max())))
+            found.append(OutOfMeasured(joint + 1, True, float(before.max())))
         if len(after) and after.min() < before.min() - BEYOND:
-            found.append(Beyond(joint + 1, False, float(before.min())))
+            found.append(OutOfMeasured(joint + 1, False, float(before.min())))
     return tuple(found)
 
 

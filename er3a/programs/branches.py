@@ -6,13 +6,13 @@ import numpy as np
 
 from er3a.kinematics.singularity import factors_where_defined
 from er3a.numerics.arrays import Flags, Reals
-from er3a.programs.instructions import Branch
+from er3a.programs.instructions import MeantSolution
 from er3a.robots.robot import Robot
 
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 
 
-def on_branch(robot: Robot, rows: Reals, branch: Branch) -> Flags:
+def on_branch(robot: Robot, rows: Reals, branch: MeantSolution) -> Flags:
     """Which of joint vectors (k, n) in rad lie on a branch: (k,).
 
     The wrist centre's sides are compared with those in the arm's zero pose; what has no side there, or has no such

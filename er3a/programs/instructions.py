@@ -128,7 +128,7 @@ class JointTarget(ByValue):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Branch(ByValue):
+class MeantSolution(ByValue):
     """Which of several solutions a target means.
 
     Attributes
@@ -162,7 +162,7 @@ class PoseTarget(ByValue):
     near: Reals | None = None
     joints: Reals | None = None
     external: tuple[tuple[str, float], ...] = ()
-    branch: Branch | None = None
+    branch: MeantSolution | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,9 @@ from er3a.programs.instructions import (
     FINE,
     ArmMotion,
     Aside,
-    Branch,
     Instruction,
     JointTarget,
+    MeantSolution,
     MotionKind,
     NamedFrame,
     Output,
@@ -174,12 +174,12 @@ def _pose(memory: ProgramMemory, value: Record, frames: Frames, text: str) -> Ta
     return PoseTarget(pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch)
 
 
-def _branch(turn: float | None, joints: int) -> Branch | None:
+def _branch(turn: float | None, joints: int) -> MeantSolution | None:
     """What Turn says of a solution: bit i - 1 is set where axis i is below 0."""
     if turn is None:
         return None
     below = [(int(turn) >> i) & 1 for i in range(joints)]
-    return Branch(np.array([(-np.inf, SIGN_ZERO) if each else (-SIGN_ZERO, np.inf) for each in below]))
+    return MeantSolution(np.array([(-np.inf, SIGN_ZERO) if each else (-SIGN_ZERO, np.inf) for each in below]))
 
 
 def tool_of(memory: ProgramMemory) -> NamedFrame:

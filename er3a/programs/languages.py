@@ -18,10 +18,10 @@ from er3a.programs.instructions import ArmMotion, JointTarget, Listing
 from er3a.programs.krl_dialect import KrlDialect
 from er3a.programs.krl_reader import read_krl
 from er3a.programs.krl_writer import KrlWriter
-from er3a.programs.language import SIX_ANGLES, Language
 from er3a.programs.lexing import ProgramText, read_program_text
 from er3a.programs.program_files import POINTS
 from er3a.programs.program_findings import NothingMoves
+from er3a.programs.program_language import SIX_ANGLES, Language
 from er3a.programs.rapid.language import RAPID
 from er3a.programs.rpl_dialect import RplDialect
 from er3a.programs.rpl_reader import read_rpl

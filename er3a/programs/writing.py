@@ -22,12 +22,12 @@ from er3a.programs.branches import on_branch
 from er3a.programs.instructions import (
     ArmMotion,
     Aside,
-    Branch,
     Decision,
     Disabled,
     Instruction,
     JointTarget,
     Listing,
+    MeantSolution,
     MovesBeside,
     NamedFrame,
     Output,
@@ -148,7 +148,7 @@ class Resolver:
         return self._solved[number]
 
     def solve(
-        self, poses: Reals, frames: Frames, near: Reals | None, branch: Branch | None = None
+        self, poses: Reals, frames: Frames, near: Reals | None, branch: MeantSolution | None = None
     ) -> list[Reals | None]:
         """Joints (n,) of poses (k, 4, 4) one after another, each nearest to those before and within the limits.
 
@@ -253,7 +253,7 @@ def _is_followed(motion: ArmMotion) -> bool:
     return given and motion.kind != "joint" and motion.angle is None
 
 
-def _chain(found: Solutions, reference: Reals, arm: Robot, branch: Branch | None) -> list[Reals]:
+def _chain(found: Solutions, reference: Reals, arm: Robot, branch: MeantSolution | None) -> list[Reals]:
     """The solution of each pose that is nearest to the one before, up to the first pose that has none."""
     chain: list[Reals] = []
     rows = np.where((found.solved & found.within_limits)[..., None], found.q, np.inf)

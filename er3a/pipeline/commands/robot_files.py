@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -29,6 +30,10 @@ from er3a.pipeline.commands.options import (
 from er3a.pipeline.messages.language import LANGUAGES, using
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
+
+if TYPE_CHECKING:
+    from er3a.calibration.observations import Measurement
+    from er3a.robots.robot import Robot
 
 
 class FixedPlacement(StrEnum):
@@ -146,6 +151,14 @@ def mesh(
     print(f"they stand out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
+def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[str], as_json: bool) -> None:
+    from er3a.calibration.plan import plan
+    from er3a.pipeline.messages.calibration import plan_lines, plan_record
+
+    proposed = plan(arm, rows, count, fixed)
+    print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
+
+
 @app.command(rich_help_panel=ROBOT_FILES)
 def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
@@ -172,7 +185,7 @@ def calibrate(
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
-    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, lines_of, plan_lines, plan_record
+    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, lines_of
     from er3a.pipeline.messages.say import say
 
     if words not in LANGUAGES:
@@ -185,13 +198,10 @@ def calibrate(
     arm = load_robot(robot)
     rows = load_measurements(file, arm) if file else ()
     if plan:
-        from er3a.calibration.plan import plan as planned
-
         if file is None:
             raise Er3aError("--plan takes measured positions; give a CSV of them, not a reference set")
         check_poses(rows, arm, file)
-        proposed = planned(arm, rows, plan, [each.value for each in fixed or ()])
-        print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
+        _print_plan(arm, rows, plan, [each.value for each in fixed or ()], as_json)
         return
     others = load_measurements(held_back, arm) if held_back else None
     try:
@@ -205,25 +215,15 @@ def calibrate(
     if output:
         write_robot(corrected, output)
     distances = found.distances_mm(others) if others else None
-    if html:
-        from er3a.pipeline.viewing.calibration import write_calibration
-
-        with using(words):
-            write_calibration(
-                arm,
-                rows,
-                found,
-                html,
-                command=["er3a", *sys.argv[1:]],
-                files=[given for given in (Path(robot), file) if given and given.is_file()],
-                corrected=corrected,
-                recording=rrd,
-                held_back=distances,
-            )
-    if rrd:
-        from er3a.pipeline.viewing.calibration import measured_errors
+    if html or rrd:
+        from er3a.pipeline.viewing.calibration import measured_errors, write_calibration
         from er3a.pipeline.viewing.calibration_recording import record_calibration
-
+    if html:
+        command, files = ["er3a", *sys.argv[1:]], [given for given in (Path(robot), file) if given and given.is_file()]
+        shown = partial(write_calibration, command=command, files=files, corrected=corrected, recording=rrd)
+        with using(words):
+            shown(arm, rows, found, html, held_back=distances)
+    if rrd:
         record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
         print_json({"output": str(output) if output else None, **calibration_record(found, distances)})

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.instructions import Branch, numbers_of, pose_of
+from er3a.programs.instructions import MeantSolution, numbers_of, pose_of
 from er3a.programs.syntax import Record, Value, finite, number, numbers
 from er3a.robots.masses import MassBody
 
@@ -235,7 +235,7 @@ CONFIGURED = (0, 3, 5)
 """Axes whose quarters confdata gives: 1, 4 and 6."""
 
 
-def branch_of(conf: Value | None, joints: int) -> Branch | None:
+def branch_of(conf: Value | None, joints: int) -> MeantSolution | None:
     """What confdata says of an arm's solution; None if its numbers are not given.
 
     3 confdata: cf1, cf4 and cf6 are the quarter turns in which axes 1, 4 and 6 are: 0 from 0 to 90 deg, 1 from 90 to
@@ -250,9 +250,9 @@ def branch_of(conf: Value | None, joints: int) -> Branch | None:
         ranges[axis] = quarter * QUARTER - AT_A_QUARTER, (quarter + 1) * QUARTER + AT_A_QUARTER
     sides = round(given[3])
     if not 0 <= sides <= 7:
-        return Branch(ranges)
+        return MeantSolution(ranges)
     ranges[4] = (-np.inf, AT_A_QUARTER) if sides & 1 else (-AT_A_QUARTER, np.inf)
-    return Branch(ranges, bool(sides & 4), bool(sides & 2))
+    return MeantSolution(ranges, bool(sides & 4), bool(sides & 2))
 
 
 def quarters_of(joints: Reals) -> tuple[int, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from er3a.programs.language import SIX_ANGLES, Language
+from er3a.programs.program_language import SIX_ANGLES, Language
 from er3a.programs.rapid.dialect import RapidDialect
 from er3a.programs.rapid.reader import read_rapid
 from er3a.programs.rapid.writer import RapidWriter
