@@ -33,6 +33,7 @@ from er3a.pipeline.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from er3a.calibration.observations import Measurement
+    from er3a.calibration.outcomes import PlacementName
     from er3a.robots.robot import Robot
 
 
@@ -151,7 +152,9 @@ def mesh(
     print(f"they stand out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
-def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[str], as_json: bool) -> None:
+def _print_plan(
+    arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[PlacementName], as_json: bool
+) -> None:
     from er3a.calibration.plan import plan
     from er3a.pipeline.messages.calibration import plan_lines, plan_record
 
