@@ -433,10 +433,12 @@ def _layers(robot: Robot, path: PathSummary, rows: PathChecks, repaired: Avoidan
     if not reached.all():
         out = np.where(reached[:, None], np.nan, rows.xyz_mm)[kept]
         yield Layer(tr("not reachable"), "line", out, "#888888", 6.0)
-    for part in path.collisions:
+    faults: list[tuple[Stretch[Any], str, str]] = [(part, "fail", tr("collision")) for part in path.collisions]
+    faults += [(part, "caution", tr("outside a joint limit")) for part in path.out_of_limits]
+    for part, status, name in faults:
         during = kept[(rows.t_s[kept] >= part.t0_s) & (rows.t_s[kept] <= part.t1_s)]
         if len(during):
-            yield Layer(tr("collision"), "line", rows.xyz_mm[during], VERDICTS["fail"], 6.0)
+            yield Layer(name, "line", rows.xyz_mm[during], VERDICTS[status], 6.0)
     if len(repaired):
         yield Layer(tr("repaired"), "line", repaired.xyz_mm, MODEL, 2.5)
     q = meant(robot, rows.q_deg)

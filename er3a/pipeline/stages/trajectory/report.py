@@ -30,6 +30,7 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,
     BodiesOverlap,
+    LimitsUsed,
     NearThresholds,
     PathChecks,
     PathSummary,
@@ -123,7 +124,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
         links = _programs(results.programs.take((results.programs.path == path.name) & (i < count)))
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
-        sections.append(_section(path, rows, drawn, links))
+        sections.append(_section(path, rows, drawn, links, summary.joint_limits))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -191,7 +192,7 @@ def _programs(rows: ProgramFiles) -> list[ProgramLink]:
 
 
 def _section(
-    path: PathSummary, rows: PathChecks, figure: PathDrawing | None, programs: list[ProgramLink]
+    path: PathSummary, rows: PathChecks, figure: PathDrawing | None, programs: list[ProgramLink], limits: LimitsUsed
 ) -> PathSection:
     return PathSection(
         path=path,
@@ -201,7 +202,7 @@ def _section(
         text=path_text(path),
         advice=advice(path),
         branches=[branch_word(label) for label in path.branches],
-        speed=_speed(path),
+        speed=_speed(path, limits),
         events=[_event_row(path.name, event) for event in path.singularities],
         faults=_faults(path),
         strategies=_strategies(path),
@@ -339,11 +340,14 @@ def _conclusion(path: PathSummary, rows: PathChecks) -> str:
     return " ".join(parts)
 
 
-def _speed(path: PathSummary) -> str:
-    joint = path.fastest_joint
-    if not path.max_joint_speed_deg_s or joint is None:
+def _speed(path: PathSummary, limits: LimitsUsed) -> str:
+    """The speed of the joint that comes nearest to its limit."""
+    speeds = path.max_joint_speed_deg_s
+    if not speeds:
         return "–" if not path.joint_speed_bounded and path.verdict == "unreachable" else tr("unbounded")
-    return f"{number(path.max_joint_speed_deg_s[joint], 3)} (J{joint + 1})"
+    joint = max(range(len(speeds)), key=lambda j: speeds[j] / limits.speed_deg_s[j])
+    unit = " mm/s" if joint + 1 in path.sliding else ""
+    return f"{number(speeds[joint], 3)}{unit} (J{joint + 1})"
 
 
 def _event_row(path: str, event: Singularity) -> list[str]:
