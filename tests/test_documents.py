@@ -40,7 +40,7 @@ PLACEHOLDERS = {"NAME", "FILE", "ROBOT", "OLD", "NEW", "..."}
 # Lines that need no study are run below, in this order, each with what stands there for a name that the page gives.
 STANDS_FOR = {
     "export-urdf": {"my_arm": "er3_600"},
-    "import-urdf": {},
+    "import-urdf": {"their_arm.urdf": "my_arm.urdf"},
     "teach": {"ROBOT": "data/robots/er3_600.yaml", "FILE": "data/robots/er3_600.yaml"},
     "mesh": {},
     "check": {"FILE": "data/paths/er3a_c60.yaml", "文件": "data/paths/er3a_c60.yaml"},

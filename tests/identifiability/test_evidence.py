@@ -313,8 +313,7 @@ def poses(random: np.random.Generator, count: int) -> np.ndarray:
 @pytest.mark.long
 def test_a_tracker_settles_a_foreign_arm_but_for_how_its_flange_is_turned(random):
     robot, stated = puma(), tracked(puma(), poses(random, 20), 0.1)
-    expected = dict.fromkeys(("a2", "d4", "alpha1", "offset3", "alpha4"), ("settled",))
-    expected |= dict.fromkeys(("direction2", "direction5"), SETTLED)
+    expected = dict.fromkeys(("direction2", "direction5", "a2", "d4", "alpha1", "offset3", "alpha4"), SETTLED)
     expected |= dict.fromkeys(("d2", "d3"), ("gauge",))
     expected |= dict.fromkeys(("offset6", "alpha6", "direction6"), ("open", "weak"))
     found = evidence_of(robot, stated, Documents(), only=tuple(expected))
@@ -395,7 +394,7 @@ def test_derived_documents_prove_nothing(random):
     """The same tracker once as a document of its own, once with an ancestor in common with the table's."""
     robot = puma().replace(origins={entry.name: "manual" for entry in entries_of(puma())})
     stated = tracked(robot, poses(random, 12), 0.1)
-    for parents, status in (((), "settled"), (("drawing",), "consistent")):
+    for parents, statuses in (((), SETTLED), (("drawing",), ("consistent",))):
         documents = Documents.of(
             [
                 Document("drawing", "a drawing", "a maker"),
@@ -403,7 +402,7 @@ def test_derived_documents_prove_nothing(random):
                 Document("tracker", "a tracker", "a laboratory", parents),
             ]
         )
-        assert evidence_of(robot, stated, documents, only=["a2"])["a2"].status == status
+        assert evidence_of(robot, stated, documents, only=["a2"])["a2"].status in statuses
 
 
 def test_a_table_that_names_an_unknown_document_is_refused():
