@@ -180,7 +180,7 @@ class LeftOut:
 
     subject: LeftOutSubject
     names: tuple[str, ...] = ()
-    amount: float | None = None
+    amount: int | float | None = None
 
 
 @dataclass(frozen=True)
