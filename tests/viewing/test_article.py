@@ -15,6 +15,7 @@ import pytest
 import yaml
 from roboticstoolbox import DHRobot, RevoluteDH, RevoluteMDH
 
+import er3a
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.article.article_numbers import EXAMPLE, ReachCheck, agreements, article_numbers
 from er3a.pipeline.article.article_page import write_article
@@ -191,5 +192,7 @@ def test_both_arms_stand_in_the_player(pages):
     assert [motion["name"] for motion in shown["motions"]] == ["article_joint", "article_line", "joint_1"]
     assert [len(motion["values"]) for motion in shown["motions"]] == [2, 2, 2]
     assert [sign["text"] for sign in shown["signs"]] == ["as printed", "offset 2 = −90°"]
-    for text in shown["motions"][1]["values"]:  # both begin with all joints at 0
-        np.testing.assert_allclose(np.frombuffer(base64.b64decode(text), "<f4")[:6], 0, atol=1e-6)
+    arms = [load_robot(name) for name in ("er3a_c60_article", "er3a_c60_article_offset2")]
+    q = [np.frombuffer(base64.b64decode(text), "<f4")[:6] for text in shown["motions"][1]["values"]]
+    starts = [er3a.forward(arm, own)[2, 3] for arm, own in zip(arms, q)]
+    assert starts == pytest.approx([-0.60744, 0.81977], abs=1e-4)
