@@ -19,6 +19,7 @@ LIMITS = (ROBOTS.parent / "manual_refs/er3_600/limits.csv").read_text(encoding="
 D_MM, TITLE = "d_mm: 367.5", ROBOT.split("title: ")[1].split("\n")[0]
 
 
+@pytest.mark.long
 def test_sound_files_are_accepted_and_read_as_they_are_written(tmp_path):
     for name, content in seeds():
         path = tmp_path / name

@@ -136,6 +136,7 @@ def test_a_term_that_is_there_is_found_and_no_other(name, term, random):
     assert found.beyond.residuals.is_noise
 
 
+@pytest.mark.long
 def test_sag_under_the_arm_s_own_weight_is_told_from_a_load_at_the_tool(random):
     robot = load_robot("er3a_c60")
     q = random.uniform(np.maximum(robot.lower, -2), np.minimum(robot.upper, 2), (200, 6))

@@ -87,6 +87,7 @@ def scene_about(robot: Robot, random: np.random.Generator) -> Scene:
     return Scene("two", tuple(solids))
 
 
+@pytest.mark.long
 def test_quill_that_slides_down_meets_the_floor_where_it_says():
     sliding = np.array([False, False, True, False])
     reach = np.array([2.5, 2.5, 0.3, 3.1])

@@ -88,6 +88,7 @@ def test_a_joint_reversed_about_an_angle_stands_there_as_before_and_mirrored_bes
     assert flip.entries == (f"direction{joint}", f"offset{joint}")
 
 
+@pytest.mark.long
 def test_joints_reversed_that_no_document_fixes_are_still_open():
     found = about(turned(load_robot("er3_600"), 1, 4, 5), "direction1", "direction4", "direction5")
     assert {each.status for each in found.entries if each.entry.startswith("direction")} == {"open"}

@@ -64,6 +64,7 @@ def test_many_tables_have_the_frames_of_one(data, robot):
     np.testing.assert_allclose(T[0], frames(robot.without_tool(), q), rtol=0, atol=1e-12)
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(robot=chains())
 def test_no_sample_leaves_the_bound_and_single_precision_follows_double(robot):

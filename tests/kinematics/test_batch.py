@@ -26,6 +26,7 @@ def assert_solves(robot, T, solved):
     np.testing.assert_array_equal(solved.within_limits, solved.solved & within(robot, solved.q))
 
 
+@pytest.mark.long
 def test_the_careful_solver_agrees(robot, random):
     q = joints_at_random(robot, random, 5000)
     T, q_ref = forward(robot, q), joints_at_random(robot, random, 5000)

@@ -63,6 +63,7 @@ def test_singular_poses_are_solved(robot, random, kind):
     assert max(part.max(initial=0) for part in errors) < 1.1e-9
 
 
+@pytest.mark.long
 def test_jacobian_of_the_error_is_its_derivative(robot, random):
     """Lane k of the scratch memory holds the arm with joint k moved a little."""
     arm = robot.direction, robot.offset, constant_links(robot)
@@ -159,6 +160,7 @@ def test_nearest_arm_of_an_unreachable_pose_is_near(robot):
     assert found.position_error == pytest.approx(50 - forward(robot, found.q)[2, 3], abs=1e-3)
 
 
+@pytest.mark.long
 def test_iteration_finds_what_the_class_of_the_arm_knows(random):
     arm = make_arm(**UR5)
     for q in joints_at_random(arm, random, 5):

@@ -137,6 +137,7 @@ def margins_at(T: np.ndarray, slot_angles: np.ndarray, near: np.ndarray) -> np.n
     return np.array(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("with_start", [True, False])
 def test_seven_joints_follow_a_line_and_keep_margin(with_start):
     q = np.radians([20, 40, -30, -80, 25, 60, 10])

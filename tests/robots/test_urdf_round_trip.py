@@ -228,6 +228,7 @@ def test_pairs_of_links_are_judged_as_before_after_export_and_import(name, tmp_p
     assert judged(import_urdf(exported(robot, tmp_path)).robot) == judged(robot)
 
 
+@pytest.mark.long
 def test_bodies_beside_those_that_a_joint_holds_are_no_error_of_the_shapes(tmp_path):
     """Housings drawn as cylinder and balls that make no capsule."""
     path = exported(load_robot("er3a_c60"), tmp_path)

@@ -62,6 +62,7 @@ def test_the_stages_say_so(small_results):
     assert list(shapes.near) == near
 
 
+@pytest.mark.long
 def test_a_wider_margin_turns_a_pass_into_a_caution():
     study = load_study("config/small.yaml")
     quick = study.collision.model_copy(update={"samples": 1000, "cells_across": 4, "rounds": 0})

@@ -36,6 +36,7 @@ def catalogue():
         return {(entry.context, *_forms(entry.id)): entry for entry in read_po(file) if entry.id}
 
 
+@pytest.mark.long
 def test_the_chinese_catalogue_has_the_texts_of_the_code_and_no_others(catalogue):
     with (ROOT / "er3a/pipeline/messages/locale/babel.cfg").open() as file:
         methods, options = parse_mapping_cfg(file)

@@ -106,6 +106,7 @@ def test_repeatability_after_iso_9283_comes_back_from_its_deviation():
     assert distance.mean() + 3 * distance.std() == pytest.approx(1e-4, rel=2e-3)
 
 
+@pytest.mark.long
 def test_an_object_is_graspable_only_at_the_probability_asked_for(cell):
     made, robot, _ = cell
     if made is not FIXED:
