@@ -36,12 +36,19 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
 from er3a.planning.follow import Followed, follow
-from er3a.planning.intervals import Interval, RateCause, RateLimit, rate_interval
+from er3a.planning.motion_faults import (
+    ELBOW_JOINT,
+    WRIST_JOINT,
+    Interval,
+    RateCause,
+    RateLimit,
+    factor_forms,
+    rate_interval,
+    singular_events,
+)
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, max_between, polynomial_motion
-from er3a.planning.polynomial_checks import ELBOW_JOINT, WRIST_JOINT, factor_forms
 from er3a.planning.profiles import TimeLaw, times_at
-from er3a.planning.singular_events import singular_events
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 

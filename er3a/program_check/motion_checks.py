@@ -23,7 +23,7 @@ from er3a.kinematics.singularity import NearSingular, determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import Followed
-from er3a.planning.intervals import (
+from er3a.planning.motion_faults import (
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
     Interval,
@@ -36,13 +36,13 @@ from er3a.planning.intervals import (
     limit_sides,
     out_of_limits,
     rates_exceeded,
+    singular_events,
     unreachable,
 )
 from er3a.planning.moves import Segment, line
 from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.profiles import trapezoid
 from er3a.planning.sequences import TURN_LENGTH, Arc, arc
-from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
 from er3a.program_check.program_check_findings import (

@@ -23,7 +23,7 @@ from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import follow
-from er3a.planning.intervals import OVER
+from er3a.planning.motion_faults import OVER
 from er3a.planning.moves import JointMove, line
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Wanted, follow_and_prove, jerk_intervals

@@ -19,8 +19,8 @@ from er3a.planning.avoidance.singular_segment import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare, deviation
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.follow import follow
+from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
-from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import within
 

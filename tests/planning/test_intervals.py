@@ -12,9 +12,16 @@ from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.solutions import WristTooFar
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.follow import follow
-from er3a.planning.intervals import AboveLimit, TooFast, out_of_limits, rates_exceeded, unreachable
+from er3a.planning.motion_faults import (
+    AboveLimit,
+    TooFast,
+    limit_intervals,
+    out_of_limits,
+    rate_intervals,
+    rates_exceeded,
+    unreachable,
+)
 from er3a.planning.moves import JointMove, line
-from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
 from er3a.planning.sequences import arc
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_proof import Wanted, follow_and_prove

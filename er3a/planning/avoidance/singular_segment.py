@@ -13,7 +13,7 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.runs import runs
 from er3a.planning.avoidance.avoidance_findings import NotPossible
 from er3a.planning.follow import Followed
-from er3a.planning.singular_events import SingularEvent
+from er3a.planning.motion_faults import SingularEvent
 from er3a.planning.timing import JointLimits, Timed, fastest, nodes_along, straight
 from er3a.robots.robot import Robot
 

@@ -23,21 +23,25 @@ from er3a.pipeline.stages.trajectory.model import (
     PairTouches,
 )
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.planning.intervals import (
+from er3a.planning.motion_faults import (
     AccelerationTooGreatIfAssumed,
+    GreatestRates,
     Interval,
     LimitCause,
+    LimitCheck,
     PathOutOfReach,
     RateCause,
+    RateCheck,
+    SingularCheck,
+    SingularEvent,
     TooFastIfAssumed,
     out_of_limits,
     rates_exceeded,
+    singular_events,
     unreachable,
 )
 from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
 from er3a.planning.piecewise import Polynomials
-from er3a.planning.polynomial_checks import GreatestRates, LimitCheck, RateCheck, SingularCheck
-from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Undecided, jerk_intervals
 from er3a.robots.joint_limits import shown
