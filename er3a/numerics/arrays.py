@@ -1,4 +1,4 @@
-"""Short names for the types of arrays."""
+"""Arrays: short names for their types, how kernels take them, stretches of True in them."""
 
 from __future__ import annotations
 
@@ -22,3 +22,9 @@ def for_kernel(array: NDArray[Number]) -> NDArray[Number]:
     view = np.ascontiguousarray(array).view()
     view.setflags(write=False)
     return view
+
+
+def runs(flags: Flags) -> list[tuple[int, int]]:
+    """Index ranges (first, behind the last) of the stretches of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -39,8 +39,7 @@ from er3a.kinematics.singularity import (
 )
 from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots, wrist_partitioned_arm
-from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.runs import runs
+from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed, parabolas
 from er3a.planning.piecewise import Pieces, PiecewiseMotion, Polynomials, Stretch
 from er3a.robots.joint_limits import CombinationExceeded, SlideExceeded

@@ -33,8 +33,7 @@ from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.singularity import TYPES, NearSingular, SingularityType, characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing
-from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.runs import runs
+from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed, follow
 from er3a.planning.motion_faults import (
     ELBOW_JOINT,

@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from er3a.kinematics.singularity import NearSingular
-from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.runs import runs
+from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.avoidance.avoidance_findings import NotPossible
 from er3a.planning.follow import Followed
 from er3a.planning.motion_faults import SingularEvent
