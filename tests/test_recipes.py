@@ -395,7 +395,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.classes.links import inverse_rigid, poses_of
+from er3a.kinematics.chain import inverse_rigid, poses_of
 from er3a.numerics.arrays import Reals
 
 MISSED = 1e-6

@@ -32,8 +32,7 @@ import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.geometry.transforms import as_floats, check_poses
-from er3a.kinematics.chain import arm_length, constant_links, joint_starts
-from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
+from er3a.kinematics.chain import arm_length, constant_links, joint_starts, multiply_rigid, post_rotate_z
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.solutions import (
     BadGuess,

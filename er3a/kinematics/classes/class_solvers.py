@@ -13,9 +13,9 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 
 from er3a.geometry.vectors import TURN
+from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angles_of, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
-from er3a.kinematics.classes.links import axes_of, poses_of, size_of
 from er3a.kinematics.classes.parallel_axes import ThreeParallel
 from er3a.kinematics.classes.scara import Gantry, Scara, solve_gantry, solve_scara
 from er3a.kinematics.classes.self_motion import PoseChain
