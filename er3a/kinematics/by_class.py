@@ -16,7 +16,6 @@ from typing import overload
 import numpy as np
 
 from er3a.errors import ShapeError
-from er3a.geometry.transforms import as_floats
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links, joint_starts, row_values, size_of
 from er3a.kinematics.classes.arm_angle import is_out_of_reach
@@ -34,7 +33,7 @@ from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseC
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
 from er3a.kinematics.forward import forward
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import kernel
 from er3a.numerics.threads import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within

@@ -464,9 +464,28 @@ def rates_exceeded(
     return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-def unreachable(followed: Followed) -> list[Interval[PathOutOfReach]]:
+def jerk_exceeded(times: Reals, jerk: Reals, steps: tuple[Reals, Reals], limit: RateLimit) -> list[Interval[RateCause]]:
+    """Where joints exceed a limit of jerk; a step of the acceleration exceeds any.
+
+    Parameters
+    ----------
+    times, jerk : ends (m + 1,) of intervals, s, and what is met in each, (m, n)
+    steps : times (k,), s, at which the acceleration steps, and by how much, (k, n)
+    """
+    found: list[Interval[RateCause]] = []
+    for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
+        size = np.abs(jerk[:, j])
+        for first, last in runs(size > limit.allowed[j]):
+            stretch = float(times[first]), float(times[last])
+            found.append(rate_interval(limit, j, *stretch, float(size[first:last].max())))
+        for k in np.flatnonzero(np.abs(steps[1][:, j]) > limit.step_allowed[j]).tolist():
+            found.append(rate_interval(limit, j, float(steps[0][k]), float(steps[0][k]), np.inf))
+    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
+
+
+def unreachable(robot: Robot, followed: Followed) -> list[Interval[PathOutOfReach]]:
     """Where no branch of the closed form reaches the pose, with the distance that is missing at the worst point."""
-    robot, found = followed.robot, []
+    found = []
     for first, last in runs(np.isnan(followed.q[:, 0])):
         poses = followed.line.poses(followed.progress[first:last])
         gap = solve_slots(robot, poses, np.zeros((len(poses), 6)))[2]

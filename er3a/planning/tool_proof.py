@@ -39,10 +39,8 @@ from er3a.planning.motion_faults import (
     ELBOW_JOINT,
     WRIST_JOINT,
     Interval,
-    RateCause,
     RateLimit,
     factor_forms,
-    rate_interval,
     singular_events,
 )
 from er3a.planning.moves import ToolPath
@@ -223,19 +221,6 @@ def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
     for part in done:
         part.open[:, RATES] &= ~broken[RATES]
     return _proof(followed, done, singular)
-
-
-def jerk_intervals(proof: ToolProof, limit: RateLimit) -> list[Interval[RateCause]]:
-    """Where joints exceed a limit of jerk; a step of the acceleration exceeds any."""
-    found: list[Interval[RateCause]] = []
-    for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
-        size = np.abs(proof.jerk[:, j])
-        for first, last in runs(size > limit.allowed[j]):
-            stretch = float(proof.times[first]), float(proof.times[last])
-            found.append(rate_interval(limit, j, *stretch, float(size[first:last].max())))
-        for k in np.flatnonzero(np.abs(proof.steps[1][:, j]) > limit.step_allowed[j]).tolist():
-            found.append(rate_interval(limit, j, float(proof.steps[0][k]), float(proof.steps[0][k]), np.inf))
-    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
 def _acceleration_steps(followed: Followed) -> tuple[Reals, Reals]:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.errors import Er3aError, ShapeError
-from er3a.geometry.transforms import as_floats, check_poses, rpy_of
-from er3a.numerics.arrays import Reals
+from er3a.geometry.transforms import check_poses, rpy_of
+from er3a.numerics.arrays import Reals, as_floats
 from er3a.planning.moves import JointMove, line
 from er3a.robots.usable import warn_of_degrees
 

@@ -393,7 +393,7 @@ def _followed_moments(
     arm = way.arm
     found: dict[CheckFinding, float] = {
         WayOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
-        for stretch in unreachable(followed)
+        for stretch in unreachable(arm, followed)
     }
     for jump in followed.jumps:
         amount, slides = joint_shown(arm, jump.joint - 1, jump.angle)

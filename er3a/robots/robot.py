@@ -13,8 +13,8 @@ import numpy as np
 
 from er3a.by_value import ByValue, Displayed, ReadOnly, Sheet, shortly
 from er3a.errors import InputWarning, RobotError, ShapeError
-from er3a.geometry.transforms import as_floats, rpy_of
-from er3a.numerics.arrays import Flags, Reals
+from er3a.geometry.transforms import rpy_of
+from er3a.numerics.arrays import Flags, Reals, as_floats
 from er3a.robots.masses import Masses
 
 MOST_JOINTS = 10

@@ -89,7 +89,7 @@ def test_short_stretch_out_of_reach_between_check_points_is_found():
         inside, outside = (x, outside) if reached else (inside, x)
     path, even = across(inside + 2e-5), np.linspace(0, 1, 20)
     assert np.isfinite(follow(robot, path, even).joints(even)).all()
-    (interval,) = unreachable(follow(robot, path, even))
+    (interval,) = unreachable(robot, follow(robot, path, even))
     y = path.poses(path.progress(np.array([interval.start, interval.end]))[0])[:, 1, 3]
     assert y[0] == pytest.approx(-y[1], abs=1e-9)
     reach = inside - 0.0785  # the wrist centre's greatest distance from axis 1 at this height
