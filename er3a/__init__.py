@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from er3a.kinematics.singularity import conditioning as conditioning
     from er3a.pipeline.viewing.plot import plot as plot
     from er3a.planning.follow import follow as follow
+    from er3a.planning.moves import ctraj as ctraj
+    from er3a.planning.moves import jtraj as jtraj
     from er3a.planning.moves import line as line
-    from er3a.planning.toolbox import ctraj as ctraj
-    from er3a.planning.toolbox import jtraj as jtraj
-    from er3a.planning.toolbox import rpy as rpy
+    from er3a.planning.moves import rpy as rpy
     from er3a.program_check.check_program import CheckOptions as CheckOptions
     from er3a.program_check.check_program import check_program as check_program
     from er3a.programs.languages import read_program as read_program
@@ -64,9 +64,9 @@ _PUBLIC = {
     "inverse_batch": "er3a.kinematics.batch",
     "solve": "er3a.kinematics.numerical",
     "conditioning": "er3a.kinematics.singularity",
-    "rpy": "er3a.planning.toolbox",
-    "jtraj": "er3a.planning.toolbox",
-    "ctraj": "er3a.planning.toolbox",
+    "rpy": "er3a.planning.moves",
+    "jtraj": "er3a.planning.moves",
+    "ctraj": "er3a.planning.moves",
     "line": "er3a.planning.moves",
     "follow": "er3a.planning.follow",
     "plot": "er3a.pipeline.viewing.plot",
