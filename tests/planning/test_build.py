@@ -14,8 +14,7 @@ from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
-from er3a.planning.build import build
-from er3a.planning.commands import CommandSource
+from er3a.planning.commands import CommandSource, build
 
 HEAD = {"name": "path", "title": "A path", "samples": 20}
 DOWN = [180, 0, 0]
