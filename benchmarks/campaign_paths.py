@@ -15,7 +15,7 @@ from er3a import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from er3a.planning.avoidance.singular_segment import singular_segment
+from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import singular_events

@@ -293,7 +293,7 @@ def _sense(axis: Reals, wanted: Reals | None) -> float:
 
 
 def rpy(T: Reals) -> Reals:
-    """Roll, pitch, yaw of poses: ``R = Rz(yaw) @ Ry(pitch) @ Rx(roll)``, as ``tr2rpy(T, 'zyx')`` gives them [1]_.
+    """Roll, pitch, yaw of poses: ``R = Rz(yaw) @ Ry(pitch) @ Rx(roll)``, as ``tr2rpy(T, 'zyx')`` gives them [2]_.
 
     Parameters
     ----------
@@ -315,7 +315,7 @@ def rpy(T: Reals) -> Reals:
 def jtraj(
     q_start: Reals, q_end: Reals, t: Reals, velocities: tuple[Reals, Reals] | None = None
 ) -> tuple[Reals, Reals, Reals]:
-    """Joint values on a quintic from one arm to another [1]_.
+    """Joint values on a quintic from one arm to another [2]_.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
-from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
+from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.motion_faults import Interval, SingularEvent
