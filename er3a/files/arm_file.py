@@ -10,7 +10,7 @@ from er3a.errors import InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.robot_library import load_robot, robot_of
 from er3a.formats.urdf import urdf_table
-from er3a.formats.xacro import plain_urdf
+from er3a.formats.urdf_tree import plain_urdf
 from er3a.robots.robot import Convention, Robot, robot_name
 
 READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
@@ -43,7 +43,7 @@ def read_arm(
     convention : of a D-H table; a column ``convention`` in it counts more
     length_unit, angle_unit : of a D-H table whose columns are named mm and deg all the same; with no ``length_unit``
         it is what the lengths can be
-    base, tip, xacro : of a URDF, as :func:`er3a.import_urdf` and ``er3a.formats.xacro`` have them
+    base, tip, xacro : of a URDF, as :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree`` have them
 
     Raises
     ------

@@ -63,7 +63,7 @@ def import_urdf(
     from er3a.files.robot_writer import write_robot
     from er3a.files.urdf_references import write_urdf_references
     from er3a.formats.urdf import import_urdf as read_urdf
-    from er3a.formats.xacro import plain_urdf
+    from er3a.formats.urdf_tree import plain_urdf
     from er3a.robots.robot import robot_name
 
     with shown_work(f"{file}: the arm is read") as at, plain_urdf(file, xacro or ()) as plain:

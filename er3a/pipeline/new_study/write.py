@@ -23,8 +23,7 @@ from er3a.files.shipped import ROOT
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.formats.mesh_file import read_text
 from er3a.formats.urdf import import_urdf
-from er3a.formats.urdf_tree import Split
-from er3a.formats.xacro import plain_urdf
+from er3a.formats.urdf_tree import Split, plain_urdf
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.new_study.tasks import LEAST_TARGETS, Spot, TaskSearch, reach_of, scenes
 from er3a.pipeline.settings import TrajectorySettings
