@@ -48,15 +48,16 @@ from er3a.workspace.orientations import AskedOrientations, asked_of
 from er3a.workspace.placement import (
     MIXED,
     NO,
+    BoxPlacement,
     Free,
     Task,
     box_points,
+    find_places,
     lattice_size,
     limited_joints,
     narrowed,
     serving_arms,
 )
-from er3a.workspace.placement_proof import BoxPlacement, find_places
 from er3a.workspace.proven import Proven
 from er3a.workspace.section_proof import ring_volumes
 from er3a.workspace.tool_inverse import (
