@@ -12,9 +12,11 @@ from pydantic import Field, model_validator
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals, wrapped
 from er3a.errors import InputError, InputWarning
 from er3a.files.dh_table import read_dh_table
-from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields, masses_of
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import (
+    HEAVIEST_PAYLOAD_KG,
+    IMPOSSIBLE,
+    BodyFields,
     CombinedLimitRow,
     Envelopes,
     JointLimitRow,
@@ -23,6 +25,7 @@ from er3a.files.robot_file import (
     Placement,
     RobotFile,
     coupling_matrix,
+    masses_of,
 )
 from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.units import Triple
