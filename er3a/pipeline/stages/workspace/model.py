@@ -19,10 +19,10 @@ from er3a.sampling.tally import ReachExtremes
 from er3a.workspace.capability import Overall
 from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
+from er3a.workspace.general_proof import Surface
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.proven import ProofMethod
 from er3a.workspace.single_changes import SingleChange
-from er3a.workspace.surface import Surface
 from er3a.workspace.tool_inverse import MapsMissing
 from er3a.workspace.voids import VoidKind
 
@@ -36,7 +36,7 @@ class Flat:
 
 @dataclass(frozen=True)
 class OnSurface:
-    """The tool point moves on a surface; its area as :class:`er3a.workspace.surface.Surface` has it."""
+    """The tool point moves on a surface; its area as :class:`er3a.workspace.general_proof.Surface` has it."""
 
     surface: Surface
     code: Literal["workspace.on_surface"] = "workspace.on_surface"
