@@ -219,8 +219,7 @@ def calibrate(
         write_robot(corrected, output)
     distances = found.distances_mm(others) if others else None
     if html or rrd:
-        from er3a.pipeline.viewing.calibration import measured_errors, write_calibration
-        from er3a.pipeline.viewing.calibration_recording import record_calibration
+        from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
     if html:
         command, files = ["er3a", *sys.argv[1:]], [given for given in (Path(robot), file) if given and given.is_file()]
         shown = partial(write_calibration, command=command, files=files, corrected=corrected, recording=rrd)
