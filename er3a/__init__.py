@@ -44,10 +44,10 @@ if TYPE_CHECKING:
     from er3a.programs.languages import write_program as write_program
     from er3a.programs.machine import execute as execute
     from er3a.programs.writing import WriteOptions as WriteOptions
-    from er3a.robots.conventions import to_modified as to_modified
-    from er3a.robots.conventions import to_standard as to_standard
     from er3a.robots.masses import Load as Load
     from er3a.robots.robot import Robot as Robot
+    from er3a.robots.robot import to_modified as to_modified
+    from er3a.robots.robot import to_standard as to_standard
     from er3a.selection.select import select as select
     from er3a.selection.sequence import select_sequence as select_sequence
     from er3a.vision.calibration_set import CalibrationSet as CalibrationSet
@@ -89,8 +89,8 @@ _PUBLIC = {
     "calibrate_hand_eye": "er3a.vision.hand_eye",
     "compare": "er3a.comparison.compare",
     "Comparison": "er3a.comparison.compare",
-    "to_modified": "er3a.robots.conventions",
-    "to_standard": "er3a.robots.conventions",
+    "to_modified": "er3a.robots.robot",
+    "to_standard": "er3a.robots.robot",
     "import_urdf": "er3a.formats.urdf",
     "export_urdf": "er3a.formats.urdf",
     "read_program": "er3a.programs.languages",

@@ -32,9 +32,18 @@ from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import rot_x, rot_y, transform, translation
 from er3a.numerics.arrays import Reals
-from er3a.robots.conventions import to_standard
 from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
-from er3a.robots.robot import CombinedLimit, Convention, ConvexPiece, Envelope, Grade, Robot, Source, robot_name
+from er3a.robots.robot import (
+    CombinedLimit,
+    Convention,
+    ConvexPiece,
+    Envelope,
+    Grade,
+    Robot,
+    Source,
+    robot_name,
+    to_standard,
+)
 
 ROBOTS = ROOT / "data" / "robots"
 REFERENCES = ROOT / "data" / "manual_refs"
