@@ -14,8 +14,8 @@ from typing import assert_never
 import numpy as np
 
 from er3a.errors import InputError, PathError, PoseError
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
+from er3a.kinematics.solutions import branch_labels
 from er3a.numerics.arrays import Reals
 from er3a.planning.moves import JointMove, Segment, ToolPath, line, rotation_between
 from er3a.planning.profiles import Ends, Times
@@ -43,7 +43,7 @@ class Start:
 
     Attributes
     ----------
-    branch : code of the branch to begin on (:mod:`er3a.kinematics.configuration`); only with a pose
+    branch : code of the branch to begin on (:mod:`er3a.kinematics.solutions`); only with a pose
     """
 
     joints: Reals | None = None

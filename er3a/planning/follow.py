@@ -83,7 +83,7 @@ class Branches:
 
     @property
     def meeting(self) -> Integers:
-        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in a branch met."""
+        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.solutions`) that differ in a branch met."""
         bits: Integers = self.free_wrist + 2 * self.straight + 4 * (self.free_shoulder | self.beside)
         return bits
 

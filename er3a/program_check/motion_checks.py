@@ -17,9 +17,9 @@ from er3a.by_value import ByValue
 from er3a.collision.along import RateBounds
 from er3a.errors import NotWristPartitionedError, PoseError
 from er3a.geometry.vectors import wrap_to_pi
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular, determinant_factors
+from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import Followed

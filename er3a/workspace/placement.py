@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from er3a.kinematics.block_inverse import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
-from er3a.kinematics.configuration import slot_labels
+from er3a.kinematics.solutions import slot_labels
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel

@@ -381,7 +381,7 @@ def _turned_back(v: Reals, axis: Reals, angle: float) -> Reals:
 def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]:
     """Names of the slots ``4 shoulder + 2 elbow + wrist``.
 
-    As :func:`er3a.kinematics.configuration.branch_labels`: *front* is where the wrist is in the zero pose; *up*: with
+    As :func:`er3a.kinematics.solutions.branch_labels`: *front* is where the wrist is in the zero pose; *up*: with
     the arm stretched out level on that side the elbow is above the line from shoulder to wrist.
     """
     names = []

@@ -14,10 +14,10 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps, PairTooNear
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, factors_where_defined
+from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated

@@ -18,7 +18,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.kinematics.by_class import parameters_of
-from er3a.kinematics.configuration import slot_labels
+from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
