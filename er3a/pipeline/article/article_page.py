@@ -30,8 +30,8 @@ from er3a.pipeline.stages.trajectory.model import PathChecks
 from er3a.pipeline.study import ArticleTables, Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import house_style
-from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.page import stage_head
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 from er3a.workspace.single_changes import SingleChange
