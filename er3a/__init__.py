@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from er3a.robots.robot import to_modified as to_modified
     from er3a.robots.robot import to_standard as to_standard
     from er3a.selection.select import select as select
-    from er3a.selection.sequence import select_sequence as select_sequence
+    from er3a.selection.select import select_sequence as select_sequence
     from er3a.vision.calibration_set import CalibrationSet as CalibrationSet
     from er3a.vision.hand_eye import calibrate_hand_eye as calibrate_hand_eye
 
@@ -71,7 +71,7 @@ _PUBLIC = {
     "follow": "er3a.planning.follow",
     "plot": "er3a.pipeline.viewing.plot",
     "select": "er3a.selection.select",
-    "select_sequence": "er3a.selection.sequence",
+    "select_sequence": "er3a.selection.select",
     "torques": "er3a.dynamics.torques",
     "mass_matrix": "er3a.dynamics.torques",
     "gravity": "er3a.dynamics.torques",
