@@ -55,8 +55,8 @@ from er3a.pipeline.stages.validation.model import (
     ValidationResults,
     ValidationSummary,
     WholeGroup,
+    model_of,
 )
-from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.stages.validation.verdict import (
     SHOWN_DECIMALS,
     counts_of,

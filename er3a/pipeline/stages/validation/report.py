@@ -35,8 +35,8 @@ from er3a.pipeline.stages.validation.model import (
     Unjudged,
     ValidationResults,
     ValidationSummary,
+    model_of,
 )
-from er3a.pipeline.stages.validation.subject import model_of
 from er3a.pipeline.stages.validation.validation_figures import (
     axis_deviation,
     corrected_robot,
