@@ -1,4 +1,4 @@
-"""How much more a motion could carry, and how much faster it could be, under the drives' torques.
+"""How much more a motion could carry, how much faster it could be, under the drives' torques and the wrist's limits.
 
 Torques are linear in the mass of a payload whose centre and radii of gyration stay, and quadratic in a scale of speed:
 gravity and Coulomb friction stay, viscous friction goes with it, inertia and velocity terms with its square [1]_. So
@@ -8,11 +8,10 @@ How far torques can be off because masses and centres are is linear, by the regr
 linear in each body's ten parameters p [2]_. A body's mass is off with its centre and radii of gyration kept, so p moves
 along itself; its centre is off with mass and inertia about it kept. Worst cases add.
 
-What a load asks of the wrist, against what the manufacturer allows, and the load diagram of manuals.
-
-A load of mass m whose centre is at distance L from a joint's axis asks for the moment ``m g L`` and the inertia
-``m L^2`` and its own about that axis [3]_. L is the greatest over all positions of the joints behind. Its own inertia
-counts with its greatest principal moment, but for the last axis, which it is fixed to.
+The wrist's limits and load diagram are the manufacturer's. A load of mass m whose centre is at distance L from a
+joint's axis asks for the moment ``m g L`` and the inertia ``m L^2`` and its own about that axis [3]_. L is the greatest
+over all positions of the joints behind. Its own inertia counts with its greatest principal moment, but for the last
+axis, which it is fixed to.
 
 References
 ----------

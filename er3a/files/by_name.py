@@ -1,4 +1,4 @@
-"""Diagnosis, evidence and calibration with names and paths of the files that they take."""
+"""Diagnosis, evidence, calibration and arms by names and paths of the files that they take."""
 
 from __future__ import annotations
 

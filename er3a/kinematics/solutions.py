@@ -1,9 +1,7 @@
 """What the inverse gives: joint solutions with their verdict, and why there are none where there are none.
 
-The eight branches of a wrist-partitioned arm: which one joint angles belong to, and their names.
-
-The slot is ``4 * shoulder + 2 * elbow + wrist``. Each part is the sign of one factor of the Jacobian's determinant, so
-that a branch can only change where the arm passes a singularity of that part:
+The eight branches of a wrist-partitioned arm are slots: ``4 * shoulder + 2 * elbow + wrist``. Each part is the sign of
+one factor of the Jacobian's determinant, so that a branch can only change where the arm passes a singularity of it:
 
 - shoulder 0: the wrist centre lies against ``w1 x w2``, as seen from axis 1 (w: axis directions, D-H sense);
 - elbow 0: the forearm is turned by 0 to pi from the upper arm about axis 2;

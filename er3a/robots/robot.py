@@ -1,6 +1,4 @@
-"""The frozen robot model that everything else takes.
-
-The same arm under the other Denavit-Hartenberg convention.
+"""The frozen robot model that everything else takes, and the same arm under the other Denavit-Hartenberg convention.
 
 The two conventions cut the same product of elementary transforms at other places, so the rows shift by one and nothing
 is approximated: a standard row's ``Tx(a) Rx(alpha)`` is the next modified row's ``Rx(alpha) Tx(a)`` (they commute).

@@ -1,14 +1,11 @@
-"""Ranking the solutions of one pose.
+"""Ranking the solutions of one pose, and choosing those of a sequence of poses that are best as a whole.
 
-Rules that rank joint solutions: each gives every solution a cost, the least of which is best.
+Rules that rank joint solutions each give every solution a cost, the least of which is best. Rules can be mixed as
+weighted sums. Then each rule's costs are stretched so that its best solution within the limits costs 0 and its worst 1,
+since degrees, seconds and millimetres don't add.
 
-Rules can be mixed as weighted sums. Then each rule's costs are stretched so that its best solution within the limits
-costs 0 and its worst 1, since degrees, seconds and millimetres don't add.
-
-Joint solutions for a sequence of poses that are best as a whole.
-
-Bellman's recursion over the solutions of each pose, turns included [1]_: the cost to reach a solution is the least,
-over those of the pose before, of its cost plus that of the move between the two.
+A sequence is chosen by Bellman's recursion over the solutions of each pose, turns included [1]_: the cost to reach a
+solution is the least, over those of the pose before, of its cost plus that of the move between the two.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""A model held against reference sets, number by number."""
+"""A model held against reference sets, number by number, and the verdict that a reader wants of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the stage's results hold."""
+"""What the stage's results hold, and which model of a robot they are of."""
 
 from __future__ import annotations
 
