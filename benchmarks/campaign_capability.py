@@ -17,8 +17,7 @@ from er3a.workspace.capability import rings
 from er3a.workspace.dexterous import dexterous_core
 from er3a.workspace.directions import from_polar, poses, roll_of, tool_rotations
 from er3a.workspace.interval_inverse import GOOD, NEVER, branches, theta_ranges
-from er3a.workspace.placement import NO, Task, fitting_places, narrowed, survey
-from er3a.workspace.placement_proof import choose_places, proven_bricks
+from er3a.workspace.placement import NO, Task, choose_places, fitting_places, narrowed, proven_bricks, survey
 from er3a.workspace.section_arm import section_arm
 from testing.evidence import sized
 

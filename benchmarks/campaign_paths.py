@@ -15,11 +15,11 @@ from er3a import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
-from er3a.planning.avoidance.singular_segment import singular_segment
+from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare
 from er3a.planning.follow import follow
+from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
-from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from testing.evidence import sized
 from testing.exact_paths import worst_location

@@ -34,22 +34,22 @@ if TYPE_CHECKING:
     from er3a.kinematics.singularity import conditioning as conditioning
     from er3a.pipeline.viewing.plot import plot as plot
     from er3a.planning.follow import follow as follow
+    from er3a.planning.moves import ctraj as ctraj
+    from er3a.planning.moves import jtraj as jtraj
     from er3a.planning.moves import line as line
-    from er3a.planning.toolbox import ctraj as ctraj
-    from er3a.planning.toolbox import jtraj as jtraj
-    from er3a.planning.toolbox import rpy as rpy
+    from er3a.planning.moves import rpy as rpy
     from er3a.program_check.check_program import CheckOptions as CheckOptions
     from er3a.program_check.check_program import check_program as check_program
     from er3a.programs.languages import read_program as read_program
     from er3a.programs.languages import write_program as write_program
     from er3a.programs.machine import execute as execute
     from er3a.programs.writing import WriteOptions as WriteOptions
-    from er3a.robots.conventions import to_modified as to_modified
-    from er3a.robots.conventions import to_standard as to_standard
     from er3a.robots.masses import Load as Load
     from er3a.robots.robot import Robot as Robot
+    from er3a.robots.robot import to_modified as to_modified
+    from er3a.robots.robot import to_standard as to_standard
     from er3a.selection.select import select as select
-    from er3a.selection.sequence import select_sequence as select_sequence
+    from er3a.selection.select import select_sequence as select_sequence
     from er3a.vision.calibration_set import CalibrationSet as CalibrationSet
     from er3a.vision.hand_eye import calibrate_hand_eye as calibrate_hand_eye
 
@@ -64,14 +64,14 @@ _PUBLIC = {
     "inverse_batch": "er3a.kinematics.batch",
     "solve": "er3a.kinematics.numerical",
     "conditioning": "er3a.kinematics.singularity",
-    "rpy": "er3a.planning.toolbox",
-    "jtraj": "er3a.planning.toolbox",
-    "ctraj": "er3a.planning.toolbox",
+    "rpy": "er3a.planning.moves",
+    "jtraj": "er3a.planning.moves",
+    "ctraj": "er3a.planning.moves",
     "line": "er3a.planning.moves",
     "follow": "er3a.planning.follow",
     "plot": "er3a.pipeline.viewing.plot",
     "select": "er3a.selection.select",
-    "select_sequence": "er3a.selection.sequence",
+    "select_sequence": "er3a.selection.select",
     "torques": "er3a.dynamics.torques",
     "mass_matrix": "er3a.dynamics.torques",
     "gravity": "er3a.dynamics.torques",
@@ -89,8 +89,8 @@ _PUBLIC = {
     "calibrate_hand_eye": "er3a.vision.hand_eye",
     "compare": "er3a.comparison.compare",
     "Comparison": "er3a.comparison.compare",
-    "to_modified": "er3a.robots.conventions",
-    "to_standard": "er3a.robots.conventions",
+    "to_modified": "er3a.robots.robot",
+    "to_standard": "er3a.robots.robot",
     "import_urdf": "er3a.formats.urdf",
     "export_urdf": "er3a.formats.urdf",
     "read_program": "er3a.programs.languages",

@@ -11,12 +11,12 @@ from functools import partial
 import numpy as np
 
 from er3a.errors import PoseError
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import TYPES, NearSingular
+from er3a.kinematics.solutions import branch_labels
 from er3a.planning.follow import follow
+from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
-from er3a.planning.singular_events import singular_events
 
 REAL = np.longdouble
 NEAR = NearSingular(float(np.radians(30)), float(np.radians(30)), 0.2)

@@ -18,8 +18,7 @@ from selenium.webdriver.common.by import By
 from er3a.pipeline.messages.language import own_title
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
-from er3a.pipeline.viewing.heads import stage_head
-from er3a.pipeline.viewing.page import status_word
+from er3a.pipeline.viewing.page import stage_head, status_word
 from testing import chromium
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"

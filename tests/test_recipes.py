@@ -188,8 +188,8 @@ def test_a_strategy_of_singularity_avoidance(carry_out):
 
 from __future__ import annotations
 
-from er3a.planning.avoidance.avoidance_findings import BeginsInRegion, NotPossible
-from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment
+from er3a.planning.avoidance.avoidance import BeginsInRegion, NotPossible
+from er3a.planning.avoidance.avoidance import Avoidance, SingularSegment
 
 
 def wait(segment: SingularSegment) -> Avoidance | NotPossible:
@@ -218,7 +218,7 @@ from er3a.kinematics.singularity import NearSingular
 from er3a.pipeline.messages.trajectory import strategy_word
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.study import load_study
-from er3a.planning.avoidance.singular_segment import singular_segment
+from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import compare
 from er3a.planning.follow import follow
 from er3a.planning.moves import line
@@ -395,7 +395,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.classes.links import inverse_rigid, poses_of
+from er3a.kinematics.chain import inverse_rigid, poses_of
 from er3a.numerics.arrays import Reals
 
 MISSED = 1e-6

@@ -14,7 +14,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline.check import check_study
-from er3a.pipeline.stages.validation.subject import model_of
+from er3a.pipeline.stages.validation.model import model_of
 from er3a.pipeline.study import STAGES, Study, load_study
 
 ROOT = Path(__file__).resolve().parents[1]

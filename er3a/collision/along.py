@@ -36,8 +36,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import link_frames
-from er3a.numerics.arrays import Integers, Reals
-from er3a.numerics.runs import runs
+from er3a.numerics.arrays import Integers, Reals, runs
 from er3a.robots.robot import Robot
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump

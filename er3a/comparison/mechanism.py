@@ -32,8 +32,7 @@ import numpy as np
 
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.conventions import to_standard
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, to_standard
 
 EXACTLY_PARALLEL = 1e-5  # rad; below it a common normal has no digits left
 NEARLY_PARALLEL = math.radians(3.0)

@@ -12,9 +12,11 @@ from pydantic import Field, model_validator
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals, wrapped
 from er3a.errors import InputError, InputWarning
 from er3a.files.dh_table import read_dh_table
-from er3a.files.mass_fields import HEAVIEST_PAYLOAD_KG, IMPOSSIBLE, BodyFields, masses_of
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import (
+    HEAVIEST_PAYLOAD_KG,
+    IMPOSSIBLE,
+    BodyFields,
     CombinedLimitRow,
     Envelopes,
     JointLimitRow,
@@ -23,15 +25,25 @@ from er3a.files.robot_file import (
     Placement,
     RobotFile,
     coupling_matrix,
+    masses_of,
 )
 from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import rot_x, rot_y, transform, translation
 from er3a.numerics.arrays import Reals
-from er3a.robots.conventions import to_standard
 from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
-from er3a.robots.robot import CombinedLimit, Convention, ConvexPiece, Envelope, Grade, Robot, Source, robot_name
+from er3a.robots.robot import (
+    CombinedLimit,
+    Convention,
+    ConvexPiece,
+    Envelope,
+    Grade,
+    Robot,
+    Source,
+    robot_name,
+    to_standard,
+)
 
 ROBOTS = ROOT / "data" / "robots"
 REFERENCES = ROOT / "data" / "manual_refs"

@@ -12,8 +12,15 @@ import yaml
 
 from er3a.errors import InputWarning
 from er3a.files.kept_files import write_atomically
-from er3a.files.mass_fields import SLIDING, TURNING, BodyFields
-from er3a.files.robot_file import LEAST_LONGEST_MM, RESIDUE_MM, SHORTEST_PLAIN_LENGTH_MM, RobotFile
+from er3a.files.robot_file import (
+    LEAST_LONGEST_MM,
+    RESIDUE_MM,
+    SHORTEST_PLAIN_LENGTH_MM,
+    SLIDING,
+    TURNING,
+    BodyFields,
+    RobotFile,
+)
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of

@@ -1,4 +1,4 @@
-"""URDF in and out: serial chains of joints that turn or slide.
+"""URDF in and out, SRDF out: serial chains of joints that turn or slide.
 
 Reference: the ROS URDF specification (joint origin, axis, limit, mimic; rpy is fixed-axis roll-pitch-yaw, the same
 matrix as R = Rz(yaw) Ry(pitch) Rx(roll)).
@@ -12,9 +12,12 @@ possible from one joint to the next.
 Axes that are parallel but for an error have a common normal kilometres away. Between them d is 0 and the table takes
 Hayati's turn beta about y [1]_, which needs no normal.
 
+An arm's SRDF is what MoveIt reads beside its URDF to plan with it: its group, and pairs of links not to check [2]_.
+
 References
 ----------
 .. [1] S. A. Hayati, "Robot arm geometric link parameter estimation", 22nd IEEE Conf. on Decision and Control (1983).
+.. [2] I. Sucan, S. Chitta and others, "Semantic Robot Description Format (SRDF)", ROS documentation.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.collision.matrix import collision_matrix
 from er3a.errors import Er3aError, InputError
 from er3a.formats.urdf_tree import (
     CylinderOfLink,
@@ -672,3 +676,32 @@ def _chain_forward(joints: Sequence[UrdfJoint], values: Reals) -> Reals:
 
 def _words(values: Reals) -> str:
     return " ".join(repr(float(value)) for value in values)
+
+
+REASONS = {"never": "Never", "joined": "Adjacent", "allowed": "User", "overlaps": "Default"}
+
+
+def export_srdf(robot: Robot) -> str:
+    """The arm's SRDF, for the URDF of :func:`er3a.formats.urdf.export_urdf`.
+
+    Pairs of links that are disabled: those that are proven apart in all joint vectors within the limits (Never),
+    that a joint joins (Adjacent), that the robot's file allows to touch (User), and whose shapes overlap in every
+    joint vector (Default), which is an error of the shapes: a comment names them. What er3a still checks of links
+    that a joint joins, away from that joint, SRDF has no words for.
+    """
+    root = ElementTree.Element("robot", name=robot.name)
+    group = ElementTree.SubElement(root, "group", name="arm")
+    ElementTree.SubElement(group, "chain", base_link="base", tip_link="tool")
+    for row in collision_matrix(robot).rows:
+        if row.state not in REASONS:
+            continue
+        if row.state == "overlaps":
+            root.append(ElementTree.Comment(f" {row.first} and {row.second} overlap always: the shapes are in error "))
+        ElementTree.SubElement(root, "disable_collisions", link1=row.first, link2=row.second, reason=REASONS[row.state])
+    ElementTree.indent(root)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
+    """Pairs of links that the SRDF disables because their shapes can't be right."""
+    return tuple(f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if row.state == "overlaps")

@@ -1,19 +1,17 @@
-"""The serial chain in a URDF's tree: from a base link to a tip link, and what stands beside it.
+"""The serial chain in a URDF's tree, from a base link to a tip link, and what stands beside it: masses, drives, shapes.
 
-Reference: the ROS URDF specification (joint origin, axis, limit, mimic).
+Reference: the ROS URDF specification (joint origin, axis, limit, mimic; an inertia is about the centre of mass, in the
+axes of the inertial's origin).
 
-The masses and drives that a URDF states: ``<inertial>`` of its links, ``<dynamics>`` and efforts of its joints.
+URDFs that are written as xacro are expanded by xacrodoc (the extra ``xacro``); ROS is not needed.
 
-Links that are fixed to one another count as one. An effort of 0 means that it is unknown, as most files have it.
+Masses and drives are ``<inertial>`` of links, ``<dynamics>`` and efforts of joints. Links that are fixed to one another
+count as one. An effort of 0 means that it is unknown, as most files have it.
 
-Reference: the ROS URDF specification (an inertia is about the centre of mass, in the axes of the inertial's origin).
-
-Collision geometry of a URDF's links as capsules and convex hulls, and the way back.
-
-Boxes become hulls, cylinders prisms around them, spheres capsules without length; a cylinder of a link with a sphere of
-its radius about each end is the capsule that they make. A mesh is taken as its hull, which holds it, or split into
-convex pieces if that is asked for. The way back writes a mesh for each hull,
-and for a capsule its cylinder and two spheres. By how much a hull is to be taken larger stands beside its mesh as
+Collision geometry becomes capsules and convex hulls: boxes become hulls, cylinders prisms around them, spheres capsules
+without length; a cylinder of a link with a sphere of its radius about each end is the capsule that they make. A mesh is
+taken as its hull, which holds it, or split into convex pieces if that is asked for. The way back writes a mesh for each
+hull, and for a capsule its cylinder and two spheres. By how much a hull is to be taken larger stands beside its mesh as
 ``<collision margin="...">`` (m), which other readers pass over.
 """
 
@@ -21,9 +19,11 @@ from __future__ import annotations
 
 import math
 import re
+import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -789,3 +789,89 @@ def numbers(
     if len(values) != (3 if default else 1) or not np.isfinite(values).all():
         raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not what stands there", "Write finite numbers")
     return values
+
+
+COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+FOLDERS_UP = 4  # in and beside which packages are looked for
+EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xacro FILE > arm.urdf"
+
+
+@contextmanager
+def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
+    """The file itself if it is a URDF; of xacro the expanded URDF, for as long as the block lasts.
+
+    Packages that the file names are looked for in the four folders above it and beside it, then where ROS has them.
+
+    Parameters
+    ----------
+    arguments : ``NAME:=VALUE``, as ``<xacro:arg name="NAME"/>`` asks for them
+
+    Raises
+    ------
+    InputError
+        for arguments of another form or to a file that is no xacro, without xacrodoc, or for what it can't expand; it
+        names ``path`` for what the expanded file is refused for, too
+    """
+    if "<xacro:" not in COMMENT.sub("", read_text(path, MOST_BYTES)):
+        if arguments:
+            raise InputError(path, "--xacro", "the file holds no xacro macros", "Leave the arguments out")
+        yield path
+        return
+    values = dict(_argument(path, each) for each in arguments)
+    expanded = _expanded(path, values)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, f"{path.name.removesuffix('.xacro').removesuffix('.urdf')}.urdf")
+        file.write_text(expanded, encoding="utf-8")
+        try:
+            yield file
+        except InputError as error:
+            if error.file != str(file):
+                raise
+            raise InputError(path, error.field, error.problem, error.remedy) from None
+
+
+def _argument(path: Path, text: str) -> tuple[str, str]:
+    name, given, value = text.partition(":=")
+    if not name or not given:
+        raise InputError(path, "--xacro", f"'{text}' is no argument of xacro", "Write NAME:=VALUE")
+    return name, value
+
+
+def _expanded(path: Path, values: dict[str, str]) -> str:
+    """The URDF's text, its meshes named by where they are; those not found keep their names."""
+    try:
+        from xacrodoc import XacroDoc, packages
+    except ImportError:
+        raise InputError(path, None, "is xacro, which xacrodoc expands", EXTRA) from None
+    packages.reset()
+    packages.update_package_cache(_packages_near(path))
+    try:
+        text = XacroDoc.from_file(path, subargs=values, resolve_packages=False).to_urdf_string()
+        root = ElementTree.fromstring(text)
+    except Exception as error:  # whatever a macro makes its expander stumble over
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        remedy = "Give what it asks for: --xacro NAME:=VALUE; keep its packages in folders beside it"
+        raise InputError(path, None, f"can't be expanded ({reason})", remedy) from None
+    for mesh in root.iter("mesh"):
+        if (file := mesh_of(path, mesh.get("filename", ""))) is not None:
+            mesh.set("filename", f"file://{file.resolve()}")
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _packages_near(path: Path) -> dict[str, Path]:
+    """Packages by name: folders above the file, nearest last, and beside those; ``package.xml`` renames one."""
+    found: dict[str, Path] = {}
+    for above in reversed(path.resolve().parents[:FOLDERS_UP]):
+        found |= {folder.name: folder for folder in (*sorted(above.glob("*/")), above)}
+        for manifest in (*sorted(above.glob("*/package.xml")), above / "package.xml"):
+            if manifest.is_file():
+                found[_package_name(manifest)] = manifest.parent
+    return found
+
+
+def _package_name(manifest: Path) -> str:
+    try:
+        name = ElementTree.parse(manifest).findtext("name")
+    except ElementTree.ParseError:
+        name = None
+    return (name or manifest.parent.name).strip()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.errors import PoseError, ShapeError
-from er3a.numerics.arrays import Reals, for_kernel
+from er3a.numerics.arrays import Reals, as_floats, for_kernel
 from er3a.numerics.jit import kernel
 
 ORTHONORMAL_TOLERANCE = 1e-6
@@ -95,17 +95,6 @@ def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
     angle: Reals = np.arctan2(np.linalg.norm(skew, axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
     return angle
-
-
-def as_floats(values: Reals, argument: str) -> Reals:
-    """Values as a float array; :class:`PoseError` if some are no real numbers, or rows differ in length."""
-    try:
-        array = np.asarray(values)
-        if np.iscomplexobj(array):
-            raise TypeError
-        return array.astype(float, copy=False)
-    except (TypeError, ValueError):
-        raise PoseError(f"{argument} holds something that is no real number, or rows that differ in length") from None
 
 
 def check_poses(T: Reals, argument: str = "T") -> Reals:

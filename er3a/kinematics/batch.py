@@ -6,20 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
-from er3a.geometry.transforms import as_floats, check_poses
+from er3a.geometry.transforms import check_poses
 from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.by_class import arm_solver, checked_parameters, slots_of_class
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import REACHED, SLOTS
-from er3a.kinematics.configuration import slot_labels
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.inverse import SAME_MEMBER, SOLVES, is_complete, missed_row, missing_class, starts_of
 from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions
+from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions, slot_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks, solve_slots
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.threads import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot

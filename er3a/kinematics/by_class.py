@@ -16,9 +16,8 @@ from typing import overload
 import numpy as np
 
 from er3a.errors import ShapeError
-from er3a.geometry.transforms import as_floats
 from er3a.geometry.vectors import TURN
-from er3a.kinematics.chain import constant_links, joint_starts, row_values
+from er3a.kinematics.chain import constant_links, joint_starts, row_values, size_of
 from er3a.kinematics.classes.arm_angle import is_out_of_reach
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
 from er3a.kinematics.classes.class_solvers import (
@@ -30,12 +29,11 @@ from er3a.kinematics.classes.class_solvers import (
     LinkedRows,
     Redundancy,
 )
-from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
 from er3a.kinematics.forward import forward
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import kernel
 from er3a.numerics.threads import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within

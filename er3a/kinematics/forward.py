@@ -10,9 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.errors import ArgumentError, ShapeError
-from er3a.geometry.transforms import as_floats
 from er3a.kinematics.chain import constant_links, joint_starts, row_values
-from er3a.numerics.arrays import Flags, Reals, for_kernel
+from er3a.numerics.arrays import Flags, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot

@@ -23,7 +23,6 @@ from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, LinkedRows
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
-from er3a.kinematics.configuration import side_of, slot_labels
 from er3a.kinematics.families import Family, families
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
@@ -44,6 +43,8 @@ from er3a.kinematics.solutions import (
     WristTooFar,
     WristTooNear,
     WristTooNearAxis1,
+    side_of,
+    slot_labels,
 )
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals

@@ -31,9 +31,8 @@ from numbers import Integral, Real
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
-from er3a.geometry.transforms import as_floats, check_poses
-from er3a.kinematics.chain import arm_length, constant_links, joint_starts
-from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
+from er3a.geometry.transforms import check_poses
+from er3a.kinematics.chain import arm_length, constant_links, joint_starts, multiply_rigid, post_rotate_z
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.solutions import (
     BadGuess,
@@ -46,7 +45,7 @@ from er3a.kinematics.solutions import (
     Solutions,
     Unreachable,
 )
-from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
+from er3a.numerics.arrays import Flags, Integers, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.numerics.threads import parallel_for

@@ -38,9 +38,8 @@ from er3a.kinematics.wrist_partitioned import (
     parallel_axes_arm,
     wrist_partitioned_arm,
 )
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.numerics.jit import inner_kernel, kernel
-from er3a.numerics.runs import runs
 from er3a.robots.robot import Robot, derived
 
 SingularityType = Literal["wrist", "elbow", "shoulder"]

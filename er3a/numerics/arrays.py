@@ -1,4 +1,4 @@
-"""Short names for the types of arrays."""
+"""Arrays: short names for their types, numbers as floats, how kernels take them, stretches of True in them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from er3a.errors import PoseError
 
 Reals = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -22,3 +24,20 @@ def for_kernel(array: NDArray[Number]) -> NDArray[Number]:
     view = np.ascontiguousarray(array).view()
     view.setflags(write=False)
     return view
+
+
+def as_floats(values: Reals, argument: str) -> Reals:
+    """Values as a float array; :class:`PoseError` if some are no real numbers, or rows differ in length."""
+    try:
+        array = np.asarray(values)
+        if np.iscomplexobj(array):
+            raise TypeError
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError):
+        raise PoseError(f"{argument} holds something that is no real number, or rows that differ in length") from None
+
+
+def runs(flags: Flags) -> list[tuple[int, int]]:
+    """Index ranges (first, behind the last) of the stretches of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -38,9 +38,9 @@ from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import kernel
+from er3a.planning.motion_faults import limit_intervals
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_through
-from er3a.planning.polynomial_checks import limit_intervals
 from er3a.planning.profiles import times_at
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot

@@ -42,9 +42,8 @@ from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.singularity import characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.wrist_partitioned import parallel_axes_arm, solve_slots, wrist_partitioned_arm
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, runs
 from er3a.numerics.jit import kernel
-from er3a.numerics.runs import runs
 from er3a.planning.moves import ToolPath, check_times
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
@@ -84,7 +83,7 @@ class Branches:
 
     @property
     def meeting(self) -> Integers:
-        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.configuration`) that differ in a branch met."""
+        """(N, 8), bits of the branch number (:mod:`er3a.kinematics.solutions`) that differ in a branch met."""
         bits: Integers = self.free_wrist + 2 * self.straight + 4 * (self.free_shoulder | self.beside)
         return bits
 

@@ -25,7 +25,7 @@ import scipy
 from er3a.by_value import ByValue
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Flags, Reals
-from er3a.planning.intervals import OVER, RateLimit
+from er3a.planning.motion_faults import OVER, RateLimit
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import Rates
 from er3a.robots.robot import Robot

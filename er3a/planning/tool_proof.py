@@ -33,15 +33,19 @@ from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.singularity import TYPES, NearSingular, SingularityType, characteristic_length, determinant_factors
 from er3a.kinematics.wrist_partitioned import closed_form_missing
-from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.runs import runs
+from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed, follow
-from er3a.planning.intervals import Interval, RateCause, RateLimit, rate_interval
+from er3a.planning.motion_faults import (
+    ELBOW_JOINT,
+    WRIST_JOINT,
+    Interval,
+    RateLimit,
+    factor_forms,
+    singular_events,
+)
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, max_between, polynomial_motion
-from er3a.planning.polynomial_checks import ELBOW_JOINT, WRIST_JOINT, factor_forms
 from er3a.planning.profiles import TimeLaw, times_at
-from er3a.planning.singular_events import singular_events
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
@@ -217,19 +221,6 @@ def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
     for part in done:
         part.open[:, RATES] &= ~broken[RATES]
     return _proof(followed, done, singular)
-
-
-def jerk_intervals(proof: ToolProof, limit: RateLimit) -> list[Interval[RateCause]]:
-    """Where joints exceed a limit of jerk; a step of the acceleration exceeds any."""
-    found: list[Interval[RateCause]] = []
-    for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
-        size = np.abs(proof.jerk[:, j])
-        for first, last in runs(size > limit.allowed[j]):
-            stretch = float(proof.times[first]), float(proof.times[last])
-            found.append(rate_interval(limit, j, *stretch, float(size[first:last].max())))
-        for k in np.flatnonzero(np.abs(proof.steps[1][:, j]) > limit.step_allowed[j]).tolist():
-            found.append(rate_interval(limit, j, float(proof.steps[0][k]), float(proof.steps[0][k]), np.inf))
-    return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
 def _acceleration_steps(followed: Followed) -> tuple[Reals, Reals]:

@@ -31,8 +31,8 @@ from er3a.collision.pairs import PairOverlaps
 from er3a.collision.shapes import link_frames
 from er3a.errors import PathError
 from er3a.numerics.arrays import Reals
+from er3a.planning.motion_faults import limit_intervals
 from er3a.planning.piecewise import PiecewiseMotion
-from er3a.planning.polynomial_checks import limit_intervals
 from er3a.planning.profiles import FromRestToRest, Rates
 from er3a.planning.sequences import JointSequence, joint_sequence
 from er3a.planning.timing import JointLimits, Timed, TimingError, ToppraMissing, fastest, joined, standing

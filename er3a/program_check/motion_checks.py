@@ -17,13 +17,13 @@ from er3a.by_value import ByValue
 from er3a.collision.along import RateBounds
 from er3a.errors import NotWristPartitionedError, PoseError
 from er3a.geometry.vectors import wrap_to_pi
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular, determinant_factors
+from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import Followed
-from er3a.planning.intervals import (
+from er3a.planning.motion_faults import (
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
     Interval,
@@ -36,13 +36,13 @@ from er3a.planning.intervals import (
     limit_sides,
     out_of_limits,
     rates_exceeded,
+    singular_events,
     unreachable,
 )
 from er3a.planning.moves import Segment, line
 from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.profiles import trapezoid
 from er3a.planning.sequences import TURN_LENGTH, Arc, arc
-from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
 from er3a.program_check.program_check_findings import (
@@ -393,7 +393,7 @@ def _followed_moments(
     arm = way.arm
     found: dict[CheckFinding, float] = {
         WayOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
-        for stretch in unreachable(followed)
+        for stretch in unreachable(arm, followed)
     }
     for jump in followed.jumps:
         amount, slides = joint_shown(arm, jump.joint - 1, jump.angle)

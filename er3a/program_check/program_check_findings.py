@@ -1,4 +1,4 @@
-"""What a check of a program can find, beside what :mod:`er3a.planning.intervals` finds on a motion."""
+"""What a check of a program can find, beside what :mod:`er3a.planning.motion_faults` finds on a motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from er3a.collision.pairs import Pair, PairsUnexamined
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.solutions import Unsolved
-from er3a.planning.intervals import AboveLimit, BelowLimit, TooFast
+from er3a.planning.motion_faults import AboveLimit, BelowLimit, TooFast
 from er3a.planning.tool_proof import Undecided
 from er3a.programs.execution import EndKind
 from er3a.programs.instructions import Unresolved

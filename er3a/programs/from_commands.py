@@ -94,7 +94,7 @@ def listing_of(
             making.segments(command.segments, command.duration, ends)
         case ToolTableCommand():
             sizes = making.sizes(tuple(map(SegmentCommand, command.poses[1:])))
-            halves = np.append(np.minimum(sizes[:-1], sizes[1:]) / 2, 0.0)  # as er3a.planning.build rounds corners
+            halves = np.append(np.minimum(sizes[:-1], sizes[1:]) / 2, 0.0)  # as er3a.planning.commands rounds corners
             blends = halves if command.blend is None else np.minimum(halves, command.blend)
             parts = tuple(SegmentCommand(pose, blend=float(blend)) for pose, blend in zip(command.poses[1:], blends))
             making.halts = _halts(command.timing, len(parts))

@@ -9,8 +9,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.errors import ShapeError
-from er3a.geometry.transforms import as_floats
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Reals, as_floats
 
 Three = tuple[float, float, float]
 SixMoments = tuple[float, float, float, float, float, float]

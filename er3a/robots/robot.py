@@ -1,4 +1,11 @@
-"""The frozen robot model that everything else takes."""
+"""The frozen robot model that everything else takes, and the same arm under the other Denavit-Hartenberg convention.
+
+The two conventions cut the same product of elementary transforms at other places, so the rows shift by one and nothing
+is approximated: a standard row's ``Tx(a) Rx(alpha)`` is the next modified row's ``Rx(alpha) Tx(a)`` (they commute).
+What has no row left goes to the ends: behind the last joint to the flange, before joint 1 to the base.
+
+Reference: J. J. Craig, *Introduction to Robotics*, 3rd ed., section 3.4 and its notes on the two conventions.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +20,8 @@ import numpy as np
 
 from er3a.by_value import ByValue, Displayed, ReadOnly, Sheet, shortly
 from er3a.errors import InputWarning, RobotError, ShapeError
-from er3a.geometry.transforms import as_floats, rpy_of
-from er3a.numerics.arrays import Flags, Reals
+from er3a.geometry.transforms import rot_x, rot_y, rpy_of, translation
+from er3a.numerics.arrays import Flags, Reals, as_floats
 from er3a.robots.masses import Masses
 
 MOST_JOINTS = 10
@@ -369,3 +376,32 @@ def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Con
 
     update_wrapper(once, function)
     return once
+
+
+def to_modified(robot: Robot) -> Robot:
+    """The arm with a modified (Craig) table; itself if it has one. Flange and tool are the same at all angles."""
+    if robot.convention == "modified":
+        return robot
+    return robot.replace(
+        convention="modified",
+        **{column: np.roll(getattr(robot, column), 1) * _not_first(robot) for column in _SHIFTED},
+        flange=translation(robot.a[-1], 0, 0) @ rot_x(robot.alpha[-1]) @ rot_y(robot.beta[-1]) @ robot.flange,
+    )
+
+
+def to_standard(robot: Robot) -> Robot:
+    """The arm with a standard table; itself if it has one. Flange and tool are the same at all angles."""
+    if robot.convention == "standard":
+        return robot
+    return robot.replace(
+        convention="standard",
+        **{column: np.roll(getattr(robot, column) * _not_first(robot), -1) for column in _SHIFTED},
+        base=robot.base @ rot_x(robot.alpha[0]) @ translation(robot.a[0], 0, 0) @ rot_y(robot.beta[0]),
+    )
+
+
+_SHIFTED = "a", "alpha", "beta"
+
+
+def _not_first(robot: Robot) -> Reals:
+    return np.where(np.arange(robot.rows) == 0, 0.0, 1.0)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from er3a.errors import ArgumentError, InputWarning, PoseError, RobotError, ShapeError
-from er3a.geometry.transforms import as_floats, check_poses
-from er3a.numerics.arrays import Reals
+from er3a.geometry.transforms import check_poses
+from er3a.numerics.arrays import Reals, as_floats
 from er3a.robots.robot import Robot, derived
 
 FINITE = (

@@ -37,8 +37,7 @@ from er3a.sampling.point_chain import (
     points_about_axis_1,
     within_sums,
 )
-from er3a.sampling.random_joints import CHUNK, OF_A_DRAW, Draw, fill_uniform
-from er3a.sampling.sobol import fill_sobol
+from er3a.sampling.random_joints import CHUNK, OF_A_DRAW, Draw, fill_sobol, fill_uniform
 
 NearLists = tuple[Reals, Integers, Integers, Reals]
 Cells = tuple[Reals, float, tuple[int, int, int]]

@@ -26,9 +26,8 @@ from numpy.typing import NDArray
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, runs
 from er3a.numerics.jit import kernel
-from er3a.numerics.runs import runs
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid
 from er3a.sampling.point_chain import at_wrist_centre, plane_direction

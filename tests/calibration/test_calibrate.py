@@ -19,7 +19,7 @@ from er3a.errors import InputError
 from er3a.files.by_name import COLUMNS, load_measurements
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
-from er3a.robots.conventions import to_modified
+from er3a.robots.robot import to_modified
 from testing.simulated_measurements import covered, measured
 
 TOUCHED = ("place", "plane", "pair", "bar", "length_mm")

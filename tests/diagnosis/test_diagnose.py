@@ -29,7 +29,7 @@ from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.references.reference import expected_of
 from er3a.references.subjects import PointAtPose
-from er3a.robots.conventions import to_modified
+from er3a.robots.robot import to_modified
 from testing.known_faults import mutations_of, noisy, try_mutation
 
 TRUSTED = ("er3a_c60", "er3_600")

@@ -12,10 +12,18 @@ import scipy
 import er3a
 from er3a.dynamics import pose_bound
 from er3a.dynamics.arm_model import arm_model
-from er3a.dynamics.margins import DriveLimits, max_payload, max_speed_scale
+from er3a.dynamics.margins import (
+    DriveLimits,
+    levers,
+    load_diagram,
+    max_payload,
+    max_speed_scale,
+    worst_levers,
+    wrist_to_flange,
+    wrist_use,
+)
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import demand, known, torque_parts, worst_holding
-from er3a.dynamics.wrist import levers, load_diagram, worst_levers, wrist_to_flange, wrist_use
 from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses, WristLoad
 from er3a.robots.robot import CombinedLimit, Robot

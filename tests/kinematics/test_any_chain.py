@@ -14,9 +14,8 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward, frames, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.table_batch import frames_of, tables_of
-from er3a.robots.conventions import to_modified, to_standard
 from er3a.robots.joint_limits import limit_margin, limits_exceeded, nearest_equivalent, turn_bounds, within
-from er3a.robots.robot import CombinedLimit, Robot
+from er3a.robots.robot import CombinedLimit, Robot, to_modified, to_standard
 from er3a.sampling.grid import make_grid, tool_bound
 from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import search_reach, tally_blocks

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from er3a.kinematics.chain import links_of_rows, poses_of
 from er3a.kinematics.classes.arm_angle import (
     arm_angle_arm,
     arm_angles_of,
@@ -20,7 +21,6 @@ from er3a.kinematics.classes.arm_angle import (
 from er3a.kinematics.classes.chain_solvers import arm_class, with_free_roll, with_joint_fixed
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
 from er3a.kinematics.classes.hidden_joint import TERMS, zeros_on_circle
-from er3a.kinematics.classes.links import links_of_rows, poses_of
 from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.scara import scara, solve_scara
 from er3a.kinematics.classes.six_revolute import CERTAIN, prepared, solve_six_revolute

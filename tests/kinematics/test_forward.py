@@ -15,7 +15,7 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.chain import axes_at_zero_theta
 from er3a.kinematics.forward import forward, frames, jacobian
 from er3a.kinematics.table_batch import frames_of, join, tables_of
-from er3a.robots.conventions import to_modified, to_standard
+from er3a.robots.robot import to_modified, to_standard
 from testing.arms import (
     PinocchioArm,
     arms,

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.closed_form import OFF_AXIS, ORIENTATION, TOO_FAR, TOO_NEAR
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
+from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import (
     ElbowAxesNotParallel,
     NeighboursParallel,

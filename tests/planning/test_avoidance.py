@@ -14,13 +14,13 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import NearSingular, characteristic_length, determinant_factors, factor_of
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
-from er3a.planning.avoidance import avoidance_findings, strategies, via_point
-from er3a.planning.avoidance.singular_segment import singular_segment
+from er3a.planning.avoidance import avoidance, strategies, via_point
+from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare, deviation
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.follow import follow
+from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
-from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import within
 
@@ -69,7 +69,7 @@ def test_what_is_usable_ends_at_the_end_within_all_limits(results, name):
 def test_stop_rests_on_the_path_before_the_region(results, name):
     case, price = segment_of(name), results[name]["stop"].cost
     end = price.motion.q[-1]
-    assert results[name]["stop"].reasons == (avoidance_findings.PathNotFinished(price.done),)
+    assert results[name]["stop"].reasons == (avoidance.PathNotFinished(price.done),)
     assert 0.2 < price.done < 0.9
     assert NEAR.margin(case.robot, price.motion.q).min() >= 1
     assert NEAR.margin(case.robot, end[None])[0] < 1.1
@@ -197,10 +197,10 @@ def test_another_branch_is_clear_from_the_start():
 def test_what_can_not_be_repaired_is_said_so(results):
     found = results["out_of_reach"]
     assert best(list(found.values()), meets=True) is None
-    assert found["slow"].reasons == (avoidance_findings.PartlyOutOfReach(),)
-    assert found["detour"].reasons == (avoidance_findings.EndsOutOfReach(),)
-    assert found["via_shift"].reasons == (avoidance_findings.EndsInRegion(),)
-    assert found["stop"].reasons == (avoidance_findings.PathNotFinished(found["stop"].cost.done),)
+    assert found["slow"].reasons == (avoidance.PartlyOutOfReach(),)
+    assert found["detour"].reasons == (avoidance.EndsOutOfReach(),)
+    assert found["via_shift"].reasons == (avoidance.EndsInRegion(),)
+    assert found["stop"].reasons == (avoidance.PathNotFinished(found["stop"].cost.done),)
 
 
 def test_best_way_keeps_away_from_a_pose_that_the_path_meets(results):
@@ -218,7 +218,7 @@ def test_start_inside_the_region_is_left_by_a_joint_move():
     limits = joint_limits(robot, np.radians([180] * 6), 0.25)
     found = {result.name: result for result in compare(singular_segment(followed, NEAR, limits, fixed_start=True))}
     np.testing.assert_allclose(found["detour"].cost.motion.q[0], q, atol=1e-9)
-    assert found["via_shift"].reasons == found["stop"].reasons == (avoidance_findings.BeginsInRegion(),)
+    assert found["via_shift"].reasons == found["stop"].reasons == (avoidance.BeginsInRegion(),)
 
 
 def test_every_strategy_has_a_name_and_words():

@@ -13,10 +13,9 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import TYPES, NearSingular, determinant_factors, factor_of
 from er3a.kinematics.solutions import WristTooFar
 from er3a.planning.follow import follow
-from er3a.planning.intervals import BelowLimit, out_of_limits, rates_exceeded, unreachable
+from er3a.planning.motion_faults import BelowLimit, out_of_limits, rates_exceeded, singular_events, unreachable
 from er3a.planning.moves import JointMove, line
 from er3a.planning.sequences import arc, segment_path
-from er3a.planning.singular_events import singular_events
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import nearest_equivalent, within
 from er3a.robots.robot import CombinedLimit
@@ -164,7 +163,7 @@ def test_unreachable_stretch_ends_where_the_stretched_arm_ends(robot):
     start = transform([0.35, 0, 0.4], [0, np.radians(135), 0])
     way = line(start, shifted(start, [1.5, 0, 0]), 1.0)
     followed = follow(robot, way, GRID)
-    (interval,) = unreachable(followed)
+    (interval,) = unreachable(robot, followed)
     assert interval.end == 1.0
     assert any(isinstance(reason.why, WristTooFar) for reason in interval.cause.reasons)
     inside, outside = way.progress(np.array([interval.start - 1e-6, interval.start + 1e-6]))[0]
@@ -178,7 +177,7 @@ def test_whole_path_unreachable():
     robot = load_robot("er3a_c60")
     far = transform([3.0, 0, 0.4], [0, 0, 0])
     followed = follow(robot, line(far, shifted(far, [0.1, 0, 0]), 1.0), GRID)
-    (interval,) = unreachable(followed)
+    (interval,) = unreachable(robot, followed)
     assert (interval.start, interval.end) == (0.0, 1.0)
     assert events_of(robot, followed) == []
 

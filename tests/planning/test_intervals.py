@@ -12,9 +12,16 @@ from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.solutions import WristTooFar
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.follow import follow
-from er3a.planning.intervals import AboveLimit, TooFast, out_of_limits, rates_exceeded, unreachable
+from er3a.planning.motion_faults import (
+    AboveLimit,
+    TooFast,
+    limit_intervals,
+    out_of_limits,
+    rate_intervals,
+    rates_exceeded,
+    unreachable,
+)
 from er3a.planning.moves import JointMove, line
-from er3a.planning.polynomial_checks import limit_intervals, rate_intervals
 from er3a.planning.sequences import arc
 from er3a.planning.timing import joint_limits
 from er3a.planning.tool_proof import Wanted, follow_and_prove
@@ -82,7 +89,7 @@ def test_short_stretch_out_of_reach_between_check_points_is_found():
         inside, outside = (x, outside) if reached else (inside, x)
     path, even = across(inside + 2e-5), np.linspace(0, 1, 20)
     assert np.isfinite(follow(robot, path, even).joints(even)).all()
-    (interval,) = unreachable(follow(robot, path, even))
+    (interval,) = unreachable(robot, follow(robot, path, even))
     y = path.poses(path.progress(np.array([interval.start, interval.end]))[0])[:, 1, 3]
     assert y[0] == pytest.approx(-y[1], abs=1e-9)
     reach = inside - 0.0785  # the wrist centre's greatest distance from axis 1 at this height

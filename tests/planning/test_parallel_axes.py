@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from er3a.geometry.vectors import wrap_to_pi
-from er3a.kinematics.configuration import LABELS, branch_labels
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import NearSingular, determinant_factors
+from er3a.kinematics.solutions import LABELS, branch_labels
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.planning.follow import follow
+from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
-from er3a.planning.singular_events import singular_events
 from testing.arms import DEG, joints_at_random, make_arm, pose_errors
 
 GRID = np.linspace(0, 1, 80)

@@ -14,9 +14,9 @@ from er3a.errors import ShapeError
 from er3a.files.program_file import load_programs
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
+from er3a.kinematics.solutions import branch_labels
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.program_check.motion_checks import _slot
 from er3a.programs.instructions import numbers_of

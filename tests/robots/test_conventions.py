@@ -7,8 +7,7 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
-from er3a.robots.conventions import to_modified, to_standard
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, to_modified, to_standard
 
 
 def random_arm(random: np.random.Generator, convention: str) -> Robot:

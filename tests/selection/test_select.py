@@ -15,8 +15,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.selection.select import RULES, available_rules, joint_weights, select
-from er3a.selection.sequence import select_sequence
+from er3a.selection.select import RULES, available_rules, joint_weights, select, select_sequence
 from testing.arms import DEG, joints_at_random
 
 POSE = np.array([10, 20, 10, 30, 40, -50]) * DEG

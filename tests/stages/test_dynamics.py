@@ -16,7 +16,7 @@ import er3a
 import er3a.pipeline.messages.dynamics
 from er3a.dynamics.plausibility import MissingLink
 from er3a.errors import InputError
-from er3a.files.mass_fields import WristLoadFields, check_masses
+from er3a.files.robot_file import WristLoadFields, check_masses
 from er3a.pipeline.messages import dynamics
 from er3a.pipeline.messages.say import listed, say
 from er3a.pipeline.results import Stored, read_results

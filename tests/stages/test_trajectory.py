@@ -47,7 +47,7 @@ from er3a.pipeline.teach.panel import write_teach_page
 from er3a.pipeline.viewing.index import write_index
 from er3a.planning import tool_proof
 from er3a.planning.avoidance.strategies import STRATEGIES
-from er3a.planning.intervals import AboveLimit
+from er3a.planning.motion_faults import AboveLimit
 from testing.on_demand import OnDemand
 from testing.readme import README, answer
 

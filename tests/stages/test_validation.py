@@ -37,7 +37,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import compute as compute_module
-from er3a.pipeline.stages.validation.checks import checks_of_set, table_checks
+from er3a.pipeline.stages.validation.checks import checks_of_set, table_checks, verdict_of
 from er3a.pipeline.stages.validation.model import (
     RESULTS,
     AnotherArm,
@@ -53,7 +53,6 @@ from er3a.pipeline.stages.validation.model import (
 )
 from er3a.pipeline.stages.validation.record import record
 from er3a.pipeline.stages.validation.report import report
-from er3a.pipeline.stages.validation.verdict import verdict_of
 from er3a.pipeline.study import RobotEntry, Study, load_study
 from er3a.pipeline.viewing.recording import TIMELINE
 from er3a.references.circle_points import circle_points, fit_circle

@@ -15,8 +15,8 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.yaml_file import load
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
+from er3a.kinematics.solutions import branch_labels
 from er3a.pipeline.stages.workspace.capability_section import capability_context
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.stages.workspace.model import CellLookup, ToolPointsElsewhere

@@ -19,8 +19,7 @@ from er3a.pipeline.progress import shown_progress
 from er3a.sampling import grid as grid_module
 from er3a.sampling.grid import make_grid, tool_bound
 from er3a.sampling.point_chain import at_wrist_centre, point_chain
-from er3a.sampling.random_joints import Draw, philox4x32
-from er3a.sampling.sobol import direction_numbers
+from er3a.sampling.random_joints import Draw, direction_numbers, philox4x32
 from er3a.sampling.tally import tally_blocks
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of
 

@@ -13,14 +13,22 @@ from er3a.kinematics.forward import jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.directions import cone_directions, from_polar, poses, roll_of, tool_rotations
-from er3a.workspace.placement import MIXED, NO, Places, Task, fitting_places, lattice_spacing, narrowed, serve, survey
-from er3a.workspace.placement_proof import (
+from er3a.workspace.placement import (
+    MIXED,
+    NO,
     PROVEN,
     REFUTED,
+    Places,
+    Task,
     choose_places,
     find_places,
+    fitting_places,
+    lattice_spacing,
+    narrowed,
     prove_place,
     proven_bricks,
+    serve,
+    survey,
 )
 from testing.arms import placement
 from tests.workspace.shell_arm import NARROW, TOOL_ASIDE, shell_arm

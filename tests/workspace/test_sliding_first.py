@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from er3a.robots.robot import CombinedLimit, Robot
+from er3a.workspace.general_proof import surface_of
 from er3a.workspace.proven import EMPTY, FILLED, Proven, prove_robot
-from er3a.workspace.surface import surface_of
 from testing.arms import DEG, dh_matrix, gantry, made_of, palletiser, placement, tools_by_hand
 
 TILTED = placement([0.3, -0.2, 0.5], [0.4, -0.7, 1.1])

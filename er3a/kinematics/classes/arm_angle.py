@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.vectors import TURN, Vector
-from er3a.kinematics.classes.links import axes_of, poses_of
+from er3a.kinematics.chain import axes_of, poses_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel

@@ -13,9 +13,9 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 
 from er3a.geometry.vectors import TURN
+from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angles_of, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
-from er3a.kinematics.classes.links import axes_of, poses_of, size_of
 from er3a.kinematics.classes.parallel_axes import ThreeParallel
 from er3a.kinematics.classes.scara import Gantry, Scara, solve_gantry, solve_scara
 from er3a.kinematics.classes.self_motion import PoseChain
@@ -381,7 +381,7 @@ def _turned_back(v: Reals, axis: Reals, angle: float) -> Reals:
 def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]:
     """Names of the slots ``4 shoulder + 2 elbow + wrist``.
 
-    As :func:`er3a.kinematics.configuration.branch_labels`: *front* is where the wrist is in the zero pose; *up*: with
+    As :func:`er3a.kinematics.solutions.branch_labels`: *front* is where the wrist is in the zero pose; *up*: with
     the arm stretched out level on that side the elbow is above the line from shoulder to wrist.
     """
     names = []

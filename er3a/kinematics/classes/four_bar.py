@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.geometry.vectors import TURN
+from er3a.kinematics.chain import size_of
 from er3a.kinematics.classes.arm_angle import about_z
-from er3a.kinematics.classes.links import size_of
 from er3a.kinematics.classes.parallel_axes import (
     SLOTS,
     ParallelConstants,

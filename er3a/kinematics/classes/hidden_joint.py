@@ -42,7 +42,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.kinematics.classes.links import invert_rigid
+from er3a.kinematics.chain import invert_rigid
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from er3a.kinematics.chain import multiply_rigid, post_rotate_z
 from er3a.kinematics.classes.hidden_joint import (
     LOCAL_ORDER,
     NODES,
@@ -26,7 +27,6 @@ from er3a.kinematics.classes.hidden_joint import (
     zeros_between,
     zeros_on_circle,
 )
-from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 

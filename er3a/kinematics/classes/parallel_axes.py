@@ -26,8 +26,8 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.vectors import TURN, Vector
+from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import Rows, about_x, about_z, vector_of
-from er3a.kinematics.classes.links import axes_of, poses_of, size_of
 from er3a.kinematics.classes.polish import newton
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2

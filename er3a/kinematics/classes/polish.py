@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
+from er3a.kinematics.chain import multiply_rigid, post_rotate_z
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.geometry.vectors import TURN, wrap_to_pi
+from er3a.kinematics.chain import axes_of, poses_of
 from er3a.kinematics.classes.arm_angle import SphericalConstants, frame_along, spherical_constants, three_angles
-from er3a.kinematics.classes.links import axes_of, poses_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.geometry.vectors import TURN
-from er3a.kinematics.classes.links import multiply_rigid, post_rotate_z
+from er3a.kinematics.chain import multiply_rigid, post_rotate_z
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 

@@ -19,8 +19,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 import scipy
 
+from er3a.kinematics.chain import inverse_rigid, invert_rigid, multiply_rigid, poses_of, size_of
 from er3a.kinematics.classes.hidden_joint import Reading, equations_of_pose, readings_of, sampled_determinant
-from er3a.kinematics.classes.links import inverse_rigid, invert_rigid, multiply_rigid, poses_of, size_of
 from er3a.kinematics.classes.loop_rows import LoopMemory, hidden_angles, new_memory, pairs_at, remaining_joints
 from er3a.kinematics.classes.polish import SOLVES, newton, residual_and_jacobian, twin_start
 from er3a.numerics.arrays import Flags, Integers, Reals

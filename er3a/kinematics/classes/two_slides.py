@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from er3a.kinematics.chain import inverse_rigid, poses_of, size_of
 from er3a.kinematics.classes.hidden_joint import HARMONICS, SAMPLE_ANGLES, SAMPLES
-from er3a.kinematics.classes.links import inverse_rigid, poses_of, size_of
 from er3a.kinematics.classes.loop_rows import LoopMemory
 from er3a.kinematics.classes.polish import SOLVES, newton, twin_start
 from er3a.kinematics.classes.six_revolute import (

@@ -63,7 +63,7 @@ def import_urdf(
     from er3a.files.robot_writer import write_robot
     from er3a.files.urdf_references import write_urdf_references
     from er3a.formats.urdf import import_urdf as read_urdf
-    from er3a.formats.xacro import plain_urdf
+    from er3a.formats.urdf_tree import plain_urdf
     from er3a.robots.robot import robot_name
 
     with shown_work(f"{file}: the arm is read") as at, plain_urdf(file, xacro or ()) as plain:
@@ -98,7 +98,7 @@ def export_urdf(
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
     from er3a.files.robot_library import load_robot
-    from er3a.formats.srdf import export_srdf, pairs_not_checked
+    from er3a.formats.urdf import export_srdf, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
 
     arm = load_robot(robot)
@@ -219,8 +219,7 @@ def calibrate(
         write_robot(corrected, output)
     distances = found.distances_mm(others) if others else None
     if html or rrd:
-        from er3a.pipeline.viewing.calibration import measured_errors, write_calibration
-        from er3a.pipeline.viewing.calibration_recording import record_calibration
+        from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
     if html:
         command, files = ["er3a", *sys.argv[1:]], [given for given in (Path(robot), file) if given and given.is_file()]
         shown = partial(write_calibration, command=command, files=files, corrected=corrected, recording=rrd)

@@ -122,7 +122,7 @@ def teach(
 
     A file (.csv with a D-H table, .yaml, .urdf) needs no study: its page is written into this folder.
     """
-    from er3a.files.arm_file import READ
+    from er3a.files.by_name import READ
     from er3a.pipeline.results import write_checksum
     from er3a.pipeline.teach.panel import write_teach_page
 
@@ -138,7 +138,7 @@ def teach(
 
 def _teach_file(source: str, page: Path) -> None:
     """Write the panel of an arm that stands in a file."""
-    from er3a.files.arm_file import read_arm
+    from er3a.files.by_name import read_arm
     from er3a.files.kept_files import sha256
     from er3a.pipeline.code_digest import code_digest
     from er3a.pipeline.results import Input, Provenance

@@ -6,7 +6,7 @@ import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import by, joined, listed, say, say_as, texts, word
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.planning.intervals import (
+from er3a.planning.motion_faults import (
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
     JerkTooGreat,

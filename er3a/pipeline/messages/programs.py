@@ -15,7 +15,7 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.planning import unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import ProgramCounts, ProgramSummary
-from er3a.planning.intervals import TooFast
+from er3a.planning.motion_faults import TooFast
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.program_check_findings import (
     AcceleratesMoreThanAssumed,

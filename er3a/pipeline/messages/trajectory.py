@@ -23,7 +23,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.planning.intervals import JerkTooGreat, RateCause
+from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.path_verdicts import PathVerdict
 
 FIGURES = {

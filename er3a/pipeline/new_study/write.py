@@ -1,34 +1,452 @@
-"""A study's files: found out, then written where none of them stands yet."""
+"""A study's files: found out, then written where none of them stands yet.
+
+Targets that an arm reaches and paths that it can do are found by the judgement of the inverse and trajectory stages.
+Poses are looked for above the scene's table with the tool straight down first, then at joint values drawn within the
+limits that are away from singular poses and clear of collisions. What is written is what was tried: millimetres and
+degrees, rounded before they are solved, with the joint values as reference that make the inverse stage choose them.
+"""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain, combinations, islice, product
 from pathlib import Path
 from typing import Any, Literal
 
 import jinja2
+import numpy as np
 
+from er3a.collision.bodies import Bodies
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.kept_files import write_atomically
+from er3a.files.path_file import PathFile, ProgramPath
 from er3a.files.reference_sets import FORMATS
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
 from er3a.files.robot_library import read_robot, robot_of, robot_path
 from er3a.files.robot_writer import robot_file, yaml_text
 from er3a.files.scene_file import SceneFile
 from er3a.files.shipped import ROOT
+from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.formats.mesh_file import read_text
 from er3a.formats.urdf import import_urdf
-from er3a.formats.urdf_tree import Split
-from er3a.formats.xacro import plain_urdf
+from er3a.formats.urdf_tree import Split, plain_urdf
+from er3a.geometry.transforms import rpy_of
+from er3a.kinematics.by_class import arm_solver
+from er3a.kinematics.classes.chain_solvers import Unsolved
+from er3a.kinematics.forward import forward, frames
+from er3a.kinematics.inverse import inverse
+from er3a.kinematics.singularity import NearSingular
+from er3a.kinematics.solutions import Solutions, Target
 from er3a.kinematics.wrist_partitioned import has_branches
-from er3a.pipeline.new_study.tasks import LEAST_TARGETS, Spot, TaskSearch, reach_of, scenes
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
+from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, wanted_of
+from er3a.planning.commands import CommandSource
+from er3a.planning.timing import JointLimits
+from er3a.planning.tool_proof import Wanted
+from er3a.robots.joint_limits import limit_margin, shown, within
 from er3a.robots.robot import Convention, Robot, robot_name
+from er3a.selection.nearest import nearest
+from er3a.selection.select import refusals_of
+
+POINTS_DRAWN = 4000
+SIDES_DEG = (0, 90, -90, 180)
+FLOOR_BELOW_MM = 5
+ROOM_BELOW_M, ROOM_BELOW = 0.1, 0.1  # at least, and of the reach
+TABLE_TOP, TABLE_FROM, TABLE_LENGTH, TABLE_WIDTH = 0.12, 0.4, 0.5, 0.9  # of the reach
+TABLE_THICKNESS_MM = 40
+LEAST_RADIUS_M = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class SampledReach:
+    """Of the tool point over random joint values.
+
+    Attributes
+    ----------
+    q : (N, n) rad or m, drawn within the limits, a tenth of each range away from them
+    poses : (N, 4, 4) m
+    radius : m, greatest distance from the base's origin
+    side_deg : about the base's z axis, where most of the points lie; one of ``SIDES_DEG``
+    stands : whether the arm works above its mounting plane rather than below it
+    """
+
+    q: Reals
+    poses: Reals
+    radius: float
+    side_deg: int
+    stands: bool
+
+
+def reach_of(robot: Robot) -> SampledReach:
+    """Sample what an arm reaches; the same for each call."""
+    margin = 0.1 * (robot.upper - robot.lower)
+    random = np.random.default_rng(0)
+    q = random.uniform(robot.lower + margin, robot.upper - margin, (POINTS_DRAWN, robot.joints))
+    q = q[kept] if (kept := within(robot, q)).any() else q
+    poses = forward(robot, q)
+    away = poses[:, :3, 3] - robot.base[:3, 3]
+    azimuth = np.degrees(np.arctan2(away[:, 1], away[:, 0]))
+    near = [np.count_nonzero(np.abs((azimuth - side + 180) % 360 - 180) < 45) for side in SIDES_DEG]
+    side = SIDES_DEG[0] if near[0] > 0.4 * max(near) else SIDES_DEG[int(np.argmax(near))]
+    radius = max(float(np.linalg.norm(away, axis=1).max()), LEAST_RADIUS_M)
+    return SampledReach(q, poses, radius, side, bool(np.mean(away[:, 2] > 0) >= 0.5))
+
+
+def scenes(robot: Robot, reach: SampledReach) -> list[dict[str, Any]]:
+    """Scene files to try, the fullest first: the last is a floor below all that the arm reaches."""
+    ground = _foot_of(robot) * 1000
+    room = max(ROOM_BELOW_M, ROOM_BELOW * reach.radius)
+    low = math.floor((float(frames(robot, reach.q)[..., 2, 3].min()) - room) * 100) * 10
+    deep = _scene("Floor below all that the arm reaches", "机械臂可达范围以下的地面", float(low))
+    if not reach.stands:
+        return [deep]
+    top, from_axis, length, width = (
+        round(share * reach.radius * 100) * 10 for share in (TABLE_TOP, TABLE_FROM, TABLE_LENGTH, TABLE_WIDTH)
+    )
+    turn = math.radians(reach.side_deg)
+    out = from_axis + length / 2
+    x, y = robot.base[:2, 3] * 1000 + out * np.array([math.cos(turn), math.sin(turn)])
+    table = {
+        "name": "table",
+        "size_mm": [float(length), float(width), float(TABLE_THICKNESS_MM)],
+        "xyz_mm": [round(float(x), 1), round(float(y), 1), round(ground + top - TABLE_THICKNESS_MM / 2, 1)],
+        "rpy_deg": [0.0, 0.0, float(reach.side_deg)],
+    }
+    floor = _scene("Table on the floor", "地面上的工作台", round(ground - FLOOR_BELOW_MM, 1))
+    bare = _scene("Floor", "地面", round(ground - FLOOR_BELOW_MM, 1))
+    return [floor | {"boxes": [table]}, bare, deep]
+
+
+def _foot_of(robot: Robot) -> float:
+    """Height (m) on which the arm stands: of the base's frame, or where the base goes deeper."""
+    shapes = arm_shapes(robot)
+    lines = [point for each in shapes.capsules if each.link == 0 for point in (each.start, each.end)]
+    points = [(0.0, 0.0, 0.0), *lines, *(point for each in shapes.pieces if each.link == 0 for point in each.points)]
+    heights: Reals = np.array(points) @ robot.base[2, :3] + robot.base[2, 3]
+    return float(heights.min())
+
+
+def _scene(title: str, title_zh: str, height_mm: float) -> dict[str, Any]:
+    plane = {"name": "floor", "normal": [0.0, 0.0, 1.0], "offset_mm": height_mm}
+    return {"kind": "scene", "title": title, "title_zh": title_zh, "planes": [plane]}
+
+
+MOST_TARGETS, LEAST_TARGETS = 5, 2
+NAMED_PAIRS = 3
+APART = 0.1  # of the reach
+TRIES, CHOICE = 150, 30  # of poses above the ground and of drawn ones each; solved ones to choose from
+TRIES_SLOW, CHOICE_SLOW = 20, 10  # of arms that are solved slowly
+DRAWN = 1000  # joint vectors that are judged at once
+LIMIT_MARGIN_RAD = np.radians(8.0)
+FULL_POSE = 6  # joints that it takes to hold any pose
+FINE_BELOW = 40.0  # deg or mm
+SINGULAR_MARGIN = 2.0  # times what the study calls near
+DOWN_DEG = (180, 0, 0)
+HEIGHTS, DISTANCES, ASIDE = (0.3, 0.4, 0.22), (0.6, 0.5, 0.7, 0.42), (0.0, 0.25, -0.25, 0.12, -0.12)  # of the reach
+STEPS = ((0, 1, 0), (0, 0, 1), (1, 0, 0), (0, -1, 0), (0, 0, -1), (-1, 0, 0))
+LENGTHS = (0.3, 0.2, 0.12, 0.06)  # of the reach
+DURATIONS_S = (3.0, 6.0, 12.0)
+PATH_SAMPLES = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A pose that the arm reaches, and the solution (n,) in rad or m that is best there.
+
+    Attributes
+    ----------
+    written : the pose as target files write it: ``xyz_mm`` with ``rpy_deg`` in whole degrees, or ``q_deg``
+    xyz_mm : the tool point
+    """
+
+    written: dict[str, list[float]]
+    xyz_mm: tuple[float, float, float]
+    q: Reals
+    label: str
+
+    @property
+    def pose(self) -> dict[str, list[float]]:
+        """As path files write it."""
+        return {key: [*self.written[key]] for key in ("xyz_mm", "rpy_deg")}
+
+    @property
+    def down(self) -> bool:
+        """Whether the tool is asked to point straight down."""
+        return tuple(self.written.get("rpy_deg", ())[:2]) == DOWN_DEG[:2]
+
+
+@dataclass(frozen=True)
+class DrawnCounts:
+    """How many of the joint vectors drawn within the limits meet each condition for a target.
+
+    Attributes
+    ----------
+    fit : those that meet all conditions
+    near_limit, near_singular, colliding : those that fail it, whatever else they fail
+    overlaps : pairs of bodies, those that overlap most often first, with in how many
+    """
+
+    drawn: int
+    fit: int
+    near_limit: int
+    near_singular: int
+    colliding: int
+    overlaps: tuple[tuple[str, int], ...]
+
+
+@dataclass
+class TaskSearch:
+    """What an arm can do in a scene, by the settings of the study's trajectory stage.
+
+    Attributes
+    ----------
+    fit : (k, n), rad or m, joint vectors drawn within the limits that meet all conditions for a target
+    counts : how many meet which
+    tried : how many poses were solved
+    rejected : kind of path -> why paths of it that were tried are none that the arm can do, with how many
+    """
+
+    robot: Robot
+    reach: SampledReach
+    scene: Scene
+    settings: TrajectorySettings
+    follows_tool: bool = field(init=False)
+    near: NearSingular = field(init=False)
+    limits: JointLimits = field(init=False)
+    wanted: Wanted = field(init=False)
+    bodies: Bodies = field(init=False)
+    middle: Reals = field(init=False)
+    fit: Reals = field(init=False)
+    counts: DrawnCounts = field(init=False)
+    tried: int = 0
+    rejected: dict[str, Counter[str]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.follows_tool = has_branches(self.robot)
+        self.limits, self.wanted = limits_of(self.robot, self.settings), wanted_of(self.robot, self.settings)
+        self.near, self.bodies = self.wanted.near, Bodies(self.robot, self.scene)
+        self.middle = self.reach.q.mean(axis=0)
+        q = self.reach.q[:DRAWN]
+        roomy, regular, free = self._roomy(q), self._regular(q), self.bodies.free(q)
+        self.fit = q[roomy & regular & free]
+        touching = Counter({pair.label: 0 for pair in self.bodies.pairs})
+        for pair, count in zip(self.bodies.pairs, self.bodies.overlaps(q).sum(axis=0).tolist()):
+            touching[pair.label] = max(touching[pair.label], count)
+        near_limit, near_singular, colliding = (int(np.count_nonzero(~each)) for each in (roomy, regular, free))
+        often = tuple((label, count) for label, count in touching.most_common(NAMED_PAIRS) if count)
+        self.counts = DrawnCounts(len(q), len(self.fit), near_limit, near_singular, colliding, often)
+
+    def spots(self) -> list[Spot]:
+        """Poses far from one another: at most ``MOST_TARGETS``, fewer where the arm reaches no more of those tried."""
+        if not len(self.fit):
+            return []
+        slow = self.robot.joints > FULL_POSE or isinstance(arm_solver(self.robot).chain, Unsolved)
+        tries, most = (TRIES_SLOW, CHOICE_SLOW) if slow else (TRIES, CHOICE)
+        written = chain(islice(self._above_ground(), tries), islice(self._drawn(), tries))
+        choice = list(islice(filter(None, map(self._spot, written)), most))
+        found = choice[:1]
+        while choice and len(found) < MOST_TARGETS:
+            away = [min(_distance(spot, other) for other in found) for spot in choice]
+            if max(away) < APART * self.reach.radius * 1000:
+                break
+            found.append(choice[int(np.argmax(away))])
+        return found
+
+    def any_spots(self) -> list[Spot]:
+        """Poses of drawn joint values, whatever is in the way."""
+        reach = self.reach
+        values = [self._written(q) for q in reach.q[:MOST_TARGETS]]
+        written = [{"q_deg": each, "q_ref_deg": [*each]} for each in values]
+        points = (reach.poses[:MOST_TARGETS, :3, 3] * 1000).tolist()
+        return [Spot(pose, (x, y, z), q, "") for pose, (x, y, z), q in zip(written, points, reach.q)]
+
+    def any_path(self, spots: list[Spot]) -> list[dict[str, Any]]:
+        """A slow joint move between two of them, whatever is in the way."""
+        return [
+            entry | {"duration_s": DURATIONS_S[-1], "samples": PATH_SAMPLES}
+            for entry in islice(self._joint_moves(spots), 1)
+        ]
+
+    def paths(self, spots: list[Spot]) -> list[dict[str, Any]]:
+        """Entries of a path file, each safe and away from singular poses: a joint move and, where the arm has branches,
+        a line and an arc.
+        """
+        kinds = {"joint": self._joint_moves}
+        if self.follows_tool:
+            kinds |= {"line": self._lines, "arc": self._arcs}
+        return [found for kind, entries in kinds.items() if (found := self._first_safe(kind, entries(spots)))]
+
+    def _above_ground(self) -> Iterator[dict[str, list[float]]]:
+        """Poses above the ground on the side where the arm works, tool down, for arms that can hold any pose."""
+        base = self.robot.base
+        if not self.reach.stands or self.robot.joints < FULL_POSE:
+            return
+        turn = np.radians(self.reach.side_deg)
+        out, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
+        for height in HEIGHTS:
+            for distance in DISTANCES:
+                for share in ASIDE:
+                    point = base[:3, 3] + self.reach.radius * (distance * out + share * aside + [0, 0, height])
+                    yield {"xyz_mm": _millimetres(point), "rpy_deg": [180.0, 0.0, 0.0]} | self._where_open(self.middle)
+
+    def _drawn(self) -> Iterator[dict[str, list[float]]]:
+        """Poses of drawn joint values that meet all conditions: of arms with fewer than six joints the joint values.
+
+        A rounded pose is none that those can hold.
+        """
+        for q, pose in zip(self.fit, forward(self.robot, self.fit)):
+            if self.robot.joints < FULL_POSE:
+                yield {"q_deg": self._written(q)}
+            else:
+                rpy = np.round(np.degrees(rpy_of(pose))).tolist()
+                yield {"xyz_mm": _millimetres(pose[:3, 3]), "rpy_deg": rpy} | self._where_open(q)
+
+    def _where_open(self, q: Reals) -> dict[str, list[float]]:
+        """The joint values (n,) that settle what a pose leaves open, for arms with more than six joints."""
+        return {"q_ref_deg": self._written(q)} if self.robot.joints > FULL_POSE else {}
+
+    def _spot(self, pose: dict[str, list[float]]) -> Spot | None:
+        """The pose with its solution that has most room; None if the inverse stage would not choose one that fits."""
+        self.tried += 1
+        try:
+            solutions = self._solutions(pose)[0]
+            rows = np.flatnonzero(solutions.solved & within(self.robot, solutions.q))
+            rows = rows[self._fits(solutions.q[rows])]
+            if not rows.size:
+                return None
+            best = rows[limit_margin(self.robot, solutions.q[rows]).argmax()]
+            written = pose | {"q_ref_deg": self._written(solutions.q[best])}
+            solutions, target = self._solutions(written)
+        except Er3aError:
+            return None
+        chosen = nearest(self.robot, solutions, target.q_ref, refusals_of(self.bodies, solutions)).chosen
+        if chosen is None or not self._fits(solutions.q[[chosen]])[0]:
+            return None
+        x, y, z = (target.T[:3, 3] * 1000).tolist()
+        written = {key: [*values] for key, values in written.items()}  # YAML would alias lists that several share
+        return Spot(written, (x, y, z), solutions.q[chosen], str(solutions.label[chosen]))
+
+    def _solutions(self, pose: dict[str, list[float]]) -> tuple[Solutions, Target]:
+        target = parse(TargetEntry, {"name": "spot", **pose}, None).target(self.robot)
+        return inverse(self.robot, target.T, target.q_ref, self_motion_rows=True), target
+
+    def _fits(self, q: Reals) -> Flags:
+        """Whether joints (N, n) are away from limits and singular poses, and clear of everything."""
+        fits = self._roomy(q) & self._regular(q)
+        fits[fits] = self.bodies.free(q[fits])
+        return fits
+
+    def _roomy(self, q: Reals) -> Flags:
+        """Whether joints (N, n) are away from their limits, by 8 deg or a twentieth of the range."""
+        robot = self.robot
+        least = np.minimum(np.where(robot.slides, np.inf, LIMIT_MARGIN_RAD), (robot.upper - robot.lower) / 20)
+        room = (np.minimum(q - robot.lower, robot.upper - q) > least) | robot.continuous
+        return np.asarray(room.all(axis=-1))
+
+    def _written(self, q: Reals) -> list[float]:
+        """Joint values (n,) as files have them: whole degrees and mm, hundredths where the range is small."""
+        step = np.where(shown(self.robot, self.robot.upper - self.robot.lower) > FINE_BELOW, 1.0, 0.01)
+        values: list[float] = (np.round(np.round(shown(self.robot, q) / step) * step, 2) + 0.0).tolist()
+        return values
+
+    def _regular(self, q: Reals) -> Flags:
+        """Whether joints (N, n) are away from singular poses, by twice what the study calls near."""
+        return np.asarray(self.near.margin(self.robot, q) > SINGULAR_MARGIN)
+
+    def _joint_moves(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
+        for start, end in combinations(spots, 2):
+            yield {
+                "name": "joint_move",
+                "kind": "joint",
+                "title": "All joints together, from one target to another",
+                "title_zh": "各关节同时运动，从一个目标到另一个",
+                "start_deg": self._written(start.q),
+                "end_deg": self._written(end.q),
+            }
+
+    def _lines(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
+        titles = {"title": "A straight line, the tool held as it is", "title_zh": "直线，工具姿态不变"}
+        for length, spot, step in product(LENGTHS, spots, STEPS):
+            end = _shifted(spot, length * self.reach.radius * np.array(step))
+            if self._reached(spot, end):
+                yield _move("line", titles, spot, {"end": end})
+
+    def _arcs(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
+        titles = {"title": "Half a circle, the tool held as it is", "title_zh": "半圆，工具姿态不变"}
+        for length, spot, (step, side) in product(LENGTHS, spots, zip(STEPS, (*STEPS[2:], *STEPS[:2]))):
+            way, bulge = (length * self.reach.radius * np.array(each) for each in (step, side))
+            via, end = _shifted(spot, way / 2 + bulge / 2), _shifted(spot, way)
+            if self._reached(spot, via) and self._reached(spot, end):
+                yield _move("arc", titles, spot, {"via_mm": via["xyz_mm"], "end": end})
+
+    def _reached(self, spot: Spot, pose: dict[str, list[float]]) -> bool:
+        """Whether the arm reaches another pose on a target's branch, with room and clear of everything."""
+        solutions = self._solutions(pose)[0]
+        same = np.array([str(label) == spot.label for label in solutions.label], bool)
+        rows = np.flatnonzero(solutions.solved & same)
+        return bool(self._fits(solutions.q[rows]).any())
+
+    def _first_safe(self, kind: str, entries: Iterator[dict[str, Any]]) -> dict[str, Any] | None:
+        """The first entry that is safe, with the shortest of ``DURATIONS_S`` in which it is."""
+        rejected = self.rejected[kind] = Counter()
+        for entry in entries:
+            for duration in DURATIONS_S:
+                timed = entry | {"duration_s": duration, "samples": PATH_SAMPLES}
+                if (fault := self._fault(timed)) is None:
+                    return timed
+                if not fault.startswith("too fast"):
+                    break
+            rejected[fault or ""] += 1
+        return None
+
+    def _fault(self, written: dict[str, Any]) -> str | None:
+        """Why the trajectory stage would not call a path safe and away from singular poses; None where it would."""
+        entry = parse(PathFile, {"kind": "paths", "paths": [written]}, None).paths[0]
+        assert not isinstance(entry, ProgramPath)
+        try:
+            motion = motion_of(
+                self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.wanted
+            )
+        except Er3aError:
+            return "can't be followed"
+        judgement = judge(self.robot, motion, self.near, self.limits)
+        if judgement.verdict != "safe":
+            return judgement.verdict
+        if judgement.events:
+            return "near-singular"
+        around = Surroundings(self.bodies, self.settings.penetration_tolerance_mm / 1000)
+        return "collides" if measured(around, motion).contacts else None
+
+
+def _move(kind: str, titles: dict[str, str], spot: Spot, rest: dict[str, Any]) -> dict[str, Any]:
+    """A path of the tool, without its duration."""
+    branch = spot.label.replace("_elbow", ", elbow").replace("_no_flip", ", no flip").replace("_flip", ", flip")
+    return {"name": kind, "kind": kind, **titles, "start": spot.pose, "start_branch": branch.replace("_", " "), **rest}
+
+
+def _distance(spot: Spot, other: Spot) -> float:
+    return float(np.linalg.norm(np.subtract(spot.xyz_mm, other.xyz_mm)))
+
+
+def _millimetres(point: Reals) -> list[float]:
+    rounded: list[float] = (np.round(point * 200) * 5 + 0.0).tolist()  # to 5 mm
+    return rounded
+
+
+def _shifted(spot: Spot, way: Reals) -> dict[str, list[float]]:
+    return {"xyz_mm": _millimetres(np.array(spot.xyz_mm) / 1000 + way), "rpy_deg": [*spot.written["rpy_deg"]]}
+
 
 SCHEMA_LINE = "# yaml-language-server: $schema=../../config/robot.schema.json\n"
 

@@ -15,8 +15,8 @@ from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.singularity import TYPES, NearSingular, characteristic_length
+from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.kinematics import branch_word

@@ -46,9 +46,8 @@ from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
-from er3a.pipeline.viewing.heads import stage_head
 from er3a.pipeline.viewing.numbers import number
-from er3a.pipeline.viewing.page import PAGES, Picture, alternative_table, status_word
+from er3a.pipeline.viewing.page import PAGES, Picture, alternative_table, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import shown

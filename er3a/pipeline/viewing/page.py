@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -30,8 +31,9 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.pages import GRADE_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, say, say_all, word
-from er3a.pipeline.results import Provenance, Stored, read_status
+from er3a.pipeline.results import Provenance, Stored, read_stage, read_status
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings, svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed, number
@@ -406,3 +408,9 @@ def panel_link(q_deg: Iterable[float], text: str) -> str:
     """A text that leads to the arm at joint values (deg; mm of joints that slide) in the teach panel."""
     joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
     return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)
+
+
+def stage_head(folder: Path, stage: Stage) -> Head:
+    """The verdict and key figures that a folder holds, in the page's language."""
+    words = import_module(stage.messages)
+    return head_of(read_stage(folder, stage), words.FIGURES)

@@ -30,8 +30,9 @@ from er3a.kinematics.forward import forward, rows_of, step_row, turn_row
 from er3a.kinematics.singularity import characteristic_length
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import inner_kernel, kernel
-from er3a.planning.avoidance.avoidance_findings import (
+from er3a.planning.avoidance.avoidance import (
     AccelerationExceeded,
+    Avoidance,
     BeginsInRegion,
     BeginsOutOfReach,
     BranchEnds,
@@ -44,9 +45,12 @@ from er3a.planning.avoidance.avoidance_findings import (
     NotPossible,
     PartlyOutOfReach,
     PathNotFinished,
+    SingularSegment,
     SpeedExceeded,
+    Strategy,
+    coarse,
+    singular_segment,
 )
-from er3a.planning.avoidance.singular_segment import Avoidance, SingularSegment, Strategy, coarse, singular_segment
 from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
 from er3a.planning.follow import Followed, follow

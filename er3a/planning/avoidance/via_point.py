@@ -20,9 +20,8 @@ from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import TYPES, SingularityType, characteristic_length, determinant_factors, factor_of
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
-from er3a.planning.avoidance import avoidance_findings
-from er3a.planning.avoidance.avoidance_findings import NotPossible
-from er3a.planning.avoidance.singular_segment import AT_REST, Avoidance, SingularSegment, coarse, singular_segment
+from er3a.planning.avoidance import avoidance
+from er3a.planning.avoidance.avoidance import AT_REST, Avoidance, NotPossible, SingularSegment, coarse, singular_segment
 from er3a.planning.follow import follow
 from er3a.planning.moves import ToolPath
 from er3a.planning.profiles import quintic
@@ -111,11 +110,11 @@ def tilted_via(segment: SingularSegment) -> Avoidance | NotPossible:
 
 def _via(segment: SingularSegment, kind: Kind) -> Avoidance | NotPossible:
     if not segment.regions:
-        return avoidance_findings.NoSingularRegion()
+        return avoidance.NoSingularRegion()
     if segment.regions[0][0] == 0:
-        return avoidance_findings.BeginsInRegion()
+        return avoidance.BeginsInRegion()
     if segment.regions[-1][1] == len(segment.t):
-        return avoidance_findings.EndsInRegion()
+        return avoidance.EndsInRegion()
     bends = [_bends(segment, first, last, kind) for first, last in segment.regions]
     if not all(bends):
         return _none_far_enough(segment, kind)
@@ -129,7 +128,7 @@ def _via(segment: SingularSegment, kind: Kind) -> Avoidance | NotPossible:
                 return Avoidance(_carried_out(segment, other))
             fallback = fallback or other
     if fallback is None:
-        return avoidance_findings.BentPathSingular()
+        return avoidance.BentPathSingular()
     return Avoidance(_carried_out(segment, fallback))
 
 
@@ -264,5 +263,5 @@ def _least(
 
 def _none_far_enough(segment: SingularSegment, kind: Kind) -> NotPossible:
     if kind == "shift":
-        return avoidance_findings.NoShiftKeepsDistance(FARTHEST["shift"] * characteristic_length(segment.robot) * 1000)
-    return avoidance_findings.NoTiltKeepsDistance(float(np.degrees(FARTHEST["tilt"])))
+        return avoidance.NoShiftKeepsDistance(FARTHEST["shift"] * characteristic_length(segment.robot) * 1000)
+    return avoidance.NoTiltKeepsDistance(float(np.degrees(FARTHEST["tilt"])))

@@ -14,16 +14,17 @@ from er3a.dynamics.margins import (
     ASSUMED,
     DriveLimits,
     Margin,
+    load_diagram,
     load_tolerance,
     max_payload,
     max_speed_scale,
     tolerances_of,
     torque_tolerance,
+    wrist_use,
 )
 from er3a.dynamics.plausibility import MassFinding, MissingLink, mass_findings
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
-from er3a.dynamics.wrist import load_diagram, wrist_use
 from er3a.files.robot_library import load_of
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import NearSingular

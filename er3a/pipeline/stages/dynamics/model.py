@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.dynamics.margins import Binding
+from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
-from er3a.dynamics.wrist import WristQuantity
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict

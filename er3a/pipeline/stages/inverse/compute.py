@@ -79,8 +79,7 @@ from er3a.robots.joint_limits import limit_margin, shown
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import AllCollide, Choice, Refusal, nearest
 from er3a.selection.rule_names import RuleName
-from er3a.selection.select import RULES, available_rules, mixed_cost, refusals
-from er3a.selection.sequence import MoveRule, best_of_sets
+from er3a.selection.select import RULES, MoveRule, available_rules, best_of_sets, mixed_cost, refusals
 
 SINGULAR = 1e-6
 LITTLE_MARGIN_DEG = 2.0

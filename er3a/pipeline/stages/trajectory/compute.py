@@ -14,10 +14,10 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps, PairTooNear
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.configuration import branch_labels
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, factors_where_defined
+from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
@@ -63,12 +63,11 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, wanted_of
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
-from er3a.planning.avoidance.singular_segment import SingularSegment, singular_segment
+from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.planning.intervals import Interval
+from er3a.planning.motion_faults import Interval, SingularEvent
 from er3a.planning.path_verdicts import PathVerdict
-from er3a.planning.singular_events import SingularEvent
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, within

@@ -23,23 +23,28 @@ from er3a.pipeline.stages.trajectory.model import (
     PairTouches,
 )
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.planning.intervals import (
+from er3a.planning.motion_faults import (
     AccelerationTooGreatIfAssumed,
+    GreatestRates,
     Interval,
     LimitCause,
+    LimitCheck,
     PathOutOfReach,
     RateCause,
+    RateCheck,
+    SingularCheck,
+    SingularEvent,
     TooFastIfAssumed,
+    jerk_exceeded,
     out_of_limits,
     rates_exceeded,
+    singular_events,
     unreachable,
 )
 from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
 from er3a.planning.piecewise import Polynomials
-from er3a.planning.polynomial_checks import GreatestRates, LimitCheck, RateCheck, SingularCheck
-from er3a.planning.singular_events import SingularEvent, singular_events
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import Undecided, jerk_intervals
+from er3a.planning.tool_proof import Undecided
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -103,7 +108,7 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
         found = _tool_faults(robot, motion, near, limits)
     times = np.unique(np.concatenate([motion.checks, [event.t for event in found.events]]))
     q, velocity, acceleration = motion.rates(times)
-    beyond = unreachable(motion.followed) if motion.followed else []
+    beyond = unreachable(robot, motion.followed) if motion.followed else []
     jumps = motion.followed.jumps if motion.followed else ()
     edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
     bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
@@ -183,7 +188,7 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
     fast: list[Interval[RateCause]] = []
     for limit in limits.rates:
         if limit.order == 3:
-            fast += jerk_intervals(proof, limit)
+            fast += jerk_exceeded(proof.times, proof.jerk, proof.steps, limit)
             continue
         fast += rates_exceeded(at, rates[:, limit.order - 1], limit, partial(_rate, motion, limit.order))
     known = rates[np.isfinite(rates).all(axis=(1, 2))]

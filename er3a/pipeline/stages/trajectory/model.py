@@ -20,7 +20,7 @@ from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.avoidance.strategy_names import StrategyName
-from er3a.planning.intervals import LimitCause, PathOutOfReach, RateCause
+from er3a.planning.motion_faults import LimitCause, PathOutOfReach, RateCause
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.tool_proof import Undecided
 from er3a.planning.way_around import NoWayAround

@@ -22,9 +22,8 @@ from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.study import Study
-from er3a.planning.build import Built, build
 from er3a.planning.class_follow import PathEndsError, follow_by_class
-from er3a.planning.commands import Command, CommandSource, PlanCommand
+from er3a.planning.commands import Built, Command, CommandSource, PlanCommand, build
 from er3a.planning.follow import Followed
 from er3a.planning.moves import JointMove
 from er3a.planning.path_verdicts import PathVerdict
@@ -138,14 +137,14 @@ def motion_of(
     *,
     task: PlanningTask | None = None,
 ) -> Motion:
-    """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.build.build`.
+    """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.commands.build`.
 
     ``wanted`` is what is to be settled between the poses that are solved; ``task`` is for motions to be planned.
 
     Raises
     ------
     InputError
-        for what :func:`er3a.planning.build.build` refuses, and a start branch that has no solution at the start
+        for what :func:`er3a.planning.commands.build` refuses, and a start branch that has no solution at the start
     NotWristPartitionedError, PathEndsError
         for a path of the tool that an arm without branches can't be made to follow
     """

@@ -1,15 +1,30 @@
-"""A model held against reference sets, number by number."""
+"""A model held against reference sets, number by number, and the verdict that a reader wants of it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from typing import Literal
+from functools import reduce
+from typing import Any, Literal
 
 import numpy as np
 
-from er3a.identifiability.reactions import CheckBasis
+from er3a.diagnosis.conclusions import TooSmallToTell
+from er3a.diagnosis.faults import CONVENTIONS, WrongLimit
+from er3a.identifiability.entries import GROUP_OF
+from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
+from er3a.identifiability.evidence import PART_OF_GROUP, PartName, PartStatus, parts_of, together
+from er3a.identifiability.proposals import Proposal
+from er3a.identifiability.reactions import CheckBasis, CheckCounts, count_checks
+from er3a.identifiability.statements import (
+    NOT_OFF,
+    ToolOff,
+    inconsistent_with_own_text,
+    is_another_arm,
+    is_unexplained,
+    not_the_robot_described,
+)
 from er3a.kinematics.round_trips import (
     MOST_BY_CLASS,
     NEAR_ELBOW_DEG,
@@ -21,32 +36,50 @@ from er3a.kinematics.round_trips import (
 )
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation.model import (
+    AnotherArm,
+    Axes,
     Check,
+    Claims,
+    Confirmed,
     Conflict,
+    Contradicted,
+    Contradiction,
+    DefinedOtherwise,
+    KeyPoses,
+    LeftOpen,
+    LikelyFault,
     Margins,
     ModelCheck,
     ModelGroup,
+    ModelUnsound,
     NearSingularLeftOut,
     NoClosedForm,
     Note,
+    NothingToCompare,
     NotInRobotFile,
     NumbersMissing,
+    PartFound,
     ReferenceCheck,
     RoundTripErrors,
     SelfCheck,
     SelfChecked,
+    SetDiagnosis,
     SetHasNoData,
+    SetSummary,
     SourceGivesNone,
     Statement,
+    TableEvidence,
     Unjudged,
+    Validated,
     WholeGroup,
 )
 from er3a.references.quantities import Limit, Quantity, Speed
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow
 from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed, ReferenceSubject
-from er3a.robots.robot import Robot
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
 ROUNDING = 1e-9
 
@@ -244,3 +277,236 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[Check],
     ]
     margins = Margins(NEAR_WRIST_DEG, NEAR_ELBOW_DEG, NEAR_SHOULDER_MM)
     return checks, RoundTripErrors(**asdict(found), margins=margins)
+
+
+OF_THE_TOOL: tuple[PartName, ...] = ("geometry", "zero_and_directions")
+
+
+def parts_found(evidence: Evidence) -> tuple[PartFound, ...]:
+    """The parts of a table that its file gives."""
+    statuses = {part.code: part.status for part in parts_of(evidence)}
+    by_part: dict[PartName, list[EntryEvidence]] = {part: [] for part in PART_OF_GROUP.values()}
+    parts_by_column = {column: PART_OF_GROUP[group] for column, group in GROUP_OF.items()}
+    for each in (*evidence.entries, *evidence.combinations):
+        column = each.entry.split()[0].lstrip("-").rstrip("0123456789")
+        for known, part in parts_by_column.items():
+            if known == column:
+                by_part[part].append(each)
+    return tuple(_part(evidence, part, statuses[part], own) for part, own in by_part.items() if own)
+
+
+def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[EntryEvidence]) -> PartFound:
+    def named(wanted: Status) -> tuple[str, ...]:
+        return tuple(each.entry for each in own if each.status == wanted)
+
+    off = reduce(ToolOff.worse, (each.off for each in own if each.status in ("weak", "open")), NOT_OFF)
+    if part == "zero_and_directions" and named("open"):
+        off = off.worse(together(evidence, list(named("open"))))
+    return PartFound(
+        part=part,
+        status=status,
+        entries=sum(each.status != "gauge" for each in own),
+        settled=len(named("settled")),
+        up_to_signs=len(named("settled_up_to_signs")),
+        contradicted=named("contradicted"),
+        open=named("open"),
+        off=off,
+    )
+
+
+TELLING_SHARE = 0.25
+SHOWN_DECIMALS = 9
+
+
+def set_summaries(
+    robot: Robot, sets: list[ReferenceSet], checks: list[Check], poses: KeyPoses, diagnoses: Mapping[str, SetDiagnosis]
+) -> tuple[SetSummary, ...]:
+    """What was found against each reference set; diagnoses by its name, as far as there are any."""
+    found = []
+    for references in sets:
+        counts = counts_of(check for check in checks if check.reference_set == references.name)
+        weighing = counts.independent, counts.consistency
+        failed, total = (sum(getattr(each, name) for each in weighing) for name in ("failed", "total"))
+        diagnosis = diagnoses.get(references.name)  # there is none of arms with joints that slide or are coupled
+        conclusion = diagnosis.conclusion if diagnosis else None
+        found.append(
+            SetSummary(
+                name=references.name,
+                grades=tuple(sorted({reference.grade for reference in references.references})),
+                counts=counts,
+                another_arm=is_another_arm(failed, total, conclusion),
+                described=not_the_robot_described(robot, references) if is_unexplained(conclusion) else None,
+                own_text=inconsistent_with_own_text(robot, references),
+                zero_pose_flange_off_mm=_zero_pose_error(poses, references.name),
+            )
+        )
+    return tuple(found)
+
+
+def verdict_of(
+    checks: list[Check],
+    conflicts: list[Conflict],
+    sets: tuple[SetSummary, ...],
+    diagnoses: Mapping[str, SetDiagnosis],
+    evidence: TableEvidence | None,
+) -> Verdict[Validated]:
+    """The stage's answer."""
+    documented = [check for check in checks if isinstance(check, ReferenceCheck) and check.is_authoritative]
+    failed = [check for check in documented if check.status == "fail"]
+    named = {
+        name: diagnosis.conclusion
+        for name, diagnosis in diagnoses.items()
+        if isinstance(diagnosis.conclusion, LikelyFault)
+    }
+    common: dict[str, Any] = {
+        "counts": counts_of(checks),
+        "conflicts": len(conflicts),
+        "sets": tuple(each.name for each in sets),
+        "claims": _claims(sets),
+        "own_text": tuple(each.own_text for each in sets if each.own_text),
+    }
+    for check in checks:
+        if isinstance(check, ModelCheck) and check.status == "fail":
+            found = ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
+            return Verdict("fail", found)
+    if failed:
+        every = evidence.entries if evidence else ()
+        excluded = [each for each in every if each.status == "contradicted" and each.moves_tool]
+        common |= {"grades": _grades(documented), "contradicted": tuple(each.entry for each in excluded)}
+        return Verdict("fail", _missed(common, failed, sets, named))
+    if not documented:
+        return Verdict("no_reference", NothingToCompare(**common))
+    contradiction = _contradiction(conflicts) if conflicts else None
+    common |= {"contradiction": contradiction}
+    parts = evidence.parts if evidence else ()
+    moving = [part for part in parts if part.part in OF_THE_TOOL]
+    if not moving or any(part.status != "settled" for part in moving):
+        off = reduce(ToolOff.worse, (part.off for part in moving), NOT_OFF)
+        entries = (*evidence.entries, *evidence.combinations) if evidence else ()
+        statuses = [each.status for each in entries if each.moves_tool]
+        left = LeftOpen(
+            **common,
+            parts=parts,
+            tolerance=evidence.tolerance if evidence else None,
+            off=off,
+            at_least=any(each.at_least for each in entries),
+            unbounded=statuses.count("consistent"),
+            next_measurement=_next_measurement(evidence),
+        )
+        return Verdict("caution", left)
+    return Verdict("pass", Confirmed(**common, grades=_grades(documented)))
+
+
+def _next_measurement(evidence: TableEvidence | None) -> Proposal | None:
+    """What would settle the entry that leaves most open: what is open first, then by how far the tool could be off."""
+    if evidence is None:
+        return None
+    by_name = {each.entry: each for each in (*evidence.entries, *evidence.combinations)}
+
+    def gravity(proposal: Proposal) -> tuple[bool, float, float]:
+        each = by_name[proposal.entry]
+        return each.status == "open", each.off.mm, each.off.deg
+
+    return max(evidence.proposals, key=gravity, default=None)
+
+
+def counts_of(checks: Iterable[Check]) -> CheckCounts:
+    """Checks against references by what they rest on."""
+    referenced = [check for check in checks if isinstance(check, ReferenceCheck)]
+    return count_checks([check.kind for check in referenced], [check.status for check in referenced])
+
+
+def most_telling(failed: list[ReferenceCheck]) -> ReferenceCheck:
+    """The failed check to quote: of those not far behind the largest difference in mm, the first of the group that
+    tells most."""
+    lengths = [check for check in failed if check.unit == "mm"]
+    least = TELLING_SHARE * max((abs(check.difference) for check in lengths), default=0.0)
+    large = [check for check in lengths if abs(check.difference) >= least]
+    return min(large or failed, key=lambda check: GROUPS[check.group].telling)
+
+
+def key_figures(
+    checks: list[Check],
+    axes: Axes,
+    sets: tuple[SetSummary, ...],
+    reach: Mapping[str, float],
+    trips: RoundTripErrors | None,
+) -> tuple[Figure, ...]:
+    """The stage's key figures; ``reach`` in mm by the figure's name."""
+    counts = counts_of(checks)
+    figures = [
+        Figure(name, tally.passed, "", of=tally.total)
+        for name, tally in (("independent_checks", counts.independent), ("consistency_checks", counts.consistency))
+        if tally.total
+    ]
+    errors = [
+        (each.is_authoritative, each.zero_pose_flange_off_mm)
+        for each in sets
+        if each.zero_pose_flange_off_mm is not None
+    ]
+    if errors:
+        figures.append(_figure("zero_pose_flange_error", max(errors)[1]))
+    trusted = axes.take(np.isin(axes.grade, AUTHORITATIVE_GRADES))
+    if len(trusted):
+        figures.append(_figure("farthest_axis", float(trusted.distance_mm.max())))
+        figures.append(_figure("most_tilted_axis", float(trusted.angle_deg.max()), "deg"))
+    labels = [
+        abs(check.difference) for check in checks if isinstance(check, ReferenceCheck) and check.group == "envelope"
+    ]
+    if labels:
+        figures.append(_figure("worst_drawing_label", max(labels)))
+    figures += [_figure(name, value) for name, value in reach.items()]
+    if trips:
+        figures.append(Figure("round_trip_joint_error", trips.joint_error_deg, "deg"))
+    return tuple(figures)
+
+
+def _figure(name: str, value: float, unit: str = "mm") -> Figure:
+    return Figure(name, round(value, SHOWN_DECIMALS), unit)
+
+
+def _missed(
+    common: dict[str, Any],
+    failed: list[ReferenceCheck],
+    sets: tuple[SetSummary, ...],
+    named: Mapping[str, LikelyFault],
+) -> Contradicted | AnotherArm | DefinedOtherwise:
+    quoted = most_telling(failed)
+    common |= {
+        "reference_set": quoted.reference_set,
+        "check": quoted.subject,
+        "measured": quoted.measured,
+        "expected": quoted.expected,
+        "unit": quoted.unit,
+        "diagnosis": named.get(quoted.reference_set),
+    }
+    own = next(each for each in sets if each.name == quoted.reference_set)
+    if own.another_arm:
+        return AnotherArm(**common, described=own.described)
+    found = named.get(quoted.reference_set)
+    faults = () if found is None or isinstance(found, TooSmallToTell) else found.faults
+    chosen = any(isinstance(fault, CONVENTIONS) for fault in faults)
+    chosen &= all(isinstance(fault, (*CONVENTIONS, WrongLimit)) for fault in faults)
+    return DefinedOtherwise(**common) if chosen else Contradicted(**common)
+
+
+def _zero_pose_error(poses: KeyPoses, set_name: str) -> float | None:
+    own = (poses.reference_set == set_name) & (poses.group == "zero_pose") & (poses.point == "flange")
+    own &= np.isfinite(poses.deviation_mm)
+    return float(poses.deviation_mm[own].max()) if own.any() else None
+
+
+def _claims(sets: tuple[SetSummary, ...]) -> tuple[Claims, ...]:
+    found = [(each.name, each.counts.claims) for each in sets if not each.is_authoritative]
+    return tuple(Claims(name, claims.total, claims.failed) for name, claims in found if claims.total)
+
+
+def _contradiction(conflicts: list[Conflict]) -> Contradiction:
+    first = conflicts[0]
+    stated = tuple(statement.expected for statement in first.statements)
+    return Contradiction(first.subject, first.unit, stated, len(conflicts) - 1)
+
+
+def _grades(checks: list[ReferenceCheck]) -> tuple[Grade, ...]:
+    present = {check.grade for check in checks}
+    return tuple(grade for grade in AUTHORITATIVE_GRADES if grade in present)

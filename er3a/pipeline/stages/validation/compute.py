@@ -26,7 +26,17 @@ from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.validation.checks import GROUP as ROUND_TRIPS
-from er3a.pipeline.stages.validation.checks import checks_of_set, round_trip_checks, table_checks
+from er3a.pipeline.stages.validation.checks import (
+    SHOWN_DECIMALS,
+    checks_of_set,
+    counts_of,
+    key_figures,
+    parts_found,
+    round_trip_checks,
+    set_summaries,
+    table_checks,
+    verdict_of,
+)
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.stages.validation.model import (
     Axes,
@@ -55,15 +65,7 @@ from er3a.pipeline.stages.validation.model import (
     ValidationResults,
     ValidationSummary,
     WholeGroup,
-)
-from er3a.pipeline.stages.validation.subject import model_of
-from er3a.pipeline.stages.validation.verdict import (
-    SHOWN_DECIMALS,
-    counts_of,
-    key_figures,
-    parts_found,
-    set_summaries,
-    verdict_of,
+    model_of,
 )
 from er3a.pipeline.study import Study
 from er3a.references.circle_points import CirclePoints, circle_points

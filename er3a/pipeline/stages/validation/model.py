@@ -1,4 +1,4 @@
-"""What the stage's results hold."""
+"""What the stage's results hold, and which model of a robot they are of."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
 from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, NextMeasurement, TooSmallToTell
 from er3a.diagnosis.faults import Faults
+from er3a.files.robot_library import robot_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
 from er3a.identifiability.evidence import PartName, PartStatus
 from er3a.identifiability.proposals import Proposal
@@ -19,10 +20,11 @@ from er3a.kinematics.round_trips import SlotRoundTrips
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.references.quantities import Unit
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
-from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
 ModelGroup = Literal["table_sanity", "round_trips"]
 SelfChecked = Literal[
@@ -727,3 +729,8 @@ class ValidationResults(Results[ValidationSummary]):
 
 
 RESULTS = ValidationResults
+
+
+def model_of(study: Study, name: str) -> Robot:
+    """The robot as its file has it, without tool: references speak of its flange and of the manufacturer's base."""
+    return robot_of(study.table(name)).without_tool().replace(name=name)

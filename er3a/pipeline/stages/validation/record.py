@@ -11,9 +11,8 @@ import rerun.blueprint as rrb
 import er3a.pipeline.messages.validation  # noqa: F401
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.validation.diagnosis_figures import corrected_robot
-from er3a.pipeline.stages.validation.model import Axes, KeyPoses, NamedPose, ValidationResults
-from er3a.pipeline.stages.validation.subject import model_of
+from er3a.pipeline.stages.validation.model import Axes, KeyPoses, NamedPose, ValidationResults, model_of
+from er3a.pipeline.stages.validation.validation_figures import corrected_robot
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
 from er3a.pipeline.viewing.arm import log_arm, send_motion

@@ -17,13 +17,6 @@ from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.validation.arm_figures import axis_deviation, link_frames, side_view, workspace_drawing
-from er3a.pipeline.stages.validation.diagnosis_figures import (
-    corrected_robot,
-    correction_stories,
-    diagnosis_stories,
-    typographic,
-)
 from er3a.pipeline.stages.validation.evidence_section import (
     OTHER_TITLES,
     evidence_section,
@@ -42,8 +35,18 @@ from er3a.pipeline.stages.validation.model import (
     Unjudged,
     ValidationResults,
     ValidationSummary,
+    model_of,
 )
-from er3a.pipeline.stages.validation.subject import model_of
+from er3a.pipeline.stages.validation.validation_figures import (
+    axis_deviation,
+    corrected_robot,
+    correction_stories,
+    diagnosis_stories,
+    link_frames,
+    side_view,
+    typographic,
+    workspace_drawing,
+)
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Head, Picture, alternative_table, head_of, render, run_command

@@ -19,7 +19,7 @@ from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
-from er3a.pipeline.stages.workspace import table_rows
+from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
 from er3a.pipeline.stages.workspace.model import (
     AxisSummary,
@@ -58,10 +58,10 @@ from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid, shoulder_of
 from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import ReachExtremes, Tally, search_reach, section_cells, touched_growth
+from er3a.workspace.general_proof import Surface, surface_of
 from er3a.workspace.proven import Proven, prove_robot
 from er3a.workspace.side_view import border_lines, corner_side, side_views
 from er3a.workspace.single_changes import single_changes
-from er3a.workspace.surface import Surface, surface_of
 from er3a.workspace.voids import (
     UNSEEN_RATIO,
     Hull,
@@ -200,18 +200,18 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
     margin = motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm
     asked = study.section(CapabilitySettings)
     tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin / 1000, proven=proven)
-    vertices, triangles = table_rows.void_surfaces(voids)
+    vertices, triangles = model.void_surfaces(voids)
     return WorkspaceResults(
         summary=_summary(study, robot, samples, proven, voids, tool, scene=scene),
-        cells=table_rows.cells(tally, void_numbers(in_cloud, tally.counts, samples.inside)),
-        section=table_rows.section(section_cells(tally, grid)),
-        side_view=table_rows.side_view(side_views(robot, tally, grid, draw)),
-        curve=table_rows.curve(touched_growth(draw, tally, grid)),
-        cloud=table_rows.cloud(robot, samples.q_cloud),
-        hull_vertices=table_rows.hull_vertices(robot, hull, samples.q_extreme),
+        cells=model.cells(tally, void_numbers(in_cloud, tally.counts, samples.inside)),
+        section=model.section(section_cells(tally, grid)),
+        side_view=model.side_view(side_views(robot, tally, grid, draw)),
+        curve=model.curve(touched_growth(draw, tally, grid)),
+        cloud=model.cloud(robot, samples.q_cloud),
+        hull_vertices=model.hull_vertices(robot, hull, samples.q_extreme),
         hull_triangles=HullTriangles(hull.triangles),
-        proof=table_rows.proof(proven),
-        border=table_rows.border(border_lines(robot)),
+        proof=model.proof(proven),
+        border=model.border(border_lines(robot)),
         drawing=drawing_table(robot, float((shoulder - grid.axis_point) @ grid.axis)),
         void_vertices=vertices,
         void_triangles=triangles,

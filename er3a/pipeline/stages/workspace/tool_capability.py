@@ -18,9 +18,9 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.kinematics.by_class import parameters_of
-from er3a.kinematics.configuration import slot_labels
+from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.stages.workspace import table_rows
+from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.pipeline.stages.workspace.model import (
     BoxPlaces,
@@ -48,15 +48,16 @@ from er3a.workspace.orientations import AskedOrientations, asked_of
 from er3a.workspace.placement import (
     MIXED,
     NO,
+    BoxPlacement,
     Free,
     Task,
     box_points,
+    find_places,
     lattice_size,
     limited_joints,
     narrowed,
     serving_arms,
 )
-from er3a.workspace.placement_proof import BoxPlacement, find_places
 from er3a.workspace.proven import Proven
 from er3a.workspace.section_proof import ring_volumes
 from er3a.workspace.tool_inverse import (
@@ -240,7 +241,7 @@ def tool_capability(
         robot, settings, task, plan, scene=scene, margin=margin, best=float(found.manipulability.max())
     )
     return ToolCapability(
-        summary, placement, table_rows.capability(middles, found, tried, frame.bar > 0), places, bodies.unexamined
+        summary, placement, model.capability(middles, found, tried, frame.bar > 0), places, bodies.unexamined
     )
 
 
@@ -278,7 +279,7 @@ def _placed(
     placed = _placement_summary(robot, settings.placement, task, placement, best, scene=scene, margin=margin)
     arms = _arms_at(within, free, task, asked, placement)
     listed = tuple(_with_nearest(place, bodies, q) for place, q in zip(placed.places, arms))
-    return replace(placed, places=listed), table_rows.places(placement.best_turns)
+    return replace(placed, places=listed), model.places(placement.best_turns)
 
 
 def _tried(
