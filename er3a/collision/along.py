@@ -309,7 +309,9 @@ def _touch(
     if first > 0:
         start = float(scipy.optimize.brentq(apart, times[first - 1], start, xtol=near))
     beside = times[max(deepest - 1, 0)], times[min(deepest + 1, len(times) - 1)]
-    found = scipy.optimize.minimize_scalar(apart, bounds=beside, method="bounded", options={"xatol": DEEPEST / LOCATED * near})
+    found = scipy.optimize.minimize_scalar(
+        apart, bounds=beside, method="bounded", options={"xatol": DEEPEST / LOCATED * near}
+    )
     if found.fun < distances[deepest] - LEVEL:
         at = float(found.x)
         motion.measure(at, motion.joints(np.array([at]))[0], np.arange(len(motion.bodies.pairs)))

@@ -414,7 +414,9 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     for each in listed_motions(file, planning, wanted, settings.checks_per_sample):
         motion = each.motion
         if motion is None:
-            skipped.append(PathNotFollowed(each.name, each.title, closed_form_missing(robot), each.stops))
+            stops = each.ends.t if each.ends else None
+            lacking, outcome = closed_form_missing(robot), each.outcome_unfollowed
+            skipped.append(PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
             continue
         found = judge(robot, motion, near, limits)
         along = measured(surroundings, motion)
@@ -515,16 +517,17 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
 def _verdict(
     paths: list[PathSummary], skipped: list[PathNotFollowed]
 ) -> Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]:
-    if unmet := unmet_expectations(paths):
+    if unmet := unmet_expectations([*paths, *skipped]):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.expect in (None, "safe")]
+    unfollowed = [path for path in skipped if path.expect is None]
 
     def named(verdict: PathVerdict) -> tuple[str, ...]:
         return tuple(path.name for path in asked if path.verdict == verdict)
 
-    safe, count = len(named("safe")), len(asked) + len(skipped)
+    safe, count = len(named("safe")), len(asked) + len(unfollowed)
     finding = AllSafe if safe == count else SomeUnsafe if safe else NoneSafe
-    failed = any(_fails(path) for path in asked)
+    failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
     status: Status = "pass" if safe == count else "fail" if failed or not safe else "caution"
     counts = finding(
         paths=count,
@@ -538,8 +541,8 @@ def _verdict(
         too_fast_if_assumed=named("too fast for the assumed limits"),
         undecided=named("undecided"),
         near_singular=named("near-singular"),
-        demonstrations=demonstrations(paths, "safe"),
-        not_followed=tuple(path.name for path in skipped),
+        demonstrations=demonstrations([*paths, *skipped], "safe"),
+        not_followed=tuple(path.name for path in unfollowed),
     )
     return Verdict(status, counts)
 

@@ -328,12 +328,22 @@ class PathSummary:
 
 @dataclass(frozen=True)
 class PathNotFollowed:
-    """A path of the tool that could not be followed: what the arm lacks for branches, and of arms whose class gives the
-    joints all the same the time (s) beyond which the path is out of reach or asks a joint to leap; else None."""
+    """A path of the tool that could not be followed.
+
+    Attributes
+    ----------
+    lacking : what the arm lacks for branches
+    outcome : what it came to; ``undecided`` for an arm whose class has no way to follow it
+    expect : the verdict that its file expects
+    stops_at_s : of arms that are followed by their class, the time (s) beyond which the path is out of reach or asks a
+        joint to leap; else None
+    """
 
     name: str
     title: str
     lacking: ClosedFormMissing | None
+    outcome: PathVerdict
+    expect: PathVerdict | None
     stops_at_s: float | None = None
 
 
