@@ -9,7 +9,9 @@ import pytest
 import yaml
 from lxml import etree
 
+from er3a.files.robot_library import load_robot
 from er3a.pipeline.messages.trajectory import advice
+from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
 from er3a.pipeline.study import Study, load_study
@@ -131,3 +133,8 @@ def test_a_path_that_no_arm_of_its_class_follows_to_its_end_fails_unless_it_is_m
     (path,) = summary.not_followed
     assert path.outcome == "unreachable"
     assert 0 < path.stops_at_s < 4
+    programs = [
+        (made.name, made.files is None)
+        for made in programs_of(tmp_path / "paths.yaml", load_robot(arm), "csv", None, None, False)
+    ]
+    assert programs == [("joint_move", False), ("out", True)]
