@@ -138,7 +138,7 @@ class AvoidanceTask:
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
         chosen = best(free, meets)
-        tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
+        tried = tuple(_tried(self.robot, result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
             chosen=chosen.name if chosen else None,
@@ -279,14 +279,14 @@ def _quickest(segment: SingularSegment) -> Timed | None:
 
 
 def _tried(
-    result: StrategyResult, meets: PairOverlaps | PairTooNear | None, clearance_mm: float | None
+    robot: Robot, result: StrategyResult, meets: PairOverlaps | PairTooNear | None, clearance_mm: float | None
 ) -> TriedStrategy:
     reasons = (*result.reasons, meets) if meets else result.reasons
-    motion = _motion(result.cost, clearance_mm) if result.cost else None
+    motion = _motion(robot, result.cost, clearance_mm) if result.cost else None
     return TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
 
 
-def _motion(cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
+def _motion(robot: Robot, cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
     return stated(
         StrategyMotion,
         cost,
@@ -294,6 +294,7 @@ def _motion(cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
         max_deviation_mm=from_si("mm", cost.distance.max()),
         max_deviation_deg=from_si("deg", cost.angle.max()),
         duration=cost.motion.duration,
+        joint_swing_deg=tuple(shown(robot, np.ptp(cost.motion.q, axis=0)).tolist()),
         max_joint_speed=np.abs(cost.motion.velocity).max(axis=0),
         max_joint_acceleration=np.abs(cost.motion.acceleration).max(axis=0),
         clearance_mm=clearance_mm,

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
-from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
+from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import GRADE_NAMES, decision
 from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
