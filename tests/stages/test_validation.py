@@ -548,7 +548,7 @@ def test_a_named_fault_is_in_the_verdict_and_on_the_page(study, tmp_path):
 
 def carried_out(study: Study, page: str, folder: Path) -> Stored[ValidationResults]:
     """What validation says of the corrected file that a page offers."""
-    written = re.search(r'<pre id="corrected">(.*?)</pre>', page, re.DOTALL)[1]
+    written = re.search(r'<code id="corrected">(.*?)</code>', page, re.DOTALL)[1]
     file = folder / "corrected" / "edited.yaml"
     file.parent.mkdir()
     file.write_text(html.unescape(written), encoding="utf-8")
