@@ -49,24 +49,32 @@ class Contacts:
     def least(self, q) -> np.ndarray:
         """Least distance (n,) in m of arms (n, 6) in rad; about 0 or less where something touches."""
         q = np.atleast_2d(q)
-        T, frames = np.broadcast_to(self.links[0], (len(q), 4, 4)), [np.broadcast_to(self.base, (len(q), 4, 4))]
+        own = [(self.shapes[i], self.shapes[j], i, j) for i, j in self.own]
+        found = [
+            min((self._apart(a, where[i], b, where[j]) for a, b, i, j in own), default=np.inf)
+            for where in map(self._placed, q)
+        ]
+        return np.minimum(found, self.from_solids(q).min(axis=(1, 2), initial=np.inf))
+
+    def from_solids(self, q) -> np.ndarray:
+        """Distances (n, links that move, solids), m, of arms (n, 6) in rad; infinite for a link without capsules."""
+        q = np.atleast_2d(q)
+        found = np.full((len(q), 6, len(self.around)), np.inf)
+        for row, where in enumerate(map(self._placed, q)):
+            for (link, _), capsule, at in zip(self.numbers, self.shapes, where):
+                for k, (shape, T) in enumerate(self.around if link > 0 else ()):
+                    found[row, link - 1, k] = min(found[row, link - 1, k], self._apart(capsule, at, shape, T))
+        return found
+
+    def _placed(self, q) -> list:
+        T, frames = self.links[0], [self.base]
         for k in range(6):
-            T = T @ _turn(self.direction[k] * q[:, k] + self.offset[k])
+            T = T @ _turn(self.direction[k] * q[k] + self.offset[k])
             frames.append(T)
             T = T @ self.links[k + 1]
         placed = [frames[link] @ own for link, own in self.numbers]
-        return np.array([self._one([part[row] for part in placed]) for row in range(len(q))])
+        return [coal.Transform3s(T[:3, :3], T[:3, 3]) for T in placed]
 
-    def _one(self, placed) -> float:
-        where = [coal.Transform3s(T[:3, :3], T[:3, 3]) for T in placed]
-        request, found = coal.DistanceRequest(), [np.inf]
-        for i, j in self.own:
-            found.append(
-                coal.distance(self.shapes[i], where[i], self.shapes[j], where[j], request, coal.DistanceResult())
-            )
-        for i, (link, _) in enumerate(self.numbers):
-            if link == 0:
-                continue
-            for shape, at in self.around:
-                found.append(coal.distance(self.shapes[i], where[i], shape, at, request, coal.DistanceResult()))
-        return float(min(found))
+    @staticmethod
+    def _apart(a, A, b, B) -> float:
+        return float(coal.distance(a, A, b, B, coal.DistanceRequest(), coal.DistanceResult()))

@@ -41,6 +41,8 @@ from er3a.robots.robot import Robot
 
 SHORTEST = 1e-9  # share of the duration; motion that is wide over less is a jump
 LOCATED = 1e-10  # share of the duration
+DEEPEST = 1e-6  # share of the duration, within which an overlap is deepest: depths are level there
+LEVEL = 1e-9  # m
 CHUNK = 20_000  # points whose ends are held in memory at a time
 
 Joints = Callable[[Reals], Reals]
@@ -242,7 +244,7 @@ def _steps(motion: _Motion, times: Reals, q: Reals) -> Reals:
 
 
 def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) -> None:
-    """Measure between known points until every interval is free as a whole, or overlaps so, or is short."""
+    """Measure between known points until each pair is free in all of an interval, or overlaps in it, or it is short."""
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
     bodies = motion.bodies
@@ -252,13 +254,13 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
         a, b, pairs = waiting.pop()
         before, after = motion.known[times[a]], motion.known[times[b]]
         moved = (way[b] - way[a])[motion.track[pairs]]
+        if b - a < 2:
+            continue
         apart = before[pairs] + after[pairs]
-        if b - a < 2 or (apart <= -moved).any():
+        free = apart - moved >= np.where(bodies.joined[pairs], 0.0, 2 * max(best, 0.0))
+        if not (~free & (apart > -moved) & (moved > step)).any():
             continue
-        open_ = apart - moved < np.where(bodies.joined[pairs], 0.0, 2 * max(best, 0.0))
-        pairs, moved = pairs[open_], moved[open_]
-        if not pairs.size or moved.max() <= step:
-            continue
+        pairs = pairs[~free]
         middle = int(np.clip(np.searchsorted(way[a : b + 1].sum(axis=1), way[[a, b]].sum() / 2) + a, a + 1, b - 1))
         found = motion.measure(times[middle], q[middle], pairs)
         least = float(np.nanmin(bodies.told(found)))
@@ -282,14 +284,12 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
         first, last = times[known[a]], times[known[b - 1]]
         start = scipy.optimize.brentq(apart, times[known[a - 1]], first, xtol=near) if a > 0 else first
         end = scipy.optimize.brentq(apart, last, times[known[b]], xtol=near) if b < len(known) else last
-        inside = known[max(a - 1, 0) : b]
-        rows = np.array([motion.measure(times[i], q[i], every) for i in known[a:b]])
-        if a > 0:
-            rows = np.concatenate([motion.bodies.distances(motion.bodies.ends(q[inside[0]]), every)[None], rows])
+        inside = known[max(a - 1, 0) : b + 1]
+        at = times[inside]
+        rows = np.array([motion.bodies.distances(motion.bodies.ends(q[i]), every) for i in inside])
         touches: dict[Pair, Touch] = {}
-        for k in np.flatnonzero(rows.min(axis=0) <= 0).tolist():
-            own = partial(apart, pairs=np.array([k]))
-            touch = _touch(motion.bodies.pairs[k], times[inside], rows[:, k], own, near)
+        for k in np.flatnonzero(rows[(at >= first) & (at <= last)].min(axis=0) <= 0).tolist():
+            touch = _touch(motion, k, at, rows[:, k], partial(apart, pairs=np.array([k])), near)
             other = touches.get(touch.pair, touch)
             deeper = max(touch, other, key=lambda each: each.depth)
             touches[touch.pair] = Touch(touch.pair, max(min(touch.start, other.start), start), deeper.depth, deeper.at)
@@ -299,14 +299,23 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
     return found
 
 
-def _touch(pair: Pair, times: Reals, distances: Reals, apart: Callable[[float], float], near: float) -> Touch:
-    """When a pair first touches and how deep it comes, of distances (k,) at times (k,)."""
-    first = int(np.argmax(distances <= 0))
-    start = float(times[first])
+def _touch(
+    motion: _Motion, k: int, times: Reals, distances: Reals, apart: Callable[[float], float], near: float
+) -> Touch:
+    """When a pair first touches, and where it is deepest, near the least of its distances (n,) at times (n,)."""
+    first, deepest = int(np.argmax(distances <= 0)), int(np.argmin(distances))
+    start, at = float(times[first]), float(times[deepest])
     if first > 0:
         start = float(scipy.optimize.brentq(apart, times[first - 1], start, xtol=near))
-    deepest = int(np.argmin(distances))
-    return Touch(pair, start, -float(distances[deepest]), float(times[deepest]))
+    beside = times[max(deepest - 1, 0)], times[min(deepest + 1, len(times) - 1)]
+    found = scipy.optimize.minimize_scalar(
+        apart, bounds=beside, method="bounded", options={"xatol": DEEPEST / LOCATED * near}
+    )
+    if found.fun < distances[deepest] - LEVEL:
+        at = float(found.x)
+        motion.measure(at, motion.joints(np.array([at]))[0], np.arange(len(motion.bodies.pairs)))
+        return Touch(motion.bodies.pairs[k], start, -float(found.fun), at)
+    return Touch(motion.bodies.pairs[k], start, -float(distances[deepest]), at)
 
 
 @dataclass(frozen=True, eq=False)

@@ -378,7 +378,10 @@ def programs_of(
     if missing is not None:
         raise InputError(file, "paths", f"there is no path '{missing}'", f"Known: {', '.join(e.name for e in listed)}")
     for each in listed_motions(file, task, Wanted(task.limits.rates, NEAR), CHECKS_PER_SAMPLE):
-        if each.motion is None or (only and each.listed not in only):
+        if only and each.listed not in only:
+            continue
+        if each.motion is None:
+            yield PathProgram(each.name, each.outcome_unfollowed, None)
             continue
         verdict = judge(robot, each.motion, NEAR, task.limits).verdict
         if collisions(measured(surroundings, each.motion)):

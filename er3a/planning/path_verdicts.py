@@ -18,5 +18,5 @@ PathVerdict = Literal[
 ]
 PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
 """The gravest first."""
-NOT_TO_BE_RUN: tuple[PathVerdict, ...] = (*PATH_VERDICTS[:5], "too fast for the assumed limits")
-"""Of paths that no arm should run as they are; others may cross singular poses, or leave something open."""
+NOT_TO_BE_RUN = PATH_VERDICTS[:7]
+"""Of paths that no arm should run as they are; others pass near singular poses, or leave something open."""

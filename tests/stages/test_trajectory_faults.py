@@ -7,30 +7,40 @@ from pathlib import Path
 
 import pytest
 import yaml
+from lxml import etree
 
+from er3a.files.robot_library import load_robot
 from er3a.pipeline.messages.trajectory import advice
+from er3a.pipeline.program_reports import programs_of
+from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.study import load_study
+from er3a.pipeline.study import Study, load_study
+from er3a.pipeline.verdicts import read_verdicts
+from er3a.pipeline.viewing.index import write_index
 
 ROBOT = "er3a_c60"
 
 
-def summary_of(folder: Path, *names: str, margin: float = 20.0, **changes):
-    """What the stage finds of some of the project's paths, of none of which anything is expected."""
+def study_of(
+    folder: Path, *names: str, expect: dict[str, str] | None = None, settings: dict | None = None, **changes
+) -> Study:
+    """A study of some of the project's paths, of which nothing is expected but what ``expect`` says."""
     content = yaml.safe_load(Path(f"data/paths/{ROBOT}.yaml").read_text(encoding="utf-8"))
-    asked = (each | changes for each in content["paths"] if each["name"] in names)
-    content["paths"] = [{key: value for key, value in each.items() if key != "expect"} for each in asked]
+    asked = [each | changes | {"expect": (expect or {}).get(each["name"])} for each in content["paths"]]
+    content["paths"] = [
+        {key: value for key, value in each.items() if value is not None} for each in asked if each["name"] in names
+    ]
     file = folder / "paths.yaml"
     file.write_text(yaml.safe_dump(content), encoding="utf-8")
     study = load_study("config/small.yaml")
     entry = study.robots[ROBOT].model_copy(update={"paths": str(file)})
-    settings = study.trajectory.model_copy(update={"assumed_margin_mm": margin})
-    return compute(study.model_copy(update={"robots": {ROBOT: entry}, "trajectory": settings}), ROBOT).summary
+    settings = study.trajectory.model_copy(update=settings or {})
+    return study.model_copy(update={"robots": {ROBOT: entry}, "trajectory": settings})
 
 
-def verdict_of(folder: Path, *names: str):
-    """The stage's verdict on some paths."""
-    return summary_of(folder, *names).verdict
+def summary_of(folder: Path, *names: str, **changes):
+    """What the stage finds of some paths; as :func:`study_of`."""
+    return compute(study_of(folder, *names, **changes), ROBOT).summary
 
 
 def paths_of(folder: Path, name: str, **changes):
@@ -38,20 +48,47 @@ def paths_of(folder: Path, name: str, **changes):
     return summary_of(folder, name, **changes).paths
 
 
-@pytest.mark.parametrize("fault", ["line_collides", "line_limits", "line_out"])
-def test_a_path_that_collides_leaves_limits_or_cannot_be_followed_fails_the_stage(tmp_path, fault):
-    verdict = verdict_of(tmp_path, "line_clean", "arc_clean", fault)
-    assert verdict.finding.safe == 2
-    assert verdict.status == "fail"
+CASES = {  # paths besides a safe one, what is expected of them; status, exit codes at caution and fail, demonstrations
+    "safe": ((), {}, "pass", (0, 0), 0),
+    "near-singular": (("line_wrist_near",), {}, "caution", (1, 0), 0),
+    "collides": (("line_collides",), {}, "fail", (1, 1), 0),
+    "leaves limits": (("line_limits",), {}, "fail", (1, 1), 0),
+    "can't be followed": (("line_out",), {}, "fail", (1, 1), 0),
+    "a demonstration that fails": (("line_collides",), {"line_collides": "collides"}, "pass", (0, 0), 1),
+    "a demonstration that passes": ((), {"line_clean": "collides"}, "fail", (1, 1), 0),
+    "a demonstration that fails otherwise": (("line_out",), {"line_out": "collides"}, "fail", (1, 1), 0),
+    "a fault beside a demonstration": (
+        ("line_collides", "line_limits"),
+        {"line_collides": "collides"},
+        "fail",
+        (1, 1),
+        1,
+    ),
+}
 
 
-def test_a_path_that_passes_near_a_singular_pose_is_a_caution(tmp_path):
-    verdict = verdict_of(tmp_path, "line_clean", "line_wrist_near")
-    assert verdict.status == "caution"
-
-
-def test_safe_paths_pass(tmp_path):
-    assert verdict_of(tmp_path, "line_clean").status == "pass"
+@pytest.mark.long
+@pytest.mark.parametrize("case", CASES)
+def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path, call, case):
+    """From the path file to exit codes, the report for continuous integration and the index."""
+    names, expect, status, codes, shown = CASES[case]
+    study = study_of(tmp_path, "line_clean", *names, expect=expect, settings={"avoidance": "slow"})
+    results, file = tmp_path / "results", tmp_path / "study.yaml"
+    run.compute("trajectory", study, ROBOT, results / ROBOT / "trajectory")
+    (verdict,) = (each for each in read_verdicts(study, results) if each.stage == "trajectory")
+    assert verdict.status == status
+    assert verdict.demonstrations == shown
+    file.write_text(yaml.safe_dump(study.model_dump(mode="json", exclude_none=True)), encoding="utf-8")
+    for level, code in zip(("caution", "fail"), codes):
+        assert call("verdicts", "--study", file, "--results", results, "--fail-on", level).returncode == code, level
+    write_index(study, results, tmp_path)
+    report = etree.parse(tmp_path / "junit.xml").getroot()
+    assert report.get("failures") == str(codes[1])
+    said = report.findtext(".//system-out") or ""
+    assert (f"which fail as expected: {shown}" in said) == bool(shown)
+    counted = (tmp_path / "index.html").read_text(encoding="utf-8").split('class="cells"')[0].rsplit("<h2", 1)[1]
+    assert f'badge {"pass as_meant" if shown and status == "pass" else status}"' in counted
+    assert counted.count('class="badge') == 1
 
 
 @pytest.mark.parametrize("name", ["line_collides", "line_limits"])
@@ -69,6 +106,35 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
 
 
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
-    (path,) = paths_of(tmp_path, "line_collides", margin=400.0)
+    (path,) = paths_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0})
     assert path.clear_until is None
     assert "end the path there" not in advice(path)
+
+
+@pytest.mark.parametrize(
+    ("expect", "status", "shown"), [(None, "fail", 0), ("unreachable", "pass", 1), ("collides", "fail", 0)]
+)
+def test_a_path_that_no_arm_of_its_class_follows_to_its_end_fails_unless_it_is_meant_to(
+    tmp_path, expect, status, shown
+):
+    """Seven joints are followed by their class, which has no joints for poses out of reach."""
+    arm = "lbr_iiwa_14"
+    content = yaml.safe_load(Path(f"data/paths/{arm}.yaml").read_text(encoding="utf-8"))
+    ends = {end: {"xyz_mm": [x, 0, 500], "rpy_deg": [180, 0, 0]} for end, x in (("start", 500), ("end", 1500))}
+    out = {"name": "out", "kind": "line", "title": "Out", "duration_s": 4, "samples": 10} | ends
+    content["paths"] = [content["paths"][0], out | ({"expect": expect} if expect else {})]
+    (tmp_path / "paths.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    study = load_study("config/small.yaml")
+    entry = study.robots[ROBOT].model_copy(update={"paths": str(tmp_path / "paths.yaml")})
+    settings = study.trajectory.model_copy(update={"scene": None, "programs": []})
+    summary = compute(study.model_copy(update={"robots": {arm: entry}, "trajectory": settings}), arm).summary
+    assert summary.verdict.status == status
+    assert len(getattr(summary.verdict.finding, "demonstrations", ())) == shown
+    (path,) = summary.not_followed
+    assert path.outcome == "unreachable"
+    assert 0 < path.stops_at_s < 4
+    programs = [
+        (made.name, made.files is None)
+        for made in programs_of(tmp_path / "paths.yaml", load_robot(arm), "csv", None, None, False)
+    ]
+    assert programs == [("joint_move", False), ("out", True)]

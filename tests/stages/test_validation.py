@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from dataclasses import replace
@@ -25,6 +26,7 @@ from er3a.identifiability.reactions import bases_of
 from er3a.kinematics.forward import frames
 from er3a.kinematics.round_trips import slot_round_trips
 from er3a.kinematics.wrist_partitioned import NoWristCentre
+from er3a.pipeline.messages.pages import next_step
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
     FORMAT_VERSION,
@@ -541,6 +543,29 @@ def test_a_named_fault_is_in_the_verdict_and_on_the_page(study, tmp_path):
     page = page_of(wrong, stored, tmp_path)
     assert "the named fault corrected: it meets the stated axes" in page
     assert page.index("<h2>Diagnosis") < page.index("<h2>Checks")
+
+
+def carried_out(study: Study, page: str, folder: Path) -> Stored[ValidationResults]:
+    """What validation says of the corrected file that a page offers."""
+    written = re.search(r'<code id="corrected">(.*?)</code>', page, re.DOTALL)[1]
+    file = folder / "corrected" / "edited.yaml"
+    file.parent.mkdir()
+    file.write_text(html.unescape(written), encoding="utf-8")
+    entry = RobotEntry(file=str(file), targets="none.yaml", paths="none.yaml")
+    return computed(study.model_copy(update={"robots": {"edited": entry}}), folder / "again")
+
+
+@pytest.mark.long
+def test_the_corrected_file_that_a_page_advises_is_not_contradicted(study, tmp_path):
+    """Zeros, directions and base defined otherwise: the file of the page, as it stands there."""
+    wrong = edited_robot(study, tmp_path, other_conventions)
+    stored = computed(wrong, tmp_path / "out")
+    assert isinstance(stored.results.summary.verdict.finding, DefinedOtherwise)
+    assert "take the corrected table from the validation page" in next_step("edited", "fail", {}, same_arm=True).text
+    report(wrong, stored, tmp_path / "page.html")
+    again = carried_out(wrong, (tmp_path / "page.html").read_text(encoding="utf-8"), tmp_path)
+    assert again.results.summary.verdict.status != "fail"
+    assert not with_status(again.results, "fail")
 
 
 def other_conventions(content) -> None:

@@ -56,6 +56,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "stop": N_("stop before it, with an alarm"),
     "planned": N_("planned motion of the joints"),
 }
+BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways that no path of the tool shows
 MOST_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
@@ -113,6 +114,7 @@ TEXTS = texts(
         "advice.tool#none": "the tool stays on the path",
         "advice.tool#far": "the tool leaves the path by {far} mm",
         "advice.tool#turned": "the tool leaves the path by {turned} deg",
+        "advice.swing": "{tool}, J{joint} swings through {swing:.0f} deg",
         "advice.time#less": "it takes {shorter:.2f} s less than programmed",
         "advice.time#same": "it takes no more time than programmed",
         "advice.time#more": "it takes {longer:.2f} s more than programmed",
@@ -181,13 +183,17 @@ def strategy_word(name: StrategyName) -> str:
 
 def path_text(path: PathSummary) -> str:
     """Where a path is singular or has faults, or that it has none."""
-    collisions = [say(part) for part in path.collisions]
-    if not collisions:
+    if not path.collisions:
         return _apart_from_collisions(path)
-    if path.verdict != "collides":
-        return joined([_apart_from_collisions(path), *collisions])
-    other = path.too_fast or path.jumps or (path.singularities and not path.in_joint_space)
-    return joined([*collisions, _apart_from_collisions(path) if other else ""])
+    collisions = joined(map(say, path.collisions))
+    if path.verdict == "collides":
+        other = path.too_fast or path.jumps or (path.singularities and not path.in_joint_space)
+        return joined([collisions, _apart_from_collisions(path) if other else ""])
+    starts = [part.t0_s for part in path.unreachable]
+    starts += [*(part.t0_s for part in path.out_of_limits), *(part.t0_s for part in path.too_fast)]
+    first = min(starts, default=0.0)
+    both = _apart_from_collisions(path), collisions
+    return joined(both[::-1] if path.collisions[0].t0_s < first else both)
 
 
 def _apart_from_collisions(path: PathSummary) -> str:
@@ -291,7 +297,7 @@ def advice(path: PathSummary) -> str | None:
     if not path.avoidance:
         return None
     if path.chosen:
-        return joined([_chosen(path.chosen, path.duration_s), _slower_throughout(path)], ". ")
+        return joined([_chosen(path.chosen, path.duration_s, path.sliding), _slower_throughout(path)], ". ")
     if path.unreachable:
         when = joined(map(_when, path.unreachable), ", ")
         why = sentence("advice.out_of_reach", when=when)
@@ -341,11 +347,15 @@ def reasons(tried: TriedStrategy) -> str:
     return joined(listed(tried.reasons))
 
 
-def _chosen(tried: TriedStrategy, programmed_s: float) -> str:
+def _chosen(tried: TriedStrategy, programmed_s: float, sliding: tuple[int, ...]) -> str:
     motion = tried.motion
     if motion is None:
         raise ValueError(f"{tried.name} was chosen and has no motion")
     tool = _leaves(motion.max_deviation_mm, motion.max_deviation_deg)
+    swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in sliding}
+    if tried.name in BY_JOINTS and swings:
+        joint = max(swings, key=swings.__getitem__)
+        tool = sentence("advice.swing", tool=tool, joint=joint, swing=swings[joint])
     cost = {"tool": tool, "time": _takes(motion.duration_s - programmed_s)}
     way = word("advice", ADVICE, tried.name)
     if motion.clearance_mm is None:

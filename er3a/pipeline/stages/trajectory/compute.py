@@ -137,7 +137,7 @@ class AvoidanceTask:
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
         chosen = best(free, meets)
-        tried = tuple(_tried(result, *met.get(result.name, (None, None))) for result in results)
+        tried = tuple(_tried(self.robot, result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
             chosen=chosen.name if chosen else None,
@@ -278,14 +278,14 @@ def _quickest(segment: SingularSegment) -> Timed | None:
 
 
 def _tried(
-    result: StrategyResult, meets: PairOverlaps | PairTooNear | None, clearance_mm: float | None
+    robot: Robot, result: StrategyResult, meets: PairOverlaps | PairTooNear | None, clearance_mm: float | None
 ) -> TriedStrategy:
     reasons = (*result.reasons, meets) if meets else result.reasons
-    motion = _motion(result.cost, clearance_mm) if result.cost else None
+    motion = _motion(robot, result.cost, clearance_mm) if result.cost else None
     return TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
 
 
-def _motion(cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
+def _motion(robot: Robot, cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
     return stated(
         StrategyMotion,
         cost,
@@ -293,6 +293,7 @@ def _motion(cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
         max_deviation_mm=from_si("mm", cost.distance.max()),
         max_deviation_deg=from_si("deg", cost.angle.max()),
         duration=cost.motion.duration,
+        joint_swing_deg=tuple(shown(robot, np.ptp(cost.motion.q, axis=0)).tolist()),
         max_joint_speed=np.abs(cost.motion.velocity).max(axis=0),
         max_joint_acceleration=np.abs(cost.motion.acceleration).max(axis=0),
         clearance_mm=clearance_mm,
@@ -413,7 +414,9 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     for each in listed_motions(file, planning, wanted, settings.checks_per_sample):
         motion = each.motion
         if motion is None:
-            skipped.append(PathNotFollowed(each.name, each.title, closed_form_missing(robot), each.stops))
+            stops = each.ends.t if each.ends else None
+            lacking, outcome = closed_form_missing(robot), each.outcome_unfollowed
+            skipped.append(PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
             continue
         found = judge(robot, motion, near, limits)
         along = measured(surroundings, motion)
@@ -514,16 +517,17 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
 def _verdict(
     paths: list[PathSummary], skipped: list[PathNotFollowed]
 ) -> Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]:
-    if unmet := unmet_expectations(paths):
+    if unmet := unmet_expectations([*paths, *skipped]):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.expect in (None, "safe")]
+    unfollowed = [path for path in skipped if path.expect is None]
 
     def named(verdict: PathVerdict) -> tuple[str, ...]:
         return tuple(path.name for path in asked if path.verdict == verdict)
 
-    safe, count = len(named("safe")), len(asked) + len(skipped)
+    safe, count = len(named("safe")), len(asked) + len(unfollowed)
     finding = AllSafe if safe == count else SomeUnsafe if safe else NoneSafe
-    failed = any(_fails(path) for path in asked)
+    failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
     status: Status = "pass" if safe == count else "fail" if failed or not safe else "caution"
     counts = finding(
         paths=count,
@@ -537,8 +541,8 @@ def _verdict(
         too_fast_if_assumed=named("too fast for the assumed limits"),
         undecided=named("undecided"),
         near_singular=named("near-singular"),
-        demonstrations=demonstrations(paths, "safe"),
-        not_followed=tuple(path.name for path in skipped),
+        demonstrations=demonstrations([*paths, *skipped], "safe"),
+        not_followed=tuple(path.name for path in unfollowed),
     )
     return Verdict(status, counts)
 

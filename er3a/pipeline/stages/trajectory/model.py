@@ -220,6 +220,7 @@ class StrategyMotion:
     ----------
     done_ratio : how much of the path is done, 0..1
     keeps_clear : whether the arm keeps its distance from singular poses wherever the tool is on or beside the path
+    joint_swing_deg : between the extremes of each joint; mm where it slides
     clearance_mm : least; None where none was measured
     """
 
@@ -228,6 +229,7 @@ class StrategyMotion:
     max_deviation_deg: float
     duration_s: float
     keeps_clear: bool
+    joint_swing_deg: tuple[float, ...]
     max_joint_speed_deg_s: tuple[float, ...]
     max_joint_speed_ratio: float
     max_joint_acceleration_deg_s2: tuple[float, ...]
@@ -328,12 +330,22 @@ class PathSummary:
 
 @dataclass(frozen=True)
 class PathNotFollowed:
-    """A path of the tool that could not be followed: what the arm lacks for branches, and of arms whose class gives the
-    joints all the same the time (s) beyond which the path is out of reach or asks a joint to leap; else None."""
+    """A path of the tool that could not be followed.
+
+    Attributes
+    ----------
+    lacking : what the arm lacks for branches
+    outcome : what it came to; ``undecided`` for an arm whose class has no way to follow it
+    expect : the verdict that its file expects
+    stops_at_s : of arms that are followed by their class, the time (s) beyond which the path is out of reach or asks a
+        joint to leap; else None
+    """
 
     name: str
     title: str
     lacking: ClosedFormMissing | None
+    outcome: PathVerdict
+    expect: PathVerdict | None
     stops_at_s: float | None = None
 
 

@@ -306,14 +306,22 @@ class ListedMotion:
     """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
 
     ``motion`` is None for a path of the tool that an arm of its class can't be made to follow, or not to its end;
-    ``stops`` is then the time (s) beyond which it is not.
+    ``ends`` then says when and why it is not.
     """
 
     listed: str
     name: str
     title: str
+    expect: PathVerdict | None
     motion: Motion | None
-    stops: float | None = None
+    ends: PathEndsError | None = None
+
+    @property
+    def outcome_unfollowed(self) -> PathVerdict:
+        """What a path without a motion came to: where the arm's class has no way to follow it, nothing is known."""
+        if self.ends is None:
+            return "undecided"
+        return "unreachable" if self.ends.kind == "out_of_reach" else "singular"
 
 
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
@@ -342,13 +350,13 @@ def listed_motions(file: Path, task: PlanningTask, wanted: Wanted, checks_per_sa
     for i, listed in enumerate(load_paths(file).paths):
         source = CommandSource(file, f"paths[{i}]")
         for entry in planned_entries(task.robot, listed, source):
-            stops = None
+            ended = None
             try:
                 motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task=task)
             except NotWristPartitionedError:
                 motion = None
             except PathEndsError as error:
-                motion, stops = None, error.t
+                motion, ended = None, error
             end = np.full(task.robot.joints, np.nan) if motion is None else motion.q[-1]
             ends[entry.name] = ends[listed.name] = end
-            yield ListedMotion(listed.name, entry.name, entry.title, motion, stops)
+            yield ListedMotion(listed.name, entry.name, entry.title, entry.expect, motion, ended)

@@ -13,6 +13,8 @@ from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.programs import say
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import (
     FIGURES,
     advice,
@@ -39,6 +41,7 @@ from er3a.pipeline.stages.trajectory.model import (
     StrategyMotion,
     Stretch,
     TrajectoryResults,
+    TrajectorySummary,
     TriedStrategy,
 )
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
@@ -48,6 +51,7 @@ from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, packed_text, render, run_command
 from er3a.planning.path_verdicts import PathVerdict
+from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.programs.languages import titles_unwritten
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -124,7 +128,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
         links = _programs(results.programs.take((results.programs.path == path.name) & (i < count)))
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
-        sections.append(_section(path, rows, drawn, links, summary.joint_limits))
+        sections.append(_section(path, rows, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -192,17 +196,23 @@ def _programs(rows: ProgramFiles) -> list[ProgramLink]:
 
 
 def _section(
-    path: PathSummary, rows: PathChecks, figure: PathDrawing | None, programs: list[ProgramLink], limits: LimitsUsed
+    path: PathSummary,
+    rows: PathChecks,
+    figure: PathDrawing | None,
+    programs: list[ProgramLink],
+    summary: TrajectorySummary,
 ) -> PathSection:
+    near = _near_assumed(path, summary)
+    only_assumed = STATUS[path.verdict] == "pass" and near
     return PathSection(
         path=path,
-        status=STATUS[path.verdict],
-        verdict=outcome_word(path.verdict),
+        status="caution" if only_assumed else STATUS[path.verdict],
+        verdict=tr("clear of assumed shapes only") if only_assumed else outcome_word(path.verdict),
         kind=kind_word(path.kind),
-        text=path_text(path),
+        text=joined([path_text(path), near]),
         advice=advice(path),
         branches=[branch_word(label) for label in path.branches],
-        speed=_speed(path, limits),
+        speed=_speed(path, summary.joint_limits),
         events=[_event_row(path.name, event) for event in path.singularities],
         faults=_faults(path),
         strategies=_strategies(path),
@@ -211,6 +221,14 @@ def _section(
         shortest="–" if path.fastest_s is None or path.verdict in AT_ANY_PACE else fixed(path.fastest_s, 2),
         figure=figure,
     )
+
+
+def _near_assumed(path: PathSummary, summary: TrajectorySummary) -> str:
+    """That a path is clear of assumed shapes by less than these may be wrong by; else empty."""
+    shapes = summary.verdict.shapes
+    if shapes is None or path.name not in shapes.near or path.clearance is None:
+        return ""
+    return say(ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm))
 
 
 def _repairs(path: PathSummary, program: ProgramLink) -> bool:
@@ -265,8 +283,9 @@ def _faults(path: PathSummary) -> list[list[str]]:
             fixed(part.s1_m * 1000, 1),
             cause_text(path, part),
         ]
-        for word, stretches in _kinds(path)
-        for part in stretches
+        for word, part in sorted(
+            ((word, part) for word, stretches in _kinds(path) for part in stretches), key=lambda each: each[1].t0_s
+        )
     ]
 
 

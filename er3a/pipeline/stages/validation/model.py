@@ -431,7 +431,7 @@ class RankedHypothesis:
 
 @dataclass(frozen=True)
 class CorrectedTable:
-    """A Denavit-Hartenberg table without its most likely fault, in m and rad."""
+    """A Denavit-Hartenberg table without its most likely fault, in m and rad; ``base`` and ``flange`` (4, 4)."""
 
     convention: Literal["standard", "modified"]
     a: Six
@@ -442,6 +442,8 @@ class CorrectedTable:
     offset: Six
     lower: Six
     upper: Six
+    base: tuple[Six, ...]
+    flange: tuple[Six, ...]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
+from er3a.files.robot_library import robot_of
+from er3a.files.robot_writer import robot_file, yaml_text
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import GRADE_NAMES, decision
@@ -49,7 +51,15 @@ from er3a.pipeline.stages.validation.validation_figures import (
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Head, Picture, alternative_table, head_of, render, run_command
+from er3a.pipeline.viewing.page import (
+    Head,
+    Picture,
+    alternative_table,
+    head_of,
+    render,
+    run_command,
+    text_address,
+)
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
@@ -293,6 +303,8 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
     drawn = _drawn_axes(results.axes)
     source = robot.sources.get("dh")
     contradicted = summary.verdict.status == "fail"
+    corrected, _ = corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
+    text = yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True)) if corrected else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -309,6 +321,8 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         formulas=formulas(robot),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
         diagnoses=diagnosis_stories(summary, results.residuals),
+        corrected=text,
+        corrected_address=text_address(text),
         corrections=correction_stories(summary, results.corrections),
         groups=group_rows(judged),
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],

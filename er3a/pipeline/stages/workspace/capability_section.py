@@ -44,6 +44,8 @@ from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
+ROUNDING = 1e-6  # mm
+
 
 def best_text(placement: PlacementSummary) -> str:
     """Where to put the box: the first place that is proven, else the first; what there is none of."""
@@ -95,17 +97,16 @@ def _movable(place: PlaceSummary) -> bool:
 
 
 def _room(place: PlaceSummary) -> str:
-    """How far the box can be moved, such as ``x ±25, y -50 to 0``, mm."""
+    """How far the box can be moved, such as ``x ±25, y -50 to 0``, in whole mm that the room holds."""
     if not _movable(place):
         return fixed(0, 0)
     parts = []
-    for axis, down, up in zip("xyz", place.room_down_m, place.room_up_m):
+    whole = (np.floor(1000 * np.array(room) + ROUNDING) for room in (place.room_down_m, place.room_up_m))
+    for axis, down, up in zip("xyz", *whole):
         if down == up:
-            parts.append(f"{axis} {'±' if up else ''}{fixed(1000 * up, 0)}")
+            parts.append(f"{axis} {'±' if up else ''}{fixed(up, 0)}")
         elif down or up:
-            parts.append(
-                tr("{axis} {least} to {most}", axis=axis, least=fixed(-1000 * down, 0), most=fixed(1000 * up, 0))
-            )
+            parts.append(tr("{axis} {least} to {most}", axis=axis, least=fixed(-down, 0), most=fixed(up, 0)))
     return ", ".join(parts)
 
 
