@@ -9,7 +9,7 @@ from testing.evidence import sized
 from testing.simulated_measurements import ANGLE_ERROR_RAD, LENGTH_ERROR_M, covered
 
 ROBOTS = ("er3a_c60", "er3_600")
-RUNS, POSES, DEVIATION_MM, SEED = sized(1000), 30, 0.05, 20261120
+RUNS, POSES, DEVIATION_MM, SEED = sized(500), 30, 0.05, 20261120
 
 
 def table() -> str:

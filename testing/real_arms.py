@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from er3a import load_measurements, load_robot
@@ -91,10 +92,11 @@ def halves(name: str, splits: int, seed: int) -> tuple[tuple[str, ...], NDArray[
     inside = np.zeros((splits, len(kept)), dtype=bool)
     for split in range(splits):
         first = random.permutation(count) < count // 2
-        values, variances = [], []
+        values, squares = [], []
         for half in (seen.take(first), seen.take(~first)):
             found = fit(robot, kept, half)
             values.append(found.amounts)
-            variances.append(np.diag(covariance_by_poses(found, half.pose_of)))
-        inside[split] = np.abs(values[0] - values[1]) <= 1.96 * np.sqrt(variances[0] + variances[1])
+            covariance, freedom = covariance_by_poses(found, half.pose_of)
+            squares.append(scipy.special.stdtrit(freedom, 0.975) ** 2 * np.diag(covariance))
+        inside[split] = np.abs(values[0] - values[1]) <= np.sqrt(squares[0] + squares[1])
     return tuple(parameter.name for parameter in kept), inside

@@ -455,7 +455,7 @@ def calibrate(
 
 def _result(robot: Robot, level: Level, observations: Observations, found: Fit) -> Calibration:
     """What the table alone has of a calibration."""
-    covariance = _covariance(observations, found)
+    covariance, quantiles = _covariance(observations, found)
     error = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(error, error)
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
@@ -463,7 +463,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     return Calibration(
         robot=corrected(robot, kept, found.amounts),
         level=level.name,
-        estimates=_estimates(robot, found, error, _quantile(observations, found)),
+        estimates=_estimates(robot, found, error, quantiles),
         correlation=correlation,
         held=level.held,
         close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
@@ -477,29 +477,25 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     )
 
 
-def _covariance(observations: Observations, found: Fit) -> Reals:
-    """By the stated deviations; where none was stated, by what remains at each pose."""
+def _covariance(observations: Observations, found: Fit) -> tuple[Reals, Reals]:
+    """By the stated deviations; where none was stated, by what remains at each pose; and half-widths (k + c,) of 95 %
+    intervals in standard errors."""
     if isinstance(observations, PointObservations) and not observations.deviation_known:
-        return covariance_by_poses(found, observations.pose_of)
-    return found.covariance
+        covariance, freedom = covariance_by_poses(found, observations.pose_of)
+        return covariance, np.asarray(scipy.special.stdtrit(freedom, 0.975))
+    return found.covariance, np.full(found.J.shape[1], INTERVAL_95)
 
 
-def _quantile(observations: Observations, found: Fit) -> float:
-    if observations.deviation_known:
-        return INTERVAL_95
-    return float(scipy.special.stdtrit(found.freedom, 0.975))
-
-
-def _estimates(robot: Robot, found: Fit, error: Reals, quantile: float) -> tuple[Estimate, ...]:
+def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tuple[Estimate, ...]:
     return tuple(
         Estimate(
             parameter,
             parameter.nominal(robot),
             float(amount * parameter.in_unit),
             float(own * parameter.in_unit),
-            quantile,
+            float(quantile),
         )
-        for parameter, amount, own in zip(found.kept, found.amounts, error)
+        for parameter, amount, own, quantile in zip(found.kept, found.amounts, error, quantiles)
     )
 
 
@@ -610,7 +606,8 @@ def _structure(robot: Robot, observations: PointObservations, found: Fit) -> Res
 
 
 def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond:
-    error, count = np.sqrt(np.diag(_covariance(observations, found))), len(found.kept)
+    covariance, quantiles = _covariance(observations, found)
+    error, count = np.sqrt(np.diag(covariance)), len(found.kept)
     return Beyond(
         robot=corrected(robot, found.kept, found.amounts),
         errors=JointErrors(robot, found.terms, found.coefficients),
@@ -624,7 +621,7 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
             )
             for term, own in zip(found.terms, places_of(found.terms))
         ),
-        estimates=_estimates(robot, found, error, _quantile(observations, found)),
+        estimates=_estimates(robot, found, error, quantiles),
         rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
         left_out=_left_out(observations, found),
         residuals=_structure(robot, observations, found),

@@ -73,7 +73,7 @@ class TriedTerm:
     ----------
     kind, joint, turns : which; of ripples the one of the joint that explains most
     change, far_change : of the mean squared error at poses left out, as a share, tenths at random and neighbourhoods:
-        when a term was taken, or of a term that was not, beside those that were
+        when a term was taken, or of a term that was not, or was dropped, beside those that were
     probability : of so large a share by chance, if there is only noise, of ripples for all numbers a turn
     verdict : whether it was taken, or why not
     """
@@ -160,7 +160,8 @@ def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> Held
 
 
 def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observations: PointObservations) -> ChosenTerms:
-    """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it.
+    """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it; one that
+    stood for others is dropped when these are there.
 
     Parameters
     ----------
@@ -176,12 +177,12 @@ def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observati
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
     parts = [part for seed in SEEDS for part in parts_of(observations.row_values, seed)]
     search = None if (observations.touched >= 0).any() else _RippleSearch(here, observations)
-    taken: list[JointTerm] = []
-    tried: list[TriedTerm] = []
+    taken: dict[JointTerm, TriedTerm] = {}
+    dropped: dict[JointTerm, TriedTerm] = {}
     while True:
-        own = term_jacobian(here, robot, taken, observations) / weights
-        open_terms = [term for term in fixed_terms if term not in taken]
-        open_terms += search.best(np.hstack([J, own]), rest) if search else []
+        own = term_jacobian(here, robot, tuple(taken), observations) / weights
+        open_terms = [*fixed_terms, *(search.best(np.hstack([J, own]), rest) if search else [])]
+        open_terms = [term for term in open_terms if term not in taken and term not in dropped]
         more = term_jacobian(here, robot, open_terms, observations) / weights
         linear = _Linear(np.hstack([J, own, more]), rest, count, observations.pose_of, parts)
         used, places = list(range(count + own.shape[1])), places_of(open_terms, count + own.shape[1])
@@ -189,10 +190,25 @@ def choose_terms(robot: Robot, here: Robot, kept: Sequence[Parameter], observati
         before = linear.squares(used)
         by_gain = sorted((trial for trial in trials if trial.probability <= SURE), key=lambda trial: trial.rest)
         outcome = next((found for trial in by_gain if (found := trial.outcome(before)).verdict == "taken"), None)
-        if outcome is None:
-            return ChosenTerms(tuple(taken), (*tried, *(trial.outcome(before) for trial in trials)))
-        taken.append(JointTerm(outcome.kind, outcome.joint, outcome.turns))
-        tried.append(outcome)
+        if outcome is not None:
+            taken[JointTerm(outcome.kind, outcome.joint, outcome.turns)] = outcome
+        elif (needless := _needless(linear, used, list(taken), count)) is not None:
+            dropped[JointTerm(needless.kind, needless.joint, needless.turns)] = needless
+            taken = {term: each for term, each in taken.items() if term not in dropped}
+        else:
+            others = (trial.outcome(before) for trial in trials)
+            return ChosenTerms(tuple(taken), (*taken.values(), *dropped.values(), *others))
+
+
+def _needless(linear: _Linear, used: list[int], taken: Sequence[JointTerm], count: int) -> TriedTerm | None:
+    """Of the terms that were taken the one that lowers the errors least, if it would not be taken beside the others."""
+    found = []
+    for term, own in zip(taken, places_of(taken, count)):
+        rest = [place for place in used if place not in own]
+        outcome = _Trial(linear, rest, term, own).outcome(linear.squares(rest))
+        if outcome.verdict != "taken":
+            found.append(outcome)
+    return max(found, key=lambda each: each.change + each.far_change, default=None)
 
 
 class _Trial:

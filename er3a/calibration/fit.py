@@ -134,22 +134,33 @@ class Fit:
         return float(np.sqrt((self.after @ self.after) / self.freedom))
 
 
-def covariance_by_poses(found: Fit, pose_of: Integers) -> Reals:
+def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     """Covariance (k + c, k + c) of the estimates from the residuals themselves, pose by pose: right also where what
-    remains is no white noise of one size, but what a model misses at poses that could have been others.
+    remains is no white noise of one size, but what a model misses at poses that could have been others; and how many
+    degrees of freedom (k + c,) each variance rests on, few where few poses settle a number.
 
-    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p`` [2]_, so that those which the fit has
-    drawn to itself count in full.
+    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p``, so that those which the fit has
+    drawn to itself count in full; degrees of freedom as Satterthwaite's, if noise were white [2]_.
     """
     C = found.covariance
     order = np.argsort(pose_of, kind="stable")
     middle = np.zeros_like(C)
+    sizes, pulls = [], []
     for rows in np.split(order, np.flatnonzero(np.diff(pose_of[order])) + 1):
         J = found.J[rows]
         size, axes = np.linalg.eigh(np.eye(len(rows)) - J @ C @ J.T)
-        push = J.T @ (axes @ ((axes.T @ found.after[rows]) / np.sqrt(np.maximum(size, LEAST_OWN))))
+        weight = (axes / np.sqrt(np.maximum(size, LEAST_OWN))) @ axes.T
+        push = J.T @ weight @ found.after[rows]
         middle += np.outer(push, push)
-    return np.asarray(C @ middle @ C, np.float64)
+        shares = weight @ J @ C
+        sizes.append((shares**2).sum(axis=0))
+        pulls.append(J.T @ shares)
+    own, pull = np.array(sizes), np.array(pulls)  # (P, k + c), (P, k + c, k + c)
+    drawn = np.einsum("pik,ij,pjk->pk", pull, C, pull)
+    both = np.einsum("ij,pjk,plk->kil", C, pull, pull)
+    squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
+    freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, LEAST_OWN * (own**2).sum(axis=0))
+    return np.asarray(C @ middle @ C, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
 def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:

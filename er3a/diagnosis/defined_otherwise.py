@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from er3a.comparison.mechanism import (
 )
 from er3a.diagnosis.faults import (
     BaseElsewhere,
+    CountedFromGround,
     Fault,
     Faults,
     FlangeElsewhere,
@@ -37,7 +39,7 @@ from er3a.diagnosis.faults import (
     WrongOffset,
 )
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import joints_of, predict_tables
@@ -68,6 +70,8 @@ SPREAD = 3.0  # times its uncertainty, that what is derived from two lines may b
 ROUNDS = 8
 STEP = 1e-6
 ROUND_DEG, ROUND_MM = 1e-6, 1e-6
+PARALLEL = 1 - 1e-6
+SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +102,41 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
     found = (_conventions(robot, stated, lines, meets, finer) for finer in FINER)
     best = next((each for each in found if each is not None), None)
     return best and _with_limits(robot, best, references)
+
+
+def counted_from_ground(robot: Robot, references: Sequence[Reference], meets: float) -> list[Conventions]:
+    """Which joint references count from the ground (J3 - J2), so that all of them are met, in each way that does it.
+    Its limits may be stated either way: of the table's joint, or of the one counted so.
+
+    Parameters
+    ----------
+    references, meets : as of :func:`conventions_of`
+    """
+    if robot.coupling is not None or robot.sliding.any():
+        return []
+    axes, found = frames(robot, np.zeros(robot.joints))[:-1, :3, 2], dict[Fault, Conventions]()
+    quantities, (expected, uncertainty) = quantities_of(references), expected_of(references)
+    for joint in range(1, robot.joints):
+        parallel = [k for k in range(joint) if abs(axes[k] @ axes[joint]) > PARALLEL]
+        for along in dict.fromkeys((*((k,) for k in reversed(parallel)), tuple(parallel))):
+            for sign, ends in itertools.product(SIGNS if along else (), (False, True)):
+                arm = _from_ground(robot, joint, along, sign, ends)
+                off = (predict_tables(tables_of(arm), arm, quantities)[0] - expected) / uncertainty
+                if np.abs(off).max() <= meets:
+                    fault = CountedFromGround(joint + 1, tuple(k + 1 for k in along), sign)
+                    found.setdefault(fault, Conventions((fault,), arm, float(np.abs(off).max())))
+    return list(found.values())
+
+
+def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal[1, -1], ends: bool) -> Robot:
+    """The robot with a joint that is counted from the ground; ``ends``: its limits are those of what is counted."""
+    coupling, lower, upper = np.eye(robot.joints), robot.lower.copy(), robot.upper.copy()
+    coupling[joint, list(along)] = sign
+    if ends:
+        least, most = robot.lower[list(along)].sum(), robot.upper[list(along)].sum()
+        lower[joint] -= sign * (most if sign > 0 else least)
+        upper[joint] -= sign * (least if sign > 0 else most)
+    return robot.replace(coupling=coupling, lower=lower, upper=upper)
 
 
 def _conventions(

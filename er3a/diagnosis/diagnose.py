@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -25,7 +25,7 @@ from er3a.diagnosis.conclusions import (
     Resolution,
     TooSmallToTell,
 )
-from er3a.diagnosis.defined_otherwise import Conventions, conventions_of
+from er3a.diagnosis.defined_otherwise import Conventions, conventions_of, counted_from_ground
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, minimise_max, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
@@ -380,13 +380,18 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
         return Diagnosis(NothingToExplain(len(stated), resolution_of(case)), len(stated), 0, None, ())
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
-    chosen = conventions_of(robot, stated, MEETS) if _may_be_chosen(robot, hypotheses) else None
+    from_ground = counted_from_ground(robot, stated, MEETS)
+    chosen = from_ground[0] if from_ground else None
+    if chosen is None and _may_be_chosen(robot, hypotheses):
+        chosen = conventions_of(robot, stated, MEETS)
     if chosen is not None:
         difference = predict_tables(tables_of(chosen.corrected), chosen.corrected, quantities_of(stated))[0]
         left = difference - expected_of(stated)[0]
         first = _defined_otherwise(ranking, chosen, left, hypotheses)
         if first.explains or not (hypotheses and hypotheses[0].explains):
-            conclusion = _concluded(first, ())
+            alike = tuple(each.faults for each in from_ground[1:])
+            first = replace(first, indistinguishable_from=(*alike, *first.indistinguishable_from))
+            conclusion = _concluded(first, first.indistinguishable_from if from_ground else ())
             if conclusion is not None:
                 return Diagnosis(conclusion, len(stated), tried, ranking, (first, *hypotheses[: SHOWN - 1]), left)
     conclusion = _conclusion(case, ranking, hypotheses)

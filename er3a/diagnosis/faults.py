@@ -31,6 +31,7 @@ FaultKind = Literal[
     "scale",
     "base",
     "flange",
+    "ground",
 ]
 Misread = Literal["metres_as_millimetres", "millimetres_as_metres", "radians_as_degrees", "degrees_as_radians"]
 Entries = Literal["a", "d", "lengths", "alpha", "offset", "limits", "angles"]
@@ -201,6 +202,18 @@ class FlangeElsewhere:
     code: Literal["flange_elsewhere"] = "flange_elsewhere"
 
 
+@dataclass(frozen=True)
+class CountedFromGround:
+    """The references count a joint from the ground, as arms with a linkage are sold: the table's joint is theirs plus
+    (``sign`` 1) or minus the sum of the joints ``along``."""
+
+    joint: int
+    along: tuple[int, ...]
+    sign: Literal[1, -1]
+    kind: ClassVar[FaultKind] = "ground"
+    code: Literal["counted_from_ground"] = "counted_from_ground"
+
+
 Fault = (
     WrongUnit
     | WrongAlphaSign
@@ -218,11 +231,12 @@ Fault = (
     | WrongScale
     | BaseElsewhere
     | FlangeElsewhere
+    | CountedFromGround
 )
 Faults = tuple[Fault, ...]
-"""One fault, or two; of conventions (zeros, directions, base, flange) any number."""
+"""One fault, or two; of conventions (zeros, directions, base, flange, what joints are counted from) any number."""
 
-CONVENTIONS = WrongOffset, ReversedDirection, BaseElsewhere, FlangeElsewhere
+CONVENTIONS = WrongOffset, ReversedDirection, BaseElsewhere, FlangeElsewhere, CountedFromGround
 """What can be chosen without changing the arm."""
 
 SIGNIFICANT_GIVEN, SIGNIFICANT_FITTED = 6, 4

@@ -180,7 +180,9 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str 
     InputError
         if there is no such reference set, or it can't be read
     """
-    return diagnosis.diagnose(robot, load_references(references) if isinstance(references, str | Path) else references)
+    return diagnosis.diagnose(
+        robot, load_references(references, robot) if isinstance(references, str | Path) else references
+    )
 
 
 References = ReferenceSet | Sequence[Reference] | Sequence[ReferenceSet] | Sequence[str] | str | Path
@@ -206,7 +208,7 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
     stated: list[Reference] = []
     documents: dict[str, Document] = {}
     for part in parts:
-        own = load_references(part) if isinstance(part, str | Path) else part
+        own = load_references(part, robot) if isinstance(part, str | Path) else part
         stated += own.references if isinstance(own, ReferenceSet) else [own]
         documents |= own.documents.by_name if isinstance(own, ReferenceSet) else {}
     if references is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.shipped import names, own_or_shipped
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import FRAME_OF_POINT, ZERO_POSE, Pose, Quantity, Rotation3
+from er3a.references.quantities import ZERO_POSE, NotOfArm, Pose, Quantity, Rotation3, not_of_arm
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
 from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
 from er3a.references.seen import COARSE_DEG, SEEN
@@ -28,16 +28,12 @@ Fields = dict[str, Any]
 Fault = tuple[str, str, str]
 """Column, problem and remedy."""
 
-_WORD, _NUMBER, _OPTIONAL, _JOINT = (
-    CsvColumn(str),
-    CsvColumn(Written),
-    CsvColumn(Written, optional=True),
-    CsvColumn(int),
-)
+_WORD, _NUMBER, _JOINT = CsvColumn(str), CsvColumn(Written), CsvColumn(int)
+_OPTIONAL, _OF_SLIDES = CsvColumn(Written, optional=True), CsvColumn(Written, optional=True, always=False)
 STATED_AS = "stated_as"
 STANDARD_DEVIATION = "standard_deviation"
 UNITS_CHECKED = "units_checked"
-UNCERTAINTIES = ("uncertainty_mm", "uncertainty_deg", "uncertainty_deg_s")
+UNCERTAINTIES = ("uncertainty_mm", "uncertainty_deg", "uncertainty_deg_s", "uncertainty_mm_s")
 _SOURCE = {
     "source": _WORD,
     "grade": CsvColumn(str, choices=tuple(GRADES)),
@@ -73,7 +69,8 @@ class Format:
     Attributes
     ----------
     columns : without source, grade, origin and what its uncertainties are, which every table has
-    digits : where a line gives no uncertainty, it is half the last digit of these columns
+    digits, sliding_digits : where a line gives no uncertainty, it is half the last digit of these columns; the latter
+        of a joint that slides
     gather : from a line's fields to those of the row
     faults : what is wrong with a line
     coarse : the uncertainty where a line gives none, of tables without digits
@@ -82,6 +79,7 @@ class Format:
 
     columns: Mapping[str, CsvColumn]
     digits: tuple[str, ...] = ()
+    sliding_digits: tuple[str, ...] = ()
     gather: Callable[[Fields], Fields] = dict
     faults: Callable[[Fields], Iterator[Fault]] = lambda fields: iter(())
     coarse: float | None = None
@@ -93,10 +91,10 @@ class Format:
         """The columns of the file."""
         return {**self.columns, **_SOURCE}
 
-    @property
-    def uncertainty(self) -> str:
-        """The column that ``digits`` fill in."""
-        return next(name for name in UNCERTAINTIES if name in self.columns)
+    def filled(self, fields: Fields) -> tuple[str, tuple[str, ...]]:
+        """The column of a line's uncertainty, and those whose digits fill it in."""
+        uncertainties = [name for name in self.columns if name in UNCERTAINTIES]
+        return (uncertainties[-1], self.sliding_digits) if _slides(fields) else (uncertainties[0], self.digits)
 
 
 def _axis_fields(fields: Fields) -> Fields:
@@ -211,16 +209,39 @@ def _reach_faults(fields: Fields) -> Iterator[Fault]:
         yield "from_axis", f"reach from axis {fields['from_axis']} is not checked", "Write 1 or 2"
 
 
+def _slides(fields: Fields) -> bool:
+    """Whether a row gives a limit or a speed of a joint that slides."""
+    return any(fields[name] is not None for name in ("lower_mm", "upper_mm", "speed_mm_s") if name in fields)
+
+
+def _in_one_unit(fields: Fields) -> Fields:
+    """Limits or a speed, without the columns of the other unit."""
+    slides = _slides(fields)
+    own, other = ("_mm", "_deg") if slides else ("_deg", "_mm")
+    values = {name.replace(own, ""): value for name, value in fields.items() if other not in name}
+    return {name.removesuffix("_s"): value for name, value in values.items()} | {"slides": slides}
+
+
 def _limit_faults(fields: Fields) -> Iterator[Fault]:
-    lower, upper = fields["lower_deg"], fields["upper_deg"]
-    if lower is not None and upper is not None and lower >= upper:
-        yield "lower_deg", f"{lower:g} is not below upper_deg {upper:g}", "Swap them"
+    yield from _mixed_units(fields)
+    for unit in ("deg", "mm"):
+        lower, upper = fields[f"lower_{unit}"], fields[f"upper_{unit}"]
+        if lower is not None and upper is not None and lower >= upper:
+            yield f"lower_{unit}", f"{lower:g} is not below upper_{unit} {upper:g}", "Swap them"
 
 
 def _speed_faults(fields: Fields) -> Iterator[Fault]:
-    speed = fields["speed_deg_s"]
-    if speed is not None and speed <= 0:
-        yield "speed_deg_s", f"{speed:g} is not positive", "Write the greatest speed, without sign"
+    yield from _mixed_units(fields)
+    for column in ("speed_deg_s", "speed_mm_s"):
+        speed = fields[column]
+        if speed is not None and speed <= 0:
+            yield column, f"{speed:g} is not positive", "Write the greatest speed, without sign"
+
+
+def _mixed_units(fields: Fields) -> Iterator[Fault]:
+    for column in ("lower_deg", "upper_deg", "speed_deg_s"):
+        if _slides(fields) and fields.get(column) is not None:
+            yield column, "given beside millimetres", "Leave it empty of a joint that slides"
 
 
 FORMATS: dict[str, Format] = {
@@ -283,14 +304,26 @@ FORMATS: dict[str, Format] = {
         mixed_lengths=True,
     ),
     "limits": Format(
-        {"joint": _JOINT, "lower_deg": _OPTIONAL, "upper_deg": _OPTIONAL, "uncertainty_deg": _OPTIONAL},
+        {
+            "joint": _JOINT,
+            **dict.fromkeys(("lower_deg", "upper_deg", "uncertainty_deg"), _OPTIONAL),
+            **dict.fromkeys(("lower_mm", "upper_mm", "uncertainty_mm"), _OF_SLIDES),
+        },
         digits=("lower_deg", "upper_deg"),
+        sliding_digits=("lower_mm", "upper_mm"),
+        gather=_in_one_unit,
         faults=_limit_faults,
         mixed_limits=True,
     ),
     "speeds": Format(
-        {"joint": _JOINT, "speed_deg_s": _OPTIONAL, "uncertainty_deg_s": _OPTIONAL},
+        {
+            "joint": _JOINT,
+            **dict.fromkeys(("speed_deg_s", "uncertainty_deg_s"), _OPTIONAL),
+            **dict.fromkeys(("speed_mm_s", "uncertainty_mm_s"), _OF_SLIDES),
+        },
         digits=("speed_deg_s",),
+        sliding_digits=("speed_mm_s",),
+        gather=_in_one_unit,
         faults=_speed_faults,
     ),
     "observations": Format(
@@ -400,7 +433,7 @@ def _known(names: Iterable[str]) -> str:
 SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
 WIDE_DEG = 30.0
 STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
-LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm")
+LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
 ANGLES = ("lower_deg", "upper_deg", "speed_deg_s")
 
 
@@ -425,7 +458,8 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
 
     Parameters
     ----------
-    robot : whose joints the rows have to be about
+    robot : rows about joints that it does not have, a wrist centre or limits in the other unit are set aside, with a
+        warning (:class:`er3a.InputWarning`)
 
     Raises
     ------
@@ -445,9 +479,13 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
     documents = load_documents(folder / FILE)
     for file in files:
         check_origins(file, tables[file.stem], documents)
-        if robot is not None:
-            _check_joints(file, tables[file.stem], robot)
-    return reference_set(folder.name, tables, documents)
+    if robot is None:
+        return reference_set(folder.name, tables, documents)
+    aside = {row: why for rows in tables.values() for row in rows if (why := _not_of_arm(row, robot))}
+    for row, why in aside.items():
+        suspect(f"{folder / row.kind}.csv: row {row.line} is set aside: {_WHY[why].format(robot=robot)}")
+    usable = {kind: tuple(row for row in rows if row not in aside) for kind, rows in tables.items()}
+    return replace(reference_set(folder.name, usable, documents), set_aside=tuple(aside.items()))
 
 
 def reference_folder(name: str) -> Path:
@@ -483,20 +521,21 @@ def check_reference_file(path: str | Path) -> tuple[Row, ...]:
     return rows
 
 
-def _check_joints(path: Path, rows: Iterable[Row], robot: Robot) -> None:
-    """Refuse rows about joints that a robot does not have: :class:`InputError` naming the row."""
-    for row in rows:
-        joint, pose = getattr(row, "joint", 1), getattr(row, "pose", ())
-        if joint > robot.joints:
-            column, problem = "joint", f"there is no joint {joint}"
-        elif any(pose[robot.joints :]):
-            column, problem = f"q{len(pose)}_deg", f"the pose has {len(pose)} joints"
-        elif FRAME_OF_POINT.get(getattr(row, "point", "flange"), -1) > robot.rows:
-            column, problem = "point", "there is no wrist centre"
-        else:
-            continue
-        remedy = f"{robot.name} has {robot.joints} joints: correct the row, or the robot's references"
-        raise InputError(path, f"row {row.line}, column {column}", problem, remedy)
+_WHY: dict[NotOfArm, str] = {
+    "no_such_joint": "{robot.name} has {robot.joints} joints",
+    "no_wrist_centre": "{robot.name} has no wrist centre",
+    "joint_slides": "the joint slides: write its limits and speed in mm (lower_mm, upper_mm, speed_mm_s)",
+    "joint_turns": "the joint turns: write its limits and speed in deg",
+}
+
+
+def _not_of_arm(row: Row, robot: Robot) -> NotOfArm | None:
+    """Why an arm does not have what a row is about; None if it has."""
+    for each in row.references():
+        why = not_of_arm(each.quantity, robot)
+        if why and (each.expected is not None or why == "no_such_joint"):
+            return why
+    return None
 
 
 def _documents_beside(path: Path) -> Documents | None:
@@ -509,13 +548,15 @@ def _documents_beside(path: Path) -> Documents | None:
 
 def _fill_uncertainty(format: Format, fields: Fields) -> None:
     """Half the last digit that the source prints, where the row gives no uncertainty; then plain numbers."""
-    if format.digits and fields[format.uncertainty] is None:
-        decimals = [fields[name].decimals for name in format.digits if fields[name] is not None]
-        fields[format.uncertainty] = 0.5 * 10.0 ** -max(decimals, default=0)
+    if format.digits:
+        column, digits = format.filled(fields)
+        if fields[column] is None:
+            decimals = [fields[name].decimals for name in digits if fields[name] is not None]
+            fields[column] = 0.5 * 10.0 ** -max(decimals, default=0)
     if ORIENTATION_COLUMNS[0] in fields:
         _fill_orientation_uncertainty(fields)
-    if format.coarse and fields[format.uncertainty] is None:
-        fields[format.uncertainty] = format.coarse
+    if format.coarse and fields["uncertainty_deg"] is None:
+        fields["uncertainty_deg"] = format.coarse
     for name, value in fields.items():
         fields[name] = float(value) if isinstance(value, Written) else value
 
@@ -540,7 +581,9 @@ def _fill_orientation_uncertainty(fields: Fields) -> None:
 def _check_row(path: Path, format: Format, fields: Fields) -> None:
     faults = []
     for column, value in fields.items():
-        if column in UNCERTAINTIES and value <= 0 and not (column == "uncertainty_deg" and _states_none(fields)):
+        if column not in UNCERTAINTIES or value is None or (column == "uncertainty_deg" and _states_none(fields)):
+            continue
+        if value <= 0:
             remedy = "Half the last digit that the source prints, if it gives none"
             faults.append((column, f"{value:g} is not positive", remedy))
     if fields.get("joint", 1) not in range(1, MOST_JOINTS + 1):

@@ -15,7 +15,7 @@ from er3a.files.kept_files import write_atomically
 from er3a.files.reference_sets import FILE, load_references
 from er3a.formats.urdf import UrdfStatements, urdf_statements
 from er3a.geometry.transforms import rpy_of
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import MM, ZERO_POSE
 from er3a.robots.robot import robot_name
 
@@ -105,24 +105,34 @@ def _positions(found: UrdfStatements, half_widths: tuple[float, float], behind: 
 
 
 def _limits(found: UrdfStatements, behind: Sequence[str]) -> Table:
-    stated = np.isfinite(found.lower) & np.isfinite(found.upper) & ~found.sliding & (found.lower < found.upper)
-    rows = [
-        (joint + 1, *_written(np.degrees([found.lower[joint], found.upper[joint]]), DIGITS_MM), LIMITS_DEG)
-        for joint in np.flatnonzero(stated).tolist()
-    ]
-    return _rows(("joint", "lower_deg", "upper_deg", "uncertainty_deg"), rows, behind)
+    stated = np.isfinite(found.lower) & np.isfinite(found.upper) & (found.lower < found.upper)
+    ends = np.column_stack([found.lower, found.upper])
+    return _joint_rows(("lower_deg", "upper_deg", "uncertainty_deg"), stated, ends, found, behind)
 
 
 def _speeds(found: UrdfStatements, behind: Sequence[str]) -> Table:
-    stated = np.isfinite(found.speed) & ~found.sliding & (found.speed > 0)
-    rows = [
-        (joint + 1, *_written(np.degrees(found.speed[[joint]]), DIGITS_MM), LIMITS_DEG)
-        for joint in np.flatnonzero(stated).tolist()
-    ]
-    return _rows(("joint", "speed_deg_s", "uncertainty_deg_s"), rows, behind)
+    stated = np.isfinite(found.speed) & (found.speed > 0)
+    return _joint_rows(("speed_deg_s", "uncertainty_deg_s"), stated, found.speed[:, None], found, behind)
 
 
-LIMITS_DEG = 0.05  # three decimals of a radian, as URDFs print limits
+def _joint_rows(
+    columns: tuple[str, ...], stated: Flags, values: Reals, found: UrdfStatements, behind: Sequence[str]
+) -> Table:
+    """A row for each joint of which values (n, k), rad or m, are stated; those of slides in columns of their own."""
+    slides = stated & found.sliding
+    blank = ("",) * len(columns)
+    rows = []
+    for joint in np.flatnonzero(stated).tolist():
+        if slides[joint]:
+            rows.append((joint + 1, *blank, *_written(MM * values[joint], DIGITS_MM), LIMITS_MM))
+        else:
+            row = (joint + 1, *_written(np.degrees(values[joint]), DIGITS_MM), LIMITS_DEG)
+            rows.append((*row, *blank) if slides.any() else row)
+    further = tuple(name.replace("_deg", "_mm") for name in columns) if slides.any() else ()
+    return _rows(("joint", *columns, *further), rows, behind)
+
+
+LIMITS_DEG, LIMITS_MM = 0.05, 0.5  # three decimals of a radian or a metre, as URDFs print limits
 
 
 def _written(values: Reals, digits: int) -> list[float]:

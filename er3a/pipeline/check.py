@@ -79,11 +79,12 @@ def stage_forms(robot: Robot) -> dict[str, str]:
     spherical = closed_form_missing(robot) is None
     plain = robot.coupling is None and not robot.combined
     solver = arm_solver(robot).chain.code.replace("_", " ")
-    six = robot.rows == robot.joints == SIX and not robot.sliding.any() and robot.coupling is None
+    turning = not robot.sliding.any() and robot.coupling is None
+    six = turning and robot.rows == SIX
     proven = "proof and capability" if spherical and plain else "proof by the general method" if six and plain else ""
     iterated = solver in ("dependent", "unsolved")
     return {
-        "validation": "references, diagnosis and evidence" if six else "references and self-checks, no diagnosis",
+        "validation": "references, diagnosis and evidence" if turning else "references and self-checks, no diagnosis",
         "workspace": f"samples, {proven or 'volume bounded by lengths alone'}",
         "inverse": "by iteration, which may miss solutions" if iterated else f"all solutions, class {solver}",
         "trajectory": "moves of the joints and of the tool"

@@ -175,6 +175,8 @@ def state_of(
         extremes=extremes,
         axes=axes,
         slides=robot.slides,
+        sliding=robot.sliding,
+        coupling=robot.coupling,
         columns={name: getattr(robot, name) for name in TABLE_COLUMNS}
         | {"twist": robot.alpha[1:] if robot.convention == "modified" else robot.alpha[:-1]},
     )
@@ -222,6 +224,8 @@ class TablesState:
             speed=self.robot.speed,
             extremes={},
             slides=self.robot.slides,
+            sliding=self.robot.sliding,
+            coupling=self.robot.coupling,
             columns={name: getattr(tables, name) for name in TABLE_COLUMNS}
             | {"twist": np.where(tables.modified[:, None], tables.alpha[:, 1:], tables.alpha[:, :-1])},
         )

@@ -19,12 +19,13 @@ import numpy as np
 import scipy
 
 from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.robot import Robot
 
 Pose = tuple[float, ...]
 """Joint values as they are written: deg, or mm of joints that slide."""
 Vector = tuple[float, float, float]
 Rotation3 = tuple[Vector, Vector, Vector]
-Unit = Literal["mm", "deg", "deg/s"]
+Unit = Literal["mm", "deg", "deg/s", "mm/s"]
 Coordinate = Literal["x", "y", "z"]
 SectionAxis = Literal["x", "z"]
 Point = Literal["flange", "wrist_centre"]
@@ -33,6 +34,7 @@ Side = Literal["lower", "upper"]
 Extremity = Literal["greatest", "least"]
 ZERO_POSE: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MM = 1000.0
+SIX = 6
 NEARLY_OPPOSITE = 1e-5
 SECTION_AXES: tuple[SectionAxis, ...] = ("x", "z")
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
@@ -51,6 +53,7 @@ class ModelState:
     extremes : value (mm) of each :class:`Extreme` that was searched for
     columns : (..., 6) each, of the table: a, d in m, alpha, offset in rad; ``twist`` (..., 5), between joint axes
     slides : (n,), joints whose limits are in m; None where all turn
+    sliding : (m,), rows that slide, and coupling : (m, n), of the robot; None where all turn, and without one
     axes : the joints' axis lines in the zero pose, if they were measured on the model; else those of the frames
     """
 
@@ -64,6 +67,8 @@ class ModelState:
     axes: AxisLines | None = None
     columns: Mapping[str, Reals] = field(default_factory=dict)
     slides: Flags | None = None
+    sliding: Flags | None = None
+    coupling: Reals | None = None
 
     def at(self, pose: Pose) -> Reals:
         """Frames (..., 7, 4, 4) at a pose."""
@@ -288,6 +293,16 @@ class Limit(Quantity):
 
 
 @dataclass(frozen=True)
+class SlideLimit(Limit):
+    """A limit of a joint that slides."""
+
+    unit: ClassVar[Unit] = "mm"
+
+    def value(self, state: ModelState) -> Reals:
+        return np.radians(super().value(state)) * MM
+
+
+@dataclass(frozen=True)
 class Speed(Quantity):
     """A joint's greatest speed; NaN where the robot's file gives none."""
 
@@ -296,6 +311,16 @@ class Speed(Quantity):
 
     def value(self, state: ModelState) -> Reals:
         return np.degrees(state.speed[..., self.joint - 1])
+
+
+@dataclass(frozen=True)
+class SlideSpeed(Speed):
+    """The greatest speed of a joint that slides."""
+
+    unit: ClassVar[Unit] = "mm/s"
+
+    def value(self, state: ModelState) -> Reals:
+        return np.asarray(state.speed[..., self.joint - 1] * MM)
 
 
 @dataclass(frozen=True)
@@ -349,6 +374,23 @@ class SectionExtent(Extreme):
 
     def measure(self, T: Reals) -> Reals:
         return section_coordinate(T, self.point, self.coordinate)
+
+
+NotOfArm = Literal["no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns"]
+
+
+def not_of_arm(quantity: Quantity, robot: Robot) -> NotOfArm | None:
+    """Why an arm has no such quantity; None if it has. Only arms with six rows have a wrist centre. ``joint_slides``: a
+    limit or speed is stated as of one that turns."""
+    joint = getattr(quantity, "joint", getattr(quantity, "axis", 1))
+    if joint > robot.joints or any(quantity.seen_at[robot.joints :]):
+        return "no_such_joint"
+    at_wrist = isinstance(quantity, SectionCoordinate | SegmentAngle)
+    if getattr(quantity, "point", "wrist_centre" if at_wrist else "flange") != "flange" and robot.rows != SIX:
+        return "no_wrist_centre"
+    if isinstance(quantity, Limit | Speed) and isinstance(quantity, SlideLimit | SlideSpeed) != robot.slides[joint - 1]:
+        return "joint_slides" if robot.slides[joint - 1] else "joint_turns"
+    return None
 
 
 def section_coordinate(T: Reals, point: Point, coordinate: SectionAxis) -> Reals:

@@ -19,7 +19,7 @@ import numpy as np
 
 from er3a.by_value import Displayed, ReadOnly, Sheet, first_rows
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import Quantity, Unit
+from er3a.references.quantities import NotOfArm, Quantity, Unit
 from er3a.references.subjects import ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 
@@ -203,12 +203,14 @@ class ReferenceSet(Displayed):
     references : the scalars
     rows : the rows they come from, per kind
     documents : that their origins name
+    set_aside : rows about what the arm does not have that the set was loaded for, with why
     """
 
     name: str
     references: tuple[Reference, ...]
     rows: Mapping[str, tuple[Row, ...]] = field(hash=False)
     documents: Documents = field(default_factory=Documents, hash=False)
+    set_aside: tuple[tuple[Row, NotOfArm], ...] = field(default=(), hash=False)
 
     @property
     def checkable(self) -> tuple[Reference, ...]:

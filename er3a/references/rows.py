@@ -31,6 +31,8 @@ from er3a.references.quantities import (
     Segment,
     SegmentAngle,
     Side,
+    SlideLimit,
+    SlideSpeed,
     Speed,
     Vector,
 )
@@ -217,33 +219,37 @@ class ReachRow(Row):
 
 @dataclass(frozen=True)
 class LimitRow(Row):
-    """A joint's limits; None where the source gives none."""
+    """A joint's limits, deg, or mm of one that ``slides``; None where the source gives none."""
 
     kind: ClassVar[str] = "limits"
     groups: ClassVar[tuple[str, ...]] = ("limits",)
     joint: int
-    lower_deg: float | None
-    upper_deg: float | None
-    uncertainty_deg: float
+    lower: float | None
+    upper: float | None
+    uncertainty: float
+    slides: bool = False
 
     def scalars(self) -> Iterator[Scalar]:
-        sides: tuple[tuple[Side, float | None], ...] = (("lower", self.lower_deg), ("upper", self.upper_deg))
+        sides: tuple[tuple[Side, float | None], ...] = (("lower", self.lower), ("upper", self.upper))
         for side, expected in sides:
-            yield JointLimit(self.joint, side), "limits", Limit(self.joint, side), expected, self.uncertainty_deg
+            quantity = (SlideLimit if self.slides else Limit)(self.joint, side)
+            yield JointLimit(self.joint, side), "limits", quantity, expected, self.uncertainty
 
 
 @dataclass(frozen=True)
 class SpeedRow(Row):
-    """A joint's greatest speed; None where the source gives none."""
+    """A joint's greatest speed, deg/s, or mm/s of one that ``slides``; None where the source gives none."""
 
     kind: ClassVar[str] = "speeds"
     groups: ClassVar[tuple[str, ...]] = ("speeds",)
     joint: int
-    speed_deg_s: float | None
-    uncertainty_deg_s: float
+    speed: float | None
+    uncertainty: float
+    slides: bool = False
 
     def scalars(self) -> Iterator[Scalar]:
-        yield JointSpeed(self.joint), "speeds", Speed(self.joint), self.speed_deg_s, self.uncertainty_deg_s
+        quantity = (SlideSpeed if self.slides else Speed)(self.joint)
+        yield JointSpeed(self.joint), "speeds", quantity, self.speed, self.uncertainty
 
 
 @dataclass(frozen=True)

@@ -86,12 +86,17 @@ class SeenMotion(QuantityAtPose):
     def _directions(self, state: ModelState) -> tuple[Reals, Reals]:
         """The motion's direction and the one that was seen, (..., 3) each."""
         T = state.at(self.pose)
-        axis = T[..., self.joint - 1, :3, 2] * state.direction[..., self.joint - 1, None]
-        if self.manner == "turns":
-            return axis, self._seen_toward()
-        pointing = T[..., -1, :3, 2]
-        arm = T[..., FRAME_OF_POINT[self.point], :3, 3] - T[..., self.joint - 1, :3, 3]
-        motion = np.cross(axis, pointing if self.manner == "tilts" else arm)
+        moves = {self.joint - 1: 1.0} if state.coupling is None else dict(enumerate(state.coupling[:, self.joint - 1]))
+        motion = np.zeros_like(T[..., 0, :3, 2])
+        for row, factor in moves.items():
+            axis = factor * T[..., row, :3, 2] * state.direction[..., row, None]
+            arm = T[..., FRAME_OF_POINT[self.point], :3, 3] - T[..., row, :3, 3]
+            if state.sliding is not None and state.sliding[row]:
+                motion = motion + (axis if self.manner == "moves" else 0.0)
+            elif self.manner == "turns":
+                motion = motion + axis
+            else:
+                motion = motion + np.cross(axis, T[..., -1, :3, 2] if self.manner == "tilts" else arm)
         toward = np.broadcast_to(self._seen_toward(), motion.shape)
         still = np.linalg.norm(motion, axis=-1, keepdims=True) < STILL
         across = np.roll(toward, 1, axis=-1)  # stands for a motion that isn't there: square to every direction

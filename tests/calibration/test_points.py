@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import er3a
+from er3a.calibration.fit import Fit, covariance_by_poses
 from er3a.calibration.observations import Measurement
 from er3a.calibration.outcomes import NotToldApart
 from er3a.calibration.terms import JointErrors, JointTerm, candidates
@@ -350,3 +351,18 @@ def test_a_touch_beside_coordinates_is_one_clear_error(tmp_path):
     path.write_text("q1_deg,point,x_mm,y_mm,z_mm,place,plane\n10,tool,1,2,300,ball,\n", encoding="utf-8")
     with pytest.raises(InputError, match="row 2, column place"):
         load_measurements(path)
+
+
+def test_intervals_rest_on_as_many_degrees_of_freedom_as_two_means_have():
+    """Welch's degrees of freedom of two groups' difference, at equal variances."""
+    first, second = 4, 30
+    J = np.column_stack([np.ones(first + second), np.arange(first + second) < first])
+    rest = np.random.default_rng(1).normal(size=(first + second))
+    off = rest - J @ np.linalg.lstsq(J, rest, rcond=None)[0]
+    covariance, freedom = covariance_by_poses(
+        Fit((), (), np.zeros(2), np.zeros(0), rest, off, J), np.arange(first + second)
+    )
+    variances = rest[:first].var(ddof=1) / first, rest[first:].var(ddof=1) / second
+    assert covariance[1, 1] == pytest.approx(sum(variances))
+    shares = 1 / (first**2 * (first - 1)), 1 / (second**2 * (second - 1))
+    assert freedom == pytest.approx([second - 1, (1 / first + 1 / second) ** 2 / sum(shares)])

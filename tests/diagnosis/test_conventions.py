@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere, entry_of
+from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere, CountedFromGround, entry_of
 from er3a.geometry.transforms import rot_z, translation
-from er3a.references.quantities import MM
+from er3a.references.quantities import MM, Limit, PointCoordinate
+from er3a.references.reference import Reference
+from er3a.references.subjects import JointLimit, PointAtPose
 
 
 def other_conventions(robot: er3a.Robot, seed: int) -> er3a.Robot:
@@ -70,3 +72,25 @@ def test_reach_on_a_data_sheet_counts():
     found = er3a.diagnose(longer, reach)
     assert found == []
     assert found.missed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "joint", "sign"), [("er3_600", 3, 1), ("lbr_iiwa_14", 4, -1)])
+def test_a_sheet_that_counts_a_joint_from_the_ground_is_named(name, joint, sign):
+    right, stated = er3a.load_robot(name), []
+    for k in range(4):
+        q = np.random.default_rng(k).uniform(-40, 40, right.joints).round()
+        x = er3a.forward(right.without_tool(), np.radians(q))[:3, 3] * MM
+        q[joint - 1] -= sign * q[1]
+        for c, value in zip("xyz", x):
+            about = PointAtPose(f"p{k}", "flange", c), "key_poses", PointCoordinate(tuple(q), "flange", c)
+            stated.append(Reference(*about, float(value), 0.1, "sheet", "official", "sheet"))
+    assert er3a.diagnose(right, stated)[0].faults == (CountedFromGround(joint, (2,), sign),)
+    lower, upper = np.degrees(right.lower), np.degrees(right.upper)
+    ends = (lower[1], upper[1]) if sign < 0 else (-upper[1], -lower[1])
+    for side, value in (("lower", lower[joint - 1] + ends[0]), ("upper", upper[joint - 1] + ends[1])):
+        about = JointLimit(joint, side), "limits", Limit(joint, side)
+        stated.append(Reference(*about, float(value), 0.5, "sheet", "official", "sheet"))
+    assert er3a.diagnose(right, stated)[0].faults == (CountedFromGround(joint, (2,), sign),)
+    limits_alone = er3a.diagnose(right, stated[-2:])[0]
+    assert (CountedFromGround(joint, (2,), sign),) in (limits_alone.faults, *limits_alone.indistinguishable_from)

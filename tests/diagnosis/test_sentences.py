@@ -23,6 +23,7 @@ from er3a.diagnosis.conclusions import (
 )
 from er3a.diagnosis.faults import (
     BaseElsewhere,
+    CountedFromGround,
     Fault,
     FlangeElsewhere,
     ReversedDirection,
@@ -113,7 +114,11 @@ def test_every_repair_and_free_number_has_a_sentence_of_its_own():
     table = tables_of(load_robot("er3a_c60_article"))
     faults = [repair.fault for repair in repairs_of(table, load_references("er3a_c60").references)]
     faults += [number.fault(float(number.value(table)[0]), 0.01) for number in free_numbers(6)]
-    faults += [BaseElsewhere((0.0, 0.0, -330.0), 0.0), FlangeElsewhere((0.0, 0.0, 50.0))]
+    faults += [
+        BaseElsewhere((0.0, 0.0, -330.0), 0.0),
+        FlangeElsewhere((0.0, 0.0, 50.0)),
+        CountedFromGround(3, (2,), -1),
+    ]
     assert {type(fault) for fault in faults} == set(get_args(Fault))
     assert len({say(fault) for fault in faults}) == len(set(faults)) == len(faults)
 

@@ -1,4 +1,4 @@
-"""References about joint 7: limits, axis, and poses that turn it; one about a joint that an arm lacks is one line."""
+"""References about joint 7, and about slides, whose limits are in mm; rows about what an arm lacks are set aside."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import frames
-from er3a.references.predict import predict
+from er3a.references.predict import predict, read, state_of
 from er3a.references.reference import expected_of
+from er3a.references.seen import SeenMotion
 
 Q_DEG = (10, 20, 30, 40, 50, 60, 70)
 POSE = ",".join(f"q{joint}_deg" for joint in range(1, 8))
@@ -50,11 +51,52 @@ def test_limits_axis_and_poses_of_joint_7_are_compared(tmp_path):
     assert np.any(np.abs(predict(turned, references) - expected) > uncertainty)
 
 
-def test_joints_that_an_arm_lacks_are_one_clear_error(tmp_path):
+def test_rows_about_joints_that_an_arm_lacks_are_set_aside(tmp_path):
     folder = write_set(tmp_path / "seven", load_robot("lbr_iiwa_14"))
-    with pytest.raises(InputError, match=r"axes.csv: row 2, column joint: there is no joint 7. er3_600 has 6 joints"):
-        load_references(folder, load_robot("er3_600"))
-    (folder / "axes.csv").unlink()
-    (folder / "limits.csv").unlink()
-    with pytest.raises(InputError, match=r"positions.csv: row 2, column q7_deg: the pose has 7 joints"):
-        load_references(folder, load_robot("er3_600"))
+    with pytest.warns(er3a.InputWarning) as warned:
+        found = load_references(folder, load_robot("er3_600"))
+    lines = {f"{name}.csv: row 2 is set aside: er3_600 has 6 joints" for name in ("axes", "limits", "positions")}
+    assert {str(each.message).removeprefix(f"{folder}/") for each in warned} == lines
+    assert {why for _, why in found.set_aside} == {"no_such_joint"}
+    assert predict(load_robot("er3_600"), found.checkable) == pytest.approx([0.0])
+
+
+LIMITS = "joint,lower_deg,upper_deg,uncertainty_deg,lower_mm,upper_mm,uncertainty_mm,source,grade,origin\n"
+SPEEDS = "joint,speed_deg_s,uncertainty_deg_s,speed_mm_s,source,grade,origin\n"
+
+
+def test_limits_and_speeds_of_slides_are_in_mm(tmp_path):
+    arm = load_robot("lbr_iiwa_14")
+    slide = arm.replace(sliding=np.arange(7) == 2, lower=arm.lower * 0 - 0.1, upper=arm.upper * 0 + 0.25)
+    (tmp_path / "documents.csv").write_text("name,title,publisher,derived_from\nsheet,Sheet,KUKA,\n")
+    (tmp_path / "limits.csv").write_text(f"{LIMITS}3,,,,-100.0,250.0,,s,official,sheet\n2,-5,14,,,,,s,official,sheet\n")
+    (tmp_path / "speeds.csv").write_text(f"{SPEEDS}3,,,1200,s,official,sheet\n")
+    found = load_references(tmp_path, slide.replace(speed=np.full(7, 1.2)))
+    assert [each.unit for each in found.references] == ["mm", "mm", "deg", "deg", "mm/s"]
+    assert [each.uncertainty for each in found.references] == [0.05, 0.05, 0.5, 0.5, 0.5]
+    assert predict(slide.replace(speed=np.full(7, 1.2)), found.references)[[0, 1, 4]] == pytest.approx(
+        [-100, 250, 1200]
+    )
+    (tmp_path / "speeds.csv").unlink()
+    with pytest.warns(er3a.InputWarning, match="limits.csv: row 2 is set aside: the joint turns"):
+        assert [why for _, why in load_references(tmp_path, arm).set_aside] == ["joint_turns"]
+    (tmp_path / "limits.csv").write_text(f"{LIMITS}3,1,2,,-100.0,250.0,,s,official,sheet\n")
+    with pytest.raises(InputError, match="row 2, column lower_deg: given beside millimetres"):
+        load_references(tmp_path, slide)
+    (tmp_path / "limits.csv").write_text(f"{LIMITS}3,,,,-0.1,0.25,,s,official,sheet\n")
+    with pytest.raises(InputError, match="which can only be metres"):
+        load_references(tmp_path, slide)
+
+
+def test_what_is_seen_of_slides_and_coupled_joints_is_the_motion_itself():
+    arm = load_robot("lbr_iiwa_14")
+    coupling = np.eye(7)
+    coupling[3, 1] = -1
+    arm = arm.replace(sliding=np.arange(7) == 2, coupling=coupling)
+    q, pose = arm.lower * 0 + 0.3, (*np.degrees([0.3, 0.3]).tolist(), 300.0, *np.degrees([0.3] * 4).tolist())
+    for joint in range(1, 7):
+        step = 1e-6 * (np.arange(7) == joint - 1)
+        moved = er3a.forward(arm, q + step)[:3, 3] - er3a.forward(arm, q - step)[:3, 3]
+        seen = SeenMotion(pose, joint, "flange", "up")
+        angle = np.degrees(np.arccos(moved[2] / np.linalg.norm(moved)))
+        assert read([seen], state_of(arm, [seen]))[0] == pytest.approx(angle, abs=1e-4)

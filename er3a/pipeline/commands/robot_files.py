@@ -209,7 +209,7 @@ def calibrate(
     others = load_measurements(held_back, arm) if held_back else None
     try:
         with shown_work(f"{robot}: corrections are estimated"):
-            source = file or load_references(measurements)
+            source = file or load_references(measurements, arm)
             found = calibrate_robot(arm, source, [each.value for each in fixed or ()])
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None

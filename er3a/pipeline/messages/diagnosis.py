@@ -20,6 +20,7 @@ from er3a.diagnosis.conclusions import (
 )
 from er3a.diagnosis.faults import (
     BaseElsewhere,
+    CountedFromGround,
     Faults,
     FlangeElsewhere,
     ReversedDirection,
@@ -129,6 +130,7 @@ TEXTS = texts(
         "flange_elsewhere#turned": (
             "the flange is defined elsewhere: ({x:g}, {y:g}, {z:g}) mm from there, turned by {turn_deg:g} deg"
         ),
+        "counted_from_ground": "counted from the ground: the table's J{joint} is the references' {sum}",
         "flange_position_decides#share": (
             "the flange's position at joints ({pose}) deg would distinguish {share:.0%} of the pairs, by up to {most}"
         ),
@@ -308,6 +310,13 @@ def _(found: BaseElsewhere) -> str:
 def _(found: FlangeElsewhere) -> str:
     x, y, z = found.shift_mm
     return say_as(found, "turned" if found.turn_deg >= LEAST_SHOWN else "shifted", x=x, y=y, z=z)
+
+
+@say.register
+def _(found: CountedFromGround) -> str:
+    sign = "+" if found.sign > 0 else "−"
+    others = "".join(f" {sign} J{joint}" for joint in found.along)
+    return _at_joint(found.joint, say_as(found, sum=f"J{found.joint}{others}"))
 
 
 @say.register

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import er3a.pipeline.messages.diagnosis  # noqa: F401
+import er3a.pipeline.messages.diagnosis
+import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.diagnosis.conclusions import TooSmallToTell
-from er3a.diagnosis.faults import ReversedDirection, WrongOffset
+from er3a.diagnosis.faults import CountedFromGround, ReversedDirection, WrongOffset
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.messages.language import N_, as_text, own_title, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_WORDS, quoted
-from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
     Claims,
@@ -144,6 +145,13 @@ TEXTS = texts(
         ),
         "not_in_robot_file": "the robot's file gives no value",
         "source_gives_none": "the source gives none",
+        "not_of_this_arm": by(
+            "reason",
+            no_such_joint="set aside: the arm has {joints} joints",
+            no_wrist_centre="set aside: the arm has no wrist centre",
+            joint_slides="set aside: the joint slides, and the limit or speed is stated as of one that turns",
+            joint_turns="set aside: the joint turns, and the limit or speed is stated as of one that slides",
+        ),
         "set_has_no_data": "{reference_set} has no data",
         "in_no_set": "no reference set gives it",
         "numbers_missing": "numbers are missing",
@@ -273,7 +281,7 @@ def _(found: Contradicted) -> str:
 @say.register
 def _(found: DefinedOtherwise) -> str:
     faults = () if found.diagnosis is None or isinstance(found.diagnosis, TooSmallToTell) else found.diagnosis.faults
-    joints = any(isinstance(fault, WrongOffset | ReversedDirection) for fault in faults)
+    joints = any(isinstance(fault, WrongOffset | ReversedDirection | CountedFromGround) for fault in faults)
     head = say_as(found, grades=_grades(found.grades), own_set=found.reference_set, checks=counted_checks(found.counts))
     meaning = say_as(found, "joints" if joints else "places")
     return joined([head, say(found.diagnosis) if found.diagnosis else "", meaning, *_of_claims(found)], " ")

@@ -35,7 +35,7 @@ from er3a.kinematics.round_trips import (
     slot_round_trips,
 )
 from er3a.kinematics.wrist_partitioned import closed_form_missing
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
@@ -59,6 +59,7 @@ from er3a.pipeline.stages.validation.model import (
     Note,
     NothingToCompare,
     NotInRobotFile,
+    NotOfThisArm,
     NumbersMissing,
     PartFound,
     ReferenceCheck,
@@ -82,6 +83,7 @@ from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed, Refer
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
 ROUNDING = 1e-9
+SIX_TURN = (False,) * 6
 
 
 def against_itself(
@@ -98,15 +100,21 @@ def against_itself(
 
 
 def checks_of_set(
-    references: ReferenceSet, values: Reals, bases: Sequence[CheckBasis], joints: int = 6
+    references: ReferenceSet, values: Reals, bases: Sequence[CheckBasis], slides: Sequence[bool] | Flags = SIX_TURN
 ) -> tuple[list[Check], list[Conflict]]:
-    """Judge a model's values (n,) of the set's checkable references, and list what the set says nothing about.
+    """Judge a model's values (n,) of the set's checkable references, and list what was set aside and what the set says
+    nothing about.
 
-    ``bases`` (n,): what each of these checks rests on; ``joints`` : of the arm.
+    ``bases`` (n,): what each of these checks rests on; ``slides`` : of each joint of the arm.
     """
     stated = _Stated(references.name, references.checkable, values, bases)
     checks = [stated.check(i) for i in range(len(values))]
-    return [*checks, *_gaps(references, joints)], stated.conflicts()
+    aside = [
+        _without_value(references.name, reference, NotOfThisArm(why, len(slides)))
+        for row, why in references.set_aside
+        for reference in row.references()
+    ]
+    return [*checks, *aside, *_gaps(references, slides)], stated.conflicts()
 
 
 class _Stated:
@@ -188,7 +196,7 @@ def _without_value(set_name: str, reference: Reference, note: Note) -> Unjudged:
     )
 
 
-def _gaps(references: ReferenceSet, joints: int) -> list[Unjudged]:
+def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[Unjudged]:
     """What the set says nothing about."""
     name, note = references.name, SetHasNoData(references.name)
     stated = {reference.quantity for reference in references.checkable}
@@ -201,20 +209,22 @@ def _gaps(references: ReferenceSet, joints: int) -> list[Unjudged]:
     gaps += [
         Unjudged(WholeGroup(group), group, "", note, reference_set=name) for group in GROUPS if group not in present
     ]
-    quantities = {reference.quantity for reference in references.references}
+    subjects = {each.subject for each in references.references}
+    subjects |= {each.subject for row, _ in references.set_aside for each in row.references()}
     with_axis = {row.joint for row in references.of(AxisRow)}
-    for joint in range(1, joints + 1):
+    for joint in range(1, len(slides) + 1):
         if "axes" in present and joint not in with_axis:
             gaps.append(Unjudged(AxisPosition(joint, None), "axes", "mm", note, reference_set=name))
-        wanted: list[tuple[str, ReferenceSubject, Quantity]] = [
-            ("limits", JointLimit(joint, "lower"), Limit(joint, "lower")),
-            ("limits", JointLimit(joint, "upper"), Limit(joint, "upper")),
-            ("speeds", JointSpeed(joint), Speed(joint)),
+        wanted: list[tuple[str, ReferenceSubject]] = [
+            ("limits", JointLimit(joint, "lower")),
+            ("limits", JointLimit(joint, "upper")),
+            ("speeds", JointSpeed(joint)),
         ]
+        units = ("mm", "mm/s") if slides[joint - 1] else (Limit.unit, Speed.unit)
         gaps += [
-            Unjudged(subject, group, quantity.unit, note, reference_set=name)
-            for group, subject, quantity in wanted
-            if group in present and quantity not in quantities
+            Unjudged(subject, group, units[group == "speeds"], note, reference_set=name)
+            for group, subject in wanted
+            if group in present and subject not in subjects
         ]
     return gaps
 

@@ -298,7 +298,7 @@ def compute(study: Study, name: str) -> ValidationResults:
     """Check a robot's model, and say what is most likely wrong with it."""
     robot = model_of(study, name)
     settings = study.section(ValidationSettings)
-    sets = [load_references(reference) for reference in robot.references]
+    sets = [load_references(reference, robot) for reference in robot.references]
     check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
 
     turning, six = is_turning(robot), is_six_turning(robot)
@@ -318,7 +318,7 @@ def compute(study: Study, name: str) -> ValidationResults:
             if turning
             else undeclared_bases(references.checkable)
         )
-        judged, contradictions = checks_of_set(references, read(quantities, state), bases, robot.joints)
+        judged, contradictions = checks_of_set(references, read(quantities, state), bases, robot.slides)
         checks += judged
         conflicts += contradictions
     checks += _without_reference(robot, values, checks)
@@ -327,7 +327,7 @@ def compute(study: Study, name: str) -> ValidationResults:
 
     axes, poses = axes_table(circles, sets), key_poses_table(robot, sets, extremes)
     diagnoses, residuals = diagnose_sets(robot, sets if turning else [])
-    calibrations, corrections = calibrate_from_sets(robot, sets if six else [])
+    calibrations, corrections = calibrate_from_sets(robot, sets)
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(robot, sets, checks, poses, found)
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
@@ -426,7 +426,7 @@ def is_turning(robot: Robot) -> bool:
 
 
 def is_six_turning(robot: Robot) -> bool:
-    """Whether the arm is one of those that calibration from references is made for."""
+    """Whether the arm is one of those that the workspace drawing is made for."""
     return robot.rows == SIX and is_turning(robot)
 
 

@@ -22,7 +22,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
-from er3a.references.quantities import Unit
+from er3a.references.quantities import NotOfArm, Unit
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
@@ -87,6 +87,15 @@ class SourceGivesNone:
 
 
 @dataclass(frozen=True)
+class NotOfThisArm:
+    """The arm does not have what the reference is about, which was set aside."""
+
+    reason: NotOfArm
+    joints: int
+    code: Literal["not_of_this_arm"] = "not_of_this_arm"
+
+
+@dataclass(frozen=True)
 class SetHasNoData:
     """A reference set says nothing about it."""
 
@@ -130,6 +139,7 @@ class NearSingularLeftOut:
 Note = (
     NotInRobotFile
     | SourceGivesNone
+    | NotOfThisArm
     | SetHasNoData
     | InNoSet
     | NumbersMissing

@@ -63,7 +63,7 @@ from er3a.pipeline.viewing.page import (
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
-DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "": 0}
+DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
     N_("Check"),
     N_("Model>"),
