@@ -91,7 +91,13 @@ def test_the_articles_table_is_another_arm():
         (lambda arm: arm.replace(convention="modified"), "other_convention"),
         (lambda arm: arm.replace(a=arm.a / 25.4, d=arm.d / 25.4), "unit"),
         (lambda arm: arm.replace(a=arm.a * 1.3, d=arm.d * 1.3), "scale"),
+        (lambda arm: arm.replace(a=arm.a / 10), "unit"),
+        (lambda arm: arm.replace(alpha=np.radians(arm.alpha)), "angle_unit"),
         (lambda arm: arm.replace(d=np.roll(arm.d, 1)), "rows_shifted"),
+        (
+            lambda arm: arm.replace(**{each: np.roll(getattr(arm, each), 1) for each in ("a", "alpha", "d")}),
+            "rows_shifted",
+        ),
     ],
 )
 def test_slips_are_named(slip, cause):
@@ -106,6 +112,31 @@ def test_all_alphas_negated_of_an_arm_that_is_its_own_mirror_image_is_a_matter_o
     found = er3a.compare(right.replace(alpha=-right.alpha), right)
     assert found.verdict == "same_arm"
     assert not found.directions.same
+
+
+@pytest.mark.parametrize("row", [0, 3, 4])
+def test_a_twist_of_the_wrong_sign_is_named_where_it_only_moves_zeros(row):
+    right = er3a.to_standard(er3a.load_robot("ur5e"))
+    found = er3a.compare(right.replace(alpha=np.where(np.arange(6) == row, -1, 1) * right.alpha), right)
+    assert (found.verdict, found.geometry.same) == ("same_arm", True)
+    assert [each.entries for each in found.zero.causes] == [(f"alpha{row + 1}",)]
+
+
+def test_a_twist_of_the_wrong_sign_beside_an_offset_is_one_entry():
+    right = er3a.Robot.from_dh(
+        a=[0, 0.43, 0.02, 0, 0, 0], alpha=np.radians([90, 0, -90, 90, -90, 0]), d=[0.67, 0.15, 0, 0.43, 0, 0]
+    )
+    found = er3a.compare(right.replace(alpha=np.where(np.arange(6) == 2, -1, 1) * right.alpha), right)
+    assert [(each.entry, each.a, each.b) for each in found.geometry.differences] == [("alpha3", 90, -90)]
+    assert (found.zero.same, found.directions.same) == (True, True)
+
+
+def test_offsets_in_radians_are_named():
+    offset = np.radians([0, -90, 37, 180, 12, 0])
+    right = er3a.load_robot("er3_600").replace(offset=offset)
+    found = er3a.compare(right.replace(offset=np.radians(offset)), right)
+    assert found.geometry.same
+    assert [(each.code, each.unit) for each in found.zero.causes] == [("angle_unit", "offset, radian")]
 
 
 def test_couplings_and_counts_and_kinds():
