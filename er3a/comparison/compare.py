@@ -490,7 +490,8 @@ def _causes_of_zeros(robot: Robot, b: Mechanism, found: Match, tolerances: Toler
         slips += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
         slips += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
         for code, amount, unit, meant in slips:
-            if np.abs(wrapped(meant - offset - zeros)[inner]).max() < tolerances.angle:
+            left = np.abs(wrapped(meant - offset - zeros)[inner])
+            if left.max() < tolerances.angle and np.abs(wrapped(meant)[inner]).max() > tolerances.angle:
                 yield Cause(code, "a", (), amount, unit)
                 return
     if np.abs(np.sin(zeros)).max() > tolerances.angle:
