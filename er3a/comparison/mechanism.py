@@ -14,7 +14,8 @@ Signs are counted out. Everything else is linear once the directions agree: tran
 
 Axes less than ``NEARLY_PARALLEL`` apart have common normals far away, which errors of measurement move by metres.
 They are compared in two forms, and the one with fewer differences counts: by their normals, which is exact, and by
-where the next axis crosses the plane across this one (Hayati's beta), which does not magnify errors.
+where the next axis crosses the plane across this one (Hayati's beta), which does not magnify errors. There they count
+as parallel, as long as a shift along one stays on the other to within the tolerances.
 
 References
 ----------
@@ -490,6 +491,9 @@ def _settled_at(
         explained[each.link, 0 if each.column == "a" else 2] += each.other - each.one
     shift = _shifts_chosen(one, other, (gaps - explained).ravel(), parts, places, turned=turned, tolerances=tolerances)
 
+    for k in np.flatnonzero(parallel & (other.between > tolerances.angle)).tolist():  # what moving along one leaves
+        off_axis = math.sin(other.between[k]) - tolerances.angle
+        left = max(left, abs(float(shift[k + 1][0][2])) * off_axis)
     zeros = np.where(one.sliding, [shift[k][1][2] - shift[k][0][2] for k in range(m)], turned)
     zeros[np.array([k in (0, m - 1) and not one.sliding[k] for k in range(m)])] = 0.0
     left_end, right_end = shift[0][0], shift[m - 1][1]
@@ -538,6 +542,7 @@ def _with_free_turns(
     they are free: to joints that turn, off those that slide (``of_slides``); of coincident axes to the joint farther
     out."""
     m, links = len(one.d), len(one.a)
+    parallel = parallel & (np.maximum(one.between, other.between) <= tolerances.angle)
     offset = other.offset.copy()
     steps = np.stack([other.a, np.zeros(links), other.d[:links]], axis=1)
 
