@@ -7,6 +7,7 @@ whoever commands joints or places the base by the table.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -22,24 +23,38 @@ from er3a.comparison.mechanism import (
     Tolerances,
     is_identity,
     is_same_mechanism,
+    joints_agree,
     match,
     mechanism_of,
-    poses,
     turn_of,
     wrapped,
 )
 from er3a.errors import RobotError
+from er3a.kinematics.chain import row_values
+from er3a.kinematics.forward import forward, forward_of_rows
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot, Source
 
 VerdictWord = Literal["equal", "same_arm", "other_arm", "other_joint_count"]
 CauseCode = Literal[
-    "a_and_d_swapped", "other_convention", "all_alphas_negated", "unit", "scale", "rows_shifted", "one_alpha_negated"
+    "a_and_d_swapped",
+    "other_convention",
+    "all_alphas_negated",
+    "one_alpha_negated",
+    "offsets_negated",
+    "unit",
+    "angle_unit",
+    "scale",
+    "rows_shifted",
 ]
+Columns = dict[str, Reals | str]
 SAMPLES = 192
 SWEEPS = 2
 ROUNDED = 4  # decimals of mm and deg in a corrected table
 UNITS = {25.4: "inch", 1 / 25.4: "inch", 1000.0: "metre", 0.001: "metre", 10.0: "centimetre", 0.1: "centimetre"}
+
+ANGLE_UNITS = {"radian": math.degrees(1.0), "degree": math.radians(1.0)}
+SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
 
 
 @dataclass(frozen=True)
@@ -85,18 +100,21 @@ class GeometryLayer:
 @dataclass(frozen=True)
 class ZeroLayer:
     """By row what B's offset is more than A's (deg; mm of joints that slide); 0 of the first and the last row, whose
-    zeros can't be distinguished from base and flange."""
+    zeros can't be distinguished from base and flange. ``causes`` : the one slip in A that explains them all."""
 
     same: bool
     offsets_deg: tuple[float, ...]
+    causes: tuple[Cause, ...] = ()
 
 
 @dataclass(frozen=True)
 class DirectionLayer:
-    """Numbers of the rows that B moves the other way."""
+    """Numbers of the rows that B moves the other way. ``causes`` : the one slip in A's table that does so, where no
+    zero differs."""
 
     same: bool
     reversed: tuple[int, ...]
+    causes: tuple[Cause, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -219,9 +237,12 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: Tolerances, explain: b
     )
     moved = np.abs(found.zeros) > np.where(a.sliding, tolerances.length, tolerances.angle)
     scale = np.where(a.sliding, 1000.0, np.degrees(1.0))
-    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()))
+    turned = same and explain and bool(moved.any() or found.reverses.any())
+    slips = tuple(_causes_of_zeros(robot_a, b, found, tolerances)) if turned else ()
+    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()), slips if moved.any() else ())
     reverses, coupled = _joints_paired(robot_a, robot_b, found)
-    directions = DirectionLayer(not found.reverses.any(), tuple((np.flatnonzero(found.reverses) + 1).tolist()))
+    reversed_rows = tuple((np.flatnonzero(found.reverses) + 1).tolist())
+    directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else slips)
     base, flange = (_placement(T, tolerances) for T in (found.base, found.flange))
     joint_zeros = _joint_zeros(robot_a, found)
     limits = _limits(robot_a, robot_b, reverses, joint_zeros, tolerances)
@@ -229,7 +250,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: Tolerances, explain: b
     agree = zero.same and directions.same and base.same and flange.same and coupled.same
     agree = agree and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
-    printed, aligned = _distances(robot_a, robot_b, (a, b), found)
+    printed, aligned = _distances(robot_a, robot_b, found)
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = geometry, zero, directions, base, flange, coupled, limits, speeds
     return Comparison(verdict, *layers, 1000 * printed, 1000 * aligned, counts, corrected)
@@ -370,24 +391,20 @@ def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
 # How far the flange is off --------------------------------------------------------------------------------------------
 
 
-def _distances(robot_a: Robot, robot_b: Robot, arms: tuple[Mechanism, Mechanism], found: Match) -> tuple[float, float]:
+def _distances(robot_a: Robot, robot_b: Robot, found: Match) -> tuple[float, float]:
     """Largest distances (m) of the flanges that were found, as printed and aligned: sampled, then climbed."""
-    a, b = arms
-    own, other = (
-        np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling for robot in (robot_a, robot_b)
-    )
-    signs = np.where(found.reverses, -1.0, 1.0)
+    a, b = robot_a.without_tool(), robot_b.without_tool()
+    signs, zeros = np.where(found.reverses, -1.0, 1.0), found.zeros * a.direction
     behind = np.linalg.inv(found.flange)
 
     def printed(q: Reals) -> Reals:
-        gaps = poses(a, q @ own.T)[:, :3, 3] - poses(b, q @ other.T)[:, :3, 3]
+        gaps = forward(a, q)[:, :3, 3] - forward(b, q)[:, :3, 3]
         return np.asarray(np.linalg.norm(gaps, axis=1))
 
     def aligned(q: Reals) -> Reals:
-        u = q @ own.T
-        there = signs * (u - found.zeros * a.direction)
-        gaps = poses(a, u)[:, :3, 3] - (found.base @ poses(b, there) @ behind)[:, :3, 3]
-        return np.asarray(np.linalg.norm(gaps, axis=1))
+        u = row_values(a, q)
+        there = found.base @ forward_of_rows(b, signs * (u - zeros)) @ behind
+        return np.asarray(np.linalg.norm((forward_of_rows(a, u) - there)[:, :3, 3], axis=1))
 
     return _largest(printed, robot_a), _largest(aligned, robot_a)
 
@@ -415,9 +432,9 @@ def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances
     """What explains all differences at once; else which single entries have the wrong sign."""
     several = len(found.differences) > 1 or found.unexplained > 0
     for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)) if several else ():
-        there = mechanism_of(other)
-        for code, amount, unit, repaired in _repaired(table, other):
-            if is_same_mechanism(mechanism_of(repaired), there, tolerances):
+        there = mechanism_of(other, ends=False)
+        for code, amount, unit, columns in _repaired(table, other):
+            if is_same_mechanism(mechanism_of(table, ends=False, **columns), there, tolerances):
                 yield Cause(code, side, (), amount, unit)  # type: ignore[arg-type]
                 return
     for each in found.differences:
@@ -429,47 +446,74 @@ def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances
         yield Cause("a_and_d_swapped", "a", swapped)
 
 
-def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Robot]]:
-    """A table with one slip undone throughout."""
-    yield "a_and_d_swapped", None, "", robot.replace(a=robot.d, d=robot.a)
-    convention = "modified" if robot.convention == "standard" else "standard"
-    yield "other_convention", None, "", robot.replace(convention=convention)
-    yield "all_alphas_negated", None, "", robot.replace(alpha=-robot.alpha)
-    sizes = [float(np.abs(each.a).sum() + np.abs(each.d[1:-1]).sum()) for each in (robot, other)]
-    if min(sizes) > 0:
-        ratio = sizes[1] / sizes[0]
+def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Columns]]:
+    """The columns of a table with one slip undone throughout; how many rows or times, and of which columns or unit."""
+    a, d, alpha = robot.a, robot.d, robot.alpha
+    yield "a_and_d_swapped", None, "", {"a": d, "d": a}
+    yield "other_convention", None, "", {"convention": "modified" if robot.convention == "standard" else "standard"}
+    yield "all_alphas_negated", None, "", {"alpha": -alpha}
+    arms = [mechanism_of(each, ends=False) for each in (robot, other)]
+    of_a, of_d = ([float(np.abs(getattr(each, column)).sum()) for each in arms] for column in "ad")
+    for sizes, columns in (
+        ([x + y for x, y in zip(of_a, of_d)], {"a": a, "d": d}),
+        (of_a, {"a": a}),
+        (of_d, {"d": d}),
+    ):
+        ratio = sizes[1] / sizes[0] if min(sizes) > 0 else 1.0
         near = min(UNITS, key=lambda factor: abs(math.log(ratio / factor)))
         if abs(math.log(ratio / near)) < math.log(2):
-            yield "unit", near, UNITS[near], robot.replace(a=robot.a * near, d=robot.d * near)
-        for each in _ratios(robot, other):
-            yield "scale", each, "", robot.replace(a=robot.a * each, d=robot.d * each)
-    for rows in (1, -1):
-        moved = {column: np.roll(getattr(robot, column), rows) for column in ("a", "alpha")}
-        yield "rows_shifted", float(rows), "a, alpha", robot.replace(**moved)
-        yield "rows_shifted", float(rows), "d", robot.replace(d=np.roll(robot.d, rows))
-        yield "rows_shifted", float(rows), "a", robot.replace(a=np.roll(robot.a, rows))
-        yield "rows_shifted", float(rows), "alpha", robot.replace(alpha=np.roll(robot.alpha, rows))
+            only = "" if len(columns) > 1 else f"{next(iter(columns))}, "
+            yield "unit", near, only + UNITS[near], {key: near * values for key, values in columns.items()}
+    for ratio in _ratios(*arms):
+        yield "scale", ratio, "", {"a": a * ratio, "d": d * ratio}
+    for unit, scale in ANGLE_UNITS.items():
+        yield "angle_unit", scale, unit, {"alpha": alpha * scale}
+    for rows, names in itertools.product((1, -1), SHIFTED):
+        yield "rows_shifted", float(rows), ", ".join(names), {key: np.roll(getattr(robot, key), rows) for key in names}
 
 
-def _ratios(robot: Robot, other: Robot) -> list[float]:
+def _ratios(one: Mechanism, other: Mechanism) -> list[float]:
     """The factor between the longest lengths of two tables, if it is not about 1."""
-    ends = [mechanism_of(each) for each in (robot, other)]
-    longest = [max(np.abs(each.a).max(initial=0.0), np.abs(each.d).max(initial=0.0)) for each in ends]
+    longest = [max(np.abs(each.a).max(initial=0.0), np.abs(each.d).max(initial=0.0)) for each in (one, other)]
     if min(longest) <= 0:
         return []
     ratio = float(longest[1] / longest[0])
     return [ratio] if abs(math.log(ratio)) > 0.005 else []
 
 
+def _causes_of_zeros(robot: Robot, b: Mechanism, found: Match, tolerances: Tolerances) -> Iterator[Cause]:
+    """The one slip in the first table that explains why zeros or directions differ, where geometry agrees."""
+    offset, zeros = robot.offset, np.where(robot.sliding, 0.0, found.zeros)
+    inner = [k for k in range(1, robot.rows - 1) if not robot.sliding[k]]
+    if not found.reverses.any() and (np.abs(zeros) > tolerances.angle).sum() > 1:
+        slips: list[tuple[CauseCode, float | None, str, Reals]] = [("offsets_negated", None, "", -offset)]
+        slips += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
+        slips += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
+        for code, amount, unit, meant in slips:
+            left = np.abs(wrapped(meant - offset - zeros)[inner])
+            if left.max() < tolerances.angle and np.abs(wrapped(meant)[inner]).max() > tolerances.angle:
+                yield Cause(code, "a", (), amount, unit)
+                return
+    if np.abs(np.sin(zeros)).max() > tolerances.angle:
+        return  # a turned normal turns zeros by half turns
+    rows = [k for k in range(robot.rows) if abs(math.sin(robot.alpha[k])) > tolerances.angle]
+    for negated in (*([k] for k in rows), rows):
+        alpha = np.where(np.isin(np.arange(robot.rows), negated), -robot.alpha, robot.alpha)
+        if joints_agree(mechanism_of(robot, alpha=alpha), b, tolerances):
+            names = tuple(f"alpha{k + 1}" for k in negated)
+            yield Cause("one_alpha_negated", "a", names) if len(names) == 1 else Cause("all_alphas_negated", "a")
+            return
+
+
 def _swapped_in_a_row(robot: Robot, other: Robot, tolerances: Tolerances) -> tuple[str, ...]:
     """The row in which a and d are swapped, if that explains all."""
-    there = mechanism_of(other)
+    there = mechanism_of(other, ends=False)
     for k in range(robot.rows):
         if abs(robot.a[k] - robot.d[k]) <= tolerances.length:
             continue
         a, d = np.array(robot.a), np.array(robot.d)
         a[k], d[k] = d[k], a[k]
-        if is_same_mechanism(mechanism_of(robot.replace(a=a, d=d)), there, tolerances):
+        if is_same_mechanism(mechanism_of(robot, ends=False, a=a, d=d), there, tolerances):
             return f"a{k + 1}", f"d{k + 1}"
     return ()
 

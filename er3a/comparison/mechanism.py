@@ -14,7 +14,8 @@ Signs are counted out. Everything else is linear once the directions agree: tran
 
 Axes less than ``NEARLY_PARALLEL`` apart have common normals far away, which errors of measurement move by metres.
 They are compared in two forms, and the one with fewer differences counts: by their normals, which is exact, and by
-where the next axis crosses the plane across this one (Hayati's beta), which does not magnify errors.
+where the next axis crosses the plane across this one (Hayati's beta), which does not magnify errors. There they count
+as parallel, as long as a shift along one stays on the other to within the tolerances.
 
 References
 ----------
@@ -26,13 +27,18 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.numerics.arrays import Flags, Reals
-from er3a.robots.robot import Robot, to_standard
+from er3a.robots.robot import Robot
+
+Parts = tuple[Reals, Reals, Reals]
+"""Of a matrix, its singular value decomposition."""
 
 EXACTLY_PARALLEL = 1e-5  # rad; below it a common normal has no digits left
 NEARLY_PARALLEL = math.radians(3.0)
@@ -42,6 +48,7 @@ MOST_SENSES = 6
 MOST_ENTRIES = 4
 TURNED_END = 2  # joints reversed, that a base or flange turned counts for
 HALF_TURN = rot_x(math.pi)
+HALF_TURN_AT_MOST = math.radians(185.0)
 
 
 @dataclass(frozen=True)
@@ -74,53 +81,51 @@ class Mechanism:
     base: Reals
     flange: Reals
 
+    @cached_property
+    def between(self) -> Reals:
+        """Angles (m - 1,), rad, 0 to pi/2, between neighbouring axes as lines."""
+        across = np.hypot(np.sin(self.beta), np.sin(self.alpha) * np.cos(self.beta))
+        angles: Reals = np.arctan2(across, np.abs(np.cos(self.alpha) * np.cos(self.beta)))
+        return angles
 
-def mechanism_of(robot: Robot) -> Mechanism:
-    """A robot's table without its tool."""
-    table = to_standard(robot)
-    last = table.rows - 1
-    d = np.array(table.d)
-    behind = translation(table.a[last], 0, 0) @ rot_x(table.alpha[last]) @ rot_y(table.beta[last]) @ table.flange
-    base, flange = table.base, behind
-    if last:
-        base, flange = base @ translation(0, 0, d[0]), translation(0, 0, d[last]) @ behind
-        d[0] = d[last] = 0.0
+
+def mechanism_of(robot: Robot, *, ends: bool = True, **otherwise: Reals | str) -> Mechanism:
+    """A robot's table without its tool; ``otherwise`` : columns, and a convention, that stand in for the robot's.
+
+    Without ``ends`` base and flange are left out: they are 1.
+    """
+    table = {key: otherwise.get(key, getattr(robot, key)) for key in (*_COLUMNS, "convention")}
+    a, alpha, beta, d, offset = (np.array(table[column], float) for column in _COLUMNS)
+    base, flange, last = robot.base, robot.flange, len(d) - 1
+    if table["convention"] == "modified":  # what follows an axis stands one row later
+        before, (a, alpha, beta) = (a[0], alpha[0], beta[0]), (np.append(each[1:], 0.0) for each in (a, alpha, beta))
+        if ends:
+            base = base @ _across(*before)
+    elif ends:
+        flange = _across(a[last], alpha[last], beta[last]) @ flange
+    if ends:
+        base, flange = (base @ translation(0, 0, d[0]) if last else base), translation(0, 0, d[last]) @ flange
     else:
-        flange, d[0] = translation(0, 0, d[0]) @ behind, 0.0
-    a, alpha, beta = (np.array(part[:last]) for part in (table.a, table.alpha, table.beta))
-    return Mechanism(a, alpha, beta, d, np.array(table.offset), np.array(table.direction), table.sliding, base, flange)
+        base = flange = np.eye(4)
+    d[0] = d[last] = 0.0
+    links = a[:last], alpha[:last], beta[:last]
+    return Mechanism(*links, d, offset, np.array(robot.direction), robot.sliding, base, flange)
 
 
-def between(mechanism: Mechanism) -> Reals:
-    """Angles (m - 1,), rad, 0 to pi/2, between neighbouring axes as lines."""
-    angles: Reals = np.arctan2(
-        np.hypot(np.sin(mechanism.beta), np.sin(mechanism.alpha) * np.cos(mechanism.beta)),
-        np.abs(np.cos(mechanism.alpha) * np.cos(mechanism.beta)),
-    )
-    return angles
+_COLUMNS = "a", "alpha", "beta", "d", "offset"
 
 
-def poses(mechanism: Mechanism, u: Reals) -> Reals:
-    """Poses (N, 4, 4) of the flange for what the rows move by, u (N, m), rad or m."""
-    x = mechanism.direction * u
-    theta = np.where(mechanism.sliding, 0.0, x) + mechanism.offset
-    shift = np.where(mechanism.sliding, x, 0.0) + mechanism.d
-    c, s = np.cos(theta), np.sin(theta)
-    steps = np.zeros((*theta.shape, 4, 4))
-    steps[..., 0, 0], steps[..., 0, 1], steps[..., 1, 0], steps[..., 1, 1] = c, -s, s, c
-    steps[..., 2, 2] = steps[..., 3, 3] = 1.0
-    steps[..., 2, 3] = shift
-    T = mechanism.base @ steps[:, 0]
-    for k in range(len(mechanism.a)):
-        T = T @ _across(mechanism, k) @ steps[:, k + 1]
-    return T @ mechanism.flange
+def _across(a: float, alpha: float, beta: float) -> Reals:
+    """(4, 4), ``Tx(a) Rx(alpha) Ry(beta)``."""
+    return translation(a, 0, 0) @ rot_x(alpha) @ rot_y(beta)
 
 
-def _across(mechanism: Mechanism, k: int) -> Reals:
-    """(4, 4), from one axis to the next, what lies along the axes not included."""
-    T = rot_x(mechanism.alpha[k]) @ rot_y(mechanism.beta[k])
-    T[0, 3] = mechanism.a[k]
-    return T
+def _turns_across(mechanism: Mechanism) -> Reals:
+    """``Rx(alpha) Ry(beta)`` of all links, (m - 1, 3, 3)."""
+    (ca, cb), (sa, sb) = ([part(angle) for angle in (mechanism.alpha, mechanism.beta)] for part in (np.cos, np.sin))
+    nothing = np.zeros(len(ca))
+    rows = [cb, nothing, sb], [sa * sb, ca, -sa * cb], [-ca * sb, sa, ca * cb]
+    return np.array(rows).transpose(2, 0, 1)
 
 
 # Feet of normals, and other points to measure from -------------------------------------------------------------------
@@ -169,14 +174,14 @@ def _measured_at(mechanism: Mechanism, k: int, height: float | None) -> Mechanis
 def by_normals(mechanism: Mechanism) -> Mechanism:
     """The arm with beta = 0 wherever axes are not parallel to ``EXACTLY_PARALLEL``."""
     for k in np.flatnonzero(mechanism.beta):
-        if between(mechanism)[k] > EXACTLY_PARALLEL:
+        if mechanism.between[k] > EXACTLY_PARALLEL:
             mechanism = _measured_at(mechanism, int(k), None)
     return mechanism
 
 
 def without_far_normals(mechanism: Mechanism) -> Mechanism:
     """The arm with links between nearly parallel axes measured within it."""
-    angles = between(mechanism)
+    angles = mechanism.between
     for k in np.flatnonzero((angles > 0) & (angles < NEARLY_PARALLEL)):
         d = mechanism.d
         if abs(d[k]) > FAR or (k + 1 < len(d) and abs(d[k + 1]) > FAR):
@@ -217,18 +222,19 @@ def _likely_senses(
     that turn the fewest bases, flanges, joints and zeros; only those by which none has to if they may not."""
     m, links = len(one.d), len(one.a)
     senses = 1.0 - 2.0 * np.array(list(itertools.product((0, 1), repeat=m)))
-    near = (between(one) < NEARLY_PARALLEL) & (between(other) < NEARLY_PARALLEL)
-    parallel = between(other) < np.where(near, NEARLY_PARALLEL, EXACTLY_PARALLEL)
-    inexact = near & (np.maximum(between(one), between(other)) > EXACTLY_PARALLEL)
+    near = (one.between < NEARLY_PARALLEL) & (other.between < NEARLY_PARALLEL)
+    parallel = other.between < np.where(near, NEARLY_PARALLEL, EXACTLY_PARALLEL)
+    inexact = near & (np.maximum(one.between, other.between) > EXACTLY_PARALLEL)
     placed = ~_beside_a_slide(one.sliding)
-    cost = np.empty((links, 2, 2))  # by link, fold and sense of the normal
+    cost, angles_off = np.empty((2, links, 2, 2))  # by link, fold and sense of the normal
     for fold, turn in ((0, 0.0), (1, np.pi)):
         for side, normal in ((0, 1.0), (1, -1.0)):
             off = np.abs(wrapped(normal * (other.alpha + turn) - one.alpha))
             gap = np.abs(normal * other.a - one.a)
-            counted = 1.0 * (off > np.where(inexact, 2 * NEARLY_PARALLEL, tolerances.angle))
-            counted += (gap > tolerances.length) & ~inexact & placed
+            angles_off[:, fold, side] = off > np.where(inexact, 2 * NEARLY_PARALLEL, tolerances.angle)
+            counted = angles_off[:, fold, side] + ((gap > tolerances.length) & ~inexact & placed)
             cost[:, fold, side] = counted + 1e-4 * off + 1e-4 * gap
+    either = ((np.floor(cost) == 1).all(axis=2) | ~placed[:, None]) & (angles_off.sum(axis=2) == 1)
     folds = (senses[:, :-1] * senses[:, 1:] < 0).astype(int)
     by_link = np.arange(links)
     normals = np.where(cost[by_link, folds, 0] <= cost[by_link, folds, 1], 1.0, -1.0)
@@ -247,11 +253,17 @@ def _likely_senses(
     total += (moved & fixed).sum(axis=1)
     moved &= ~one.sliding
     extra = (senses * other.direction * one.direction < 0).sum(axis=1) + moved.sum(axis=1)
-    extra = extra + _ends_turned(one, other, senses, turned, tolerances)
+    if may_differ:
+        extra = extra + _ends_turned(one, other, senses, turned, tolerances)
     order = np.argsort(np.floor(total) + 0.01 * extra + 1e-3 * (total % 1), kind="stable")
     most = np.floor(total).min() + 1 if may_differ or inexact.any() else 0
     best = order[np.floor(total[order]) <= most][: MOST_SENSES * (4 if one.sliding.any() else 1)]
-    return [(senses[k], normals[k]) for k in best]
+    found = []
+    for k in best:
+        found.append((senses[k], normals[k]))
+        for link in np.flatnonzero(either[by_link, folds[k]]):  # a normal and a twist: the sign of one of both
+            found.append((senses[k], np.where(by_link == link, -normals[k], normals[k])))
+    return found
 
 
 def _ends_turned(one: Mechanism, other: Mechanism, senses: Reals, turned: Reals, tolerances: Tolerances) -> Reals:
@@ -303,6 +315,20 @@ class EntryDifference:
     other: float
     alike: tuple[tuple[str, int], ...] = ()
 
+    @property
+    def size(self) -> float:
+        """By how much it differs, m or rad."""
+        gap = self.other - self.one
+        return abs(gap if self.column in ("a", "d") else float(wrapped(np.array(gap))))
+
+
+def _other_angle(column: str, link: int, one: float, gap: float) -> EntryDifference:
+    """An angle that differs by ``gap``, written as a table would: within half a turn, but for tolerances around it."""
+    other = one + gap
+    return EntryDifference(
+        column, link, one, float(wrapped(np.array(other))) if abs(other) > HALF_TURN_AT_MOST else other
+    )
+
 
 @dataclass(frozen=True, eq=False)
 class Match:
@@ -335,7 +361,7 @@ class Match:
         """Less is a better match: fewer entries (beta, which few tables have, counts more), fewer conventions, smaller
         differences."""
         entries = sum(1.5 if each.column == "beta" else 1.0 for each in self.differences)
-        size = sum(abs(each.one - each.other) for each in self.differences)
+        size = sum(each.size for each in self.differences)
         turns = turn_of(self.base) + turn_of(self.flange)
         return entries + 2 * (self.unexplained > 0), self.layers, round(size, 6), round(turns, 4)
 
@@ -354,22 +380,31 @@ def is_same_mechanism(one: Mechanism, other: Mechanism, tolerances: Tolerances) 
     """Whether no entry of geometry differs; much faster than :func:`match` where many do."""
     if _links_differ(one, other, tolerances):
         return False
-    found = _best_match(one, other, tolerances, may_differ=False)
-    return found is not None and not found.differences and not found.unexplained
+    return _best_match(one, other, tolerances, may_differ=False) is not None
+
+
+def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
+    """Whether geometry, zeros and directions agree, with all axes and normals the way that both tables have them."""
+    least = np.where(one.sliding, tolerances.length, tolerances.angle)
+    return any(
+        not (found.reverses.any() or (np.abs(found.zeros) > least).any())
+        for found in _settled(one, other, np.ones(len(one.d)), tolerances, may_differ=False)
+    )
 
 
 def _links_differ(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
     """Whether some link's length or twist differs whichever way axes and normals point."""
     if one.beta.any() or other.beta.any():
         return False
-    angles = between(one), between(other)
-    plain = ~_beside_a_slide(one.sliding) & (np.minimum(*angles) > NEARLY_PARALLEL)
-    apart = np.abs(np.abs(one.a) - np.abs(other.a)) > tolerances.length
-    return bool((plain & (apart | (np.abs(angles[0] - angles[1]) > tolerances.angle))).any())
+    angles = np.stack([one.between, other.between])
+    least, most = angles.min(axis=0), angles.max(axis=0)
+    placed = ~_beside_a_slide(one.sliding) & ((least > NEARLY_PARALLEL) | (most < EXACTLY_PARALLEL))
+    apart = placed & (np.abs(np.abs(one.a) - np.abs(other.a)) > tolerances.length)
+    return bool((apart | (most - least > np.where(least > NEARLY_PARALLEL, tolerances.angle, NEARLY_PARALLEL))).any())
 
 
 def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True) -> Match | None:
-    angles = np.maximum(between(one), between(other))
+    angles = np.maximum(one.between, other.between)
     near = angles < NEARLY_PARALLEL
     exact = by_normals(one), by_normals(other)
     best: Match | None = None
@@ -380,10 +415,10 @@ def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may
             pairs.append(_measured_alike(local[0], with_senses(local[1], senses, normals)))
             pairs.append((one, with_senses(other, senses, normals)))
         for first, second in pairs:
-            found = _settled(first, second, senses, tolerances)
-            if best is None or found.rank < best.rank:
-                best = found
-        if not may_differ and best is not None and best.rank[0] == 0:
+            for found in _settled(first, second, senses, tolerances, may_differ=may_differ):
+                if best is None or found.rank < best.rank:
+                    best = found
+        if best is not None and (not may_differ or best.rank[0] == best.layers == 0):
             break
     return best
 
@@ -391,41 +426,74 @@ def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may
 def _measured_alike(one: Mechanism, other: Mechanism) -> tuple[Mechanism, Mechanism]:
     """Both arms with links between nearly parallel axes measured from the same height of the axis."""
     for k in range(len(one.a)):
-        widest = max(between(one)[k], between(other)[k])
+        widest = max(one.between[k], other.between[k])
         if EXACTLY_PARALLEL < widest < NEARLY_PARALLEL:
             other = _measured_at(other, k, float(one.d[k]))
     return one, other
 
 
-def _settled(one: Mechanism, other: Mechanism, senses: Reals, tolerances: Tolerances) -> Match:
-    """The match for chosen senses."""
-    m, links = len(one.d), len(one.a)
+def _settled(
+    one: Mechanism, other: Mechanism, senses: Reals, tolerances: Tolerances, *, may_differ: bool = True
+) -> Iterator[Match]:
+    """The match for chosen senses; where axes beside a slide are parallel to it, also the one with its own theta; those
+    alone in which geometry agrees if it may not differ."""
     least = NEARLY_PARALLEL if one.beta.any() or other.beta.any() else EXACTLY_PARALLEL
-    parallel = between(other) < np.where(between(one) < NEARLY_PARALLEL, least, EXACTLY_PARALLEL)
-    offset, steps = _with_free_turns(one, other, parallel, tolerances)
+    parallel = other.between < np.where(one.between < NEARLY_PARALLEL, least, EXACTLY_PARALLEL)
+    ways = [_with_free_turns(one, other, parallel, tolerances)]
+    beside = one.sliding & (np.append(parallel, False) | np.append(False, parallel))
+    if (np.abs(wrapped(other.offset - one.offset))[1:-1][beside[1:-1]] > tolerances.angle).any():
+        ways.append(_with_free_turns(one, other, parallel, tolerances, of_slides=False))
+    for placed in ways:
+        found = _settled_at(one, other, senses, parallel, placed, tolerances, may_differ=may_differ)
+        if found is not None:
+            yield found
+
+
+def _settled_at(
+    one: Mechanism,
+    other: Mechanism,
+    senses: Reals,
+    parallel: Flags,
+    placed: tuple[Reals, Reals],
+    tolerances: Tolerances,
+    *,
+    may_differ: bool,
+) -> Match | None:
+    """The match for chosen senses, and offsets and translations of the other's links; None where geometry differs and
+    may not."""
+    m, links = len(one.d), len(one.a)
+    offset, steps = placed
     turned = wrapped(offset - one.offset)
     differences = []
     off = wrapped(other.alpha - one.alpha), wrapped(other.beta - one.beta)
     for column, gaps, values in (("alpha", off[0], one.alpha), ("beta", off[1], one.beta)):
         for k in np.flatnonzero(np.abs(gaps) > tolerances.angle).tolist():
-            differences.append(EntryDifference(column, k, float(values[k]), float(values[k] + gaps[k])))
+            differences.append(_other_angle(column, k, float(values[k]), float(gaps[k])))
     inner_slides = [k for k in range(1, m - 1) if one.sliding[k]]
     for k in inner_slides:
         if abs(turned[k]) > tolerances.angle:
-            differences.append(EntryDifference("theta", k, float(one.offset[k]), float(one.offset[k] + turned[k])))
+            differences.append(_other_angle("theta", k, float(one.offset[k]), float(turned[k])))
     worst_angle = max(
         [0.0, *np.abs(off[0]).tolist(), *np.abs(off[1]).tolist(), *(abs(turned[k]) for k in inner_slides)]
     )
 
+    if differences and not may_differ:
+        return None
     gaps = steps - np.stack([one.a, np.zeros(links), one.d[:links]], axis=1)
     shifts, places = _free_shifts(one, other, parallel, offset)
-    entries, counted, left = _entries(one, gaps.ravel(), shifts, tolerances)
+    parts = np.linalg.svd(shifts) if links else (np.eye(0), np.empty(0), np.eye(shifts.shape[1]))
+    entries, counted, left = _entries(one, gaps.ravel(), parts, tolerances)
     differences += entries
+    if not may_differ and (differences or left > tolerances.length):
+        return None
     explained = np.zeros((links, 3))
     for each in entries:
         explained[each.link, 0 if each.column == "a" else 2] += each.other - each.one
-    shift = _shifts_chosen(one, other, (gaps - explained).ravel(), shifts, places, turned=turned, tolerances=tolerances)
+    shift = _shifts_chosen(one, other, (gaps - explained).ravel(), parts, places, turned=turned, tolerances=tolerances)
 
+    for k in np.flatnonzero(parallel & (other.between > tolerances.angle)).tolist():  # what moving along one leaves
+        off_axis = math.sin(other.between[k]) - tolerances.angle
+        left = max(left, abs(float(shift[k + 1][0][2])) * off_axis)
     zeros = np.where(one.sliding, [shift[k][1][2] - shift[k][0][2] for k in range(m)], turned)
     zeros[np.array([k in (0, m - 1) and not one.sliding[k] for k in range(m)])] = 0.0
     left_end, right_end = shift[0][0], shift[m - 1][1]
@@ -467,10 +535,14 @@ def turn_of(T: Reals) -> float:
     return math.atan2(skew, R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
 
 
-def _with_free_turns(one: Mechanism, other: Mechanism, parallel: Flags, tolerances: Tolerances) -> tuple[Reals, Reals]:
+def _with_free_turns(
+    one: Mechanism, other: Mechanism, parallel: Flags, tolerances: Tolerances, *, of_slides: bool = True
+) -> tuple[Reals, Reals]:
     """The other's offsets (m,), and translations (m - 1, 3) of its links, with turns that parallel axes share put where
-    they are free: to joints that turn, off those that slide; of coincident axes to the joint farther out."""
+    they are free: to joints that turn, off those that slide (``of_slides``); of coincident axes to the joint farther
+    out."""
     m, links = len(one.d), len(one.a)
+    parallel = parallel & (np.maximum(one.between, other.between) <= tolerances.angle)
     offset = other.offset.copy()
     steps = np.stack([other.a, np.zeros(links), other.d[:links]], axis=1)
 
@@ -482,11 +554,11 @@ def _with_free_turns(one: Mechanism, other: Mechanism, parallel: Flags, toleranc
     def gap(k: int) -> float:
         return float(wrapped(offset[k] - one.offset[k]))
 
-    for k in range(m - 1, 0, -1):
-        if one.sliding[k] and parallel[k - 1] and k < m - 1:
+    for k in range(m - 2, 0, -1):
+        if of_slides and one.sliding[k] and parallel[k - 1]:
             turn(k - 1, -gap(k) * float(np.sign(np.cos(other.alpha[k - 1]))))
-    for k in range(m - 1):
-        if one.sliding[k] and parallel[k] and k > 0:
+    for k in range(1, m - 1):
+        if of_slides and one.sliding[k] and parallel[k]:
             turn(k, gap(k))
     for k in range(links):
         coincident = parallel[k] and max(abs(one.a[k]), abs(other.a[k])) < tolerances.length
@@ -509,9 +581,9 @@ def _free_shifts(one: Mechanism, other: Mechanism, parallel: Flags, offset: Real
         size = 4 if one.sliding[k] else 1
         places.append(list(range(count, count + size)))
         count += size
-    matrix = np.zeros((links, 3, count))
+    matrix, turns = np.zeros((links, 3, count)), _turns_across(other)
     for k in range(links):
-        R = (rot_x(other.alpha[k]) @ rot_y(other.beta[k]))[:3, :3]
+        R = turns[k]
         if parallel[k]:
             R = np.diag([1.0, 0.0, 0.0]) + np.sign(np.cos(other.alpha[k])) * np.diag([0.0, 1.0, 1.0])
         start, end = places[k], places[k + 1]
@@ -528,9 +600,9 @@ def _free_shifts(one: Mechanism, other: Mechanism, parallel: Flags, offset: Real
 
 
 def _entries(
-    one: Mechanism, gaps: Reals, shifts: Reals, tolerances: Tolerances
+    one: Mechanism, gaps: Reals, shifts: Parts, tolerances: Tolerances
 ) -> tuple[list[EntryDifference], tuple[int, list[float]], float]:
-    """The fewest lengths that explain translations that differ by ``gaps``, up to free shifts.
+    """The fewest lengths that explain translations that differ by ``gaps``, up to free ``shifts``.
 
     Returns
     -------
@@ -541,9 +613,7 @@ def _entries(
         return [], (0, []), 0.0
     names = [("a", k) for k in range(links)] + [("d", k) for k in range(1, links)]
     rows = [3 * k + (0 if column == "a" else 2) for column, k in names]
-    left = np.linalg.svd(shifts, full_matrices=True)
-    rank = int((left[1] > 1e-9).sum())
-    kept = left[0][:, rank:]
+    kept = shifts[0][:, int((shifts[1] > 1e-9).sum()) :]
     columns, wanted = kept[rows].T, kept.T @ gaps  # what shifts leave of entries and gaps
     sizes = np.linalg.norm(columns, axis=0)
     classes: list[list[int]] = []
@@ -606,7 +676,7 @@ def _shifts_chosen(
     one: Mechanism,
     other: Mechanism,
     gaps: Reals,
-    shifts: Reals,
+    shifts: Parts,
     places: list[list[int]],
     *,
     turned: Reals,
@@ -617,13 +687,9 @@ def _shifts_chosen(
     What is free throughout (all axes parallel, or slides at the ends) is chosen so that as few as can be of base,
     zeros and flange differ.
     """
-    m, count = len(one.d), shifts.shape[1]
-    if len(shifts):
-        U, S, V = np.linalg.svd(shifts, full_matrices=True)
-        rank = int((S > 1e-9).sum())
-        y, free = V[:rank].T @ ((U[:, :rank].T @ gaps) / S[:rank]), V[rank:].T
-    else:
-        y, free = np.zeros(count), np.eye(count)
+    m, (U, S, V) = len(one.d), shifts
+    rank = int((S > 1e-9).sum())
+    y, free = V[:rank].T @ ((U[:, :rank].T @ gaps) / S[:rank]), V[rank:].T
 
     def sides(values: Reals) -> list[tuple[Reals, Reals]]:
         found = []

@@ -298,7 +298,7 @@ def read_arm(
     *,
     convention: Convention = "standard",
     length_unit: LengthUnit | None = None,
-    angle_unit: AngleUnit = "deg",
+    angle_unit: AngleUnit | None = None,
     base: str | None = None,
     tip: str | None = None,
     xacro: Sequence[str] = (),
@@ -309,8 +309,8 @@ def read_arm(
     ----------
     source : a robot's name, or a path that ends in .csv, .yaml, .urdf or .xacro
     convention : of a D-H table; a column ``convention`` in it counts more
-    length_unit, angle_unit : of a D-H table whose columns are named mm and deg all the same; with no ``length_unit``
-        it is what the lengths can be
+    length_unit, angle_unit : of a D-H table whose columns are named mm and deg all the same; if None what its values
+        can be
     base, tip, xacro : of a URDF, as :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree`` have them
 
     Raises

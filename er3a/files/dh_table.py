@@ -20,7 +20,7 @@ from typing import Any, Literal
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
-from er3a.files.units import MOST_DEG
+from er3a.files.units import MOST_DEG, RADIANS_BELOW_DEG, look_like_radians
 from er3a.files.yaml_file import parse
 from er3a.robots.robot import CONVENTIONS, MOST_JOINTS, Convention, Grade
 
@@ -50,7 +50,7 @@ OTHER_UNITS: dict[str, tuple[str, float]] = {unit: ("mm", scale) for unit, scale
 OTHER_UNITS |= {"rad": ("deg", DEGREES["rad"])}
 SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres
 LONGEST_ARM_IN = 200.0  # inches; a length of five metres
-ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3)
+ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3), (0.5, 0.0135, 3)
 """What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
 ASSUMED_SLIDE_MM = 1000.0
 
@@ -61,7 +61,7 @@ def read_dh_table(
     convention: Convention = "standard",
     *,
     length_unit: LengthUnit | None = None,
-    angle_unit: AngleUnit = "deg",
+    angle_unit: AngleUnit | None = None,
     as_printed: bool = False,
 ) -> tuple[RobotFile, tuple[str, ...]]:
     """A robot file made of a D-H table.
@@ -69,8 +69,8 @@ def read_dh_table(
     Parameters
     ----------
     name : of the robot
-    length_unit, angle_unit : what the numbers of a table are in whose columns are named mm and deg all the same; with
-        no ``length_unit`` they are mm unless they can't be
+    length_unit, angle_unit : what the numbers of a table are in whose columns are named mm and deg all the same; if
+        None they are mm and deg unless they can't be
     as_printed : read values that look like another unit's all the same, with a note on what they were taken for; else
         they are refused
 
@@ -92,8 +92,16 @@ def read_dh_table(
     rows = [{_usual_unit(column)[0]: value for column, value in row.items()} for row in rows]
     for row in rows:
         row |= {column: row[column] * scale for column, scale in converted.items() if row[column] is not None}
-    short = any(0 < abs(row[key]) < SHORTEST_PLAIN_LENGTH_MM for row in rows for key in ("a_mm", "d_mm"))
     notes = list(_in_own_units(path, rows, length_unit, angle_unit, as_printed, {*converted}))
+    lengths = [(abs(row[key]), row, key) for row in rows for key in ("a_mm", "d_mm") if row[key]]
+    short = [(row, key) for length, row, key in lengths if length < SHORTEST_PLAIN_LENGTH_MM]
+    unsaid = [each for each in short if each[1] not in converted]
+    if unsaid and not (as_printed or length_unit or _calibrated(rows, convention)):
+        row, key = unsaid[0]
+        problem = f"{row[key]:g} mm looks like metres"
+        remedy = f"Write {1000 * row[key]:g}, or name the column {key[0]}_m; if so short a length is meant, give"
+        remedy += " --length-unit mm, or add a column calibrated with true in each row"
+        raise InputError(path, f"row {row['row']}, column {key}", problem, remedy)
     given = set(names)
     if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
@@ -122,7 +130,7 @@ def read_dh_table(
     if _far_normals(rows, convention):
         notes.append("d of more than 5 m that cancel: read as a calibrated table, with Hayati's beta in place of them")
     content = _content(rows, given, name, convention, path.name)
-    if as_printed and (short or length_unit):
+    if short or 0 < max((length for length, *_ in lengths), default=0.0) < SHORTEST_ARM_MM:
         content["dh"]["calibrated"] = True  # lengths of a millimetre or less are meant
     return parse(RobotFile, content, path), tuple(notes)
 
@@ -142,12 +150,13 @@ def _in_own_units(
     path: Path,
     rows: list[dict[str, Any]],
     length_unit: LengthUnit | None,
-    angle_unit: AngleUnit,
+    angle_unit: AngleUnit | None,
     as_printed: bool,
     own: set[str],
 ) -> Iterator[str]:
     """Take all values to mm and degrees. Lengths that are another unit's, and degrees that were read twice, are
-    refused, or with ``as_printed`` taken for what they are, with a note. ``own``: columns that said their unit."""
+    refused, or with ``as_printed`` taken for what they are, with a note; so are twists that can only be radians, which
+    are otherwise left as they are, with a note. ``own``: columns that said their unit."""
     lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
     unit = length_unit or "mm"
     if length_unit is None and lengths and not any(_unit(row) == "mm" for row in rows):
@@ -156,16 +165,26 @@ def _in_own_units(
             word = {"m": "metres", "in": "inches"}[unit]
             if not as_printed:
                 problem = f"the lengths, {max(lengths):g} mm at most, are those of an arm in {word}"
-                remedy = f"Name the columns a_{unit} and d_{unit}, or give --length-unit {unit} (or mm)"
+                remedy = f"Name the columns a_{unit} and d_{unit}, or give --length-unit {unit}"
+                remedy += " (or mm)" if max(lengths) > SHORTEST_PLAIN_LENGTH_MM else ""
                 raise InputError(path, "columns a_mm, d_mm", problem, remedy)
             yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
-    scales = {"mm": MILLIMETRES[unit], "deg": DEGREES[angle_unit]}
-    in_degrees = angle_unit == "deg" and "alpha_deg" not in own
+    turned = {column for column, value in rows[0].items() if _unit_of(column) == "deg"} - own
+    if angle_unit is None:
+        turned = {column for column in turned if _in_radians(rows, column)} if _twists_in_radians(rows, own) else set()
+        if turned and not as_printed:
+            yield f"{', '.join(sorted(turned))} look like radians: give --angle-unit rad if they are"
+            turned = set()
+        elif turned:
+            yield f"{', '.join(sorted(turned))} were read as radians; --angle-unit deg if they are degrees"
+    elif angle_unit == "deg":
+        turned = set()
+    in_degrees = "alpha_deg" not in own | turned
     twice = [row for row in rows if in_degrees and abs(row["alpha_deg"]) > MOST_DEG]
     for row in rows:
         for column, value in row.items():
             if column not in own and isinstance(value, float):
-                row[column] = value * scales.get(_unit_of(column), 1.0)
+                row[column] = value * (DEGREES["rad"] if column in turned else _scale_of(column, unit))
     for row in twice:
         alpha, once = row["alpha_deg"], math.radians(row["alpha_deg"])
         problem = f"{alpha:g} deg is more than ten turns: it is {once:.6g} deg that were converted twice"
@@ -174,6 +193,24 @@ def _in_own_units(
             raise InputError(path, f"row {row['row']}, column alpha_deg", problem, remedy)
         row["alpha_deg"] = once
         yield f"row {row['row']}, column alpha_deg: {problem}"
+
+
+def _scale_of(column: str, length_unit: LengthUnit) -> float:
+    return MILLIMETRES[length_unit] if _unit_of(column) == "mm" else 1.0
+
+
+def _in_radians(rows: list[dict[str, Any]], column: str) -> bool:
+    """Whether a column's values can all be radians, and are not all 0."""
+    values = [abs(row[column]) for row in rows if row[column]]
+    return bool(values) and max(values) < RADIANS_BELOW_DEG
+
+
+def _twists_in_radians(rows: list[dict[str, Any]], own: set[str]) -> bool:
+    """Whether all twists are right angles in radians, as printed with two decimals or more, and two at least."""
+    twists = [row["alpha_deg"] for row in rows if row["alpha_deg"]]
+    return (
+        "alpha_deg" not in own and look_like_radians(twists) and all(look_like_radians([each, each]) for each in twists)
+    )
 
 
 def _likely_unit(lengths: list[float]) -> LengthUnit:

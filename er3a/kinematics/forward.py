@@ -55,6 +55,13 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
     return out
 
 
+def forward_of_rows(robot: Robot, u: Reals) -> Reals:
+    """Poses (N, 4, 4) of the tool point for what the rows of the table move by, u (N, m), whatever couples them."""
+    out = np.empty((len(u), 4, 4))
+    _forward(for_kernel(u), robot.direction, joint_starts(robot), robot.sliding, constant_links(robot), out)
+    return out
+
+
 def frames(robot: Robot, q: Reals) -> Reals:
     """Frames that move with each joint, and the tool frame.
 

@@ -91,7 +91,13 @@ def test_the_articles_table_is_another_arm():
         (lambda arm: arm.replace(convention="modified"), "other_convention"),
         (lambda arm: arm.replace(a=arm.a / 25.4, d=arm.d / 25.4), "unit"),
         (lambda arm: arm.replace(a=arm.a * 1.3, d=arm.d * 1.3), "scale"),
+        (lambda arm: arm.replace(a=arm.a / 10), "unit"),
+        (lambda arm: arm.replace(alpha=np.radians(arm.alpha)), "angle_unit"),
         (lambda arm: arm.replace(d=np.roll(arm.d, 1)), "rows_shifted"),
+        (
+            lambda arm: arm.replace(**{each: np.roll(getattr(arm, each), 1) for each in ("a", "alpha", "d")}),
+            "rows_shifted",
+        ),
     ],
 )
 def test_slips_are_named(slip, cause):
@@ -106,6 +112,31 @@ def test_all_alphas_negated_of_an_arm_that_is_its_own_mirror_image_is_a_matter_o
     found = er3a.compare(right.replace(alpha=-right.alpha), right)
     assert found.verdict == "same_arm"
     assert not found.directions.same
+
+
+@pytest.mark.parametrize("row", [0, 3, 4])
+def test_a_twist_of_the_wrong_sign_is_named_where_it_only_moves_zeros(row):
+    right = er3a.to_standard(er3a.load_robot("ur5e"))
+    found = er3a.compare(right.replace(alpha=np.where(np.arange(6) == row, -1, 1) * right.alpha), right)
+    assert (found.verdict, found.geometry.same) == ("same_arm", True)
+    assert [each.entries for each in found.zero.causes] == [(f"alpha{row + 1}",)]
+
+
+def test_a_twist_of_the_wrong_sign_beside_an_offset_is_one_entry():
+    right = er3a.Robot.from_dh(
+        a=[0, 0.43, 0.02, 0, 0, 0], alpha=np.radians([90, 0, -90, 90, -90, 0]), d=[0.67, 0.15, 0, 0.43, 0, 0]
+    )
+    found = er3a.compare(right.replace(alpha=np.where(np.arange(6) == 2, -1, 1) * right.alpha), right)
+    assert [(each.entry, each.a, each.b) for each in found.geometry.differences] == [("alpha3", 90, -90)]
+    assert (found.zero.same, found.directions.same) == (True, True)
+
+
+def test_offsets_in_radians_are_named():
+    offset = np.radians([0, -90, 37, 180, 12, 0])
+    right = er3a.load_robot("er3_600").replace(offset=offset)
+    found = er3a.compare(right.replace(offset=np.radians(offset)), right)
+    assert found.geometry.same
+    assert [(each.code, each.unit) for each in found.zero.causes] == [("angle_unit", "offset, radian")]
 
 
 def test_couplings_and_counts_and_kinds():
@@ -147,15 +178,42 @@ def test_other_units_are_taken_for_what_they_are(given, note, tmp_path):
     assert er3a.compare(slipped.robot, right).geometry.same
 
 
-def test_inches_are_recognised_where_they_are_round_millimetres(tmp_path):
+@pytest.mark.parametrize("decimals", [6, 3])
+def test_inches_are_recognised_where_they_are_round_millimetres(decimals, tmp_path):
     path = tmp_path / "inches.csv"
     lengths = ((0, 13.779528), (10.629921, 0), (2.755906, 0), (0, 11.771654), (0, 0), (0, 3.090551))
+    lengths = tuple((round(a, decimals), round(d, decimals)) for a, d in lengths)
     rows = [f"{k},{a},{alpha},{d}" for k, ((a, d), alpha) in enumerate(zip(lengths, (-90, 0, -90, 90, -90, 0)), 1)]
     path.write_text("\n".join(["joint,a_mm,alpha_deg,d_mm", *rows]), encoding="utf-8")
     found = read_arm(str(path))
-    assert found.robot.a[1] == pytest.approx(0.27, abs=1e-6)
+    assert found.robot.a[1] == pytest.approx(0.27, abs=25.4 * 10.0**-decimals / 1000)
     assert any("read as inches" in text for text in found.notes)
-    assert read_arm(str(path), length_unit="mm").robot.a[1] == pytest.approx(0.010629921)
+    assert read_arm(str(path), length_unit="mm").robot.a[1] == pytest.approx(lengths[1][0] / 1000)
+
+
+@pytest.mark.parametrize("decimals", [2, 4])
+def test_twists_in_radians_are_taken_for_what_they_are(decimals, tmp_path):
+    right = read_arm(str(with_columns(tmp_path))).robot
+    lines = [line.split(",") for line in (tmp_path / "table.csv").read_text(encoding="utf-8").splitlines()]
+    for cells in lines[1:]:
+        cells[3] = f"{np.radians(float(cells[3])):.{decimals}f}"
+    path = tmp_path / "radians.csv"
+    path.write_text("\n".join(",".join(cells) for cells in lines), encoding="utf-8")
+    found = read_arm(str(path))
+    assert any("--angle-unit deg" in text for text in found.notes)
+    assert er3a.compare(found.robot, right).geometry.same
+    with pytest.warns(er3a.InputWarning, match="may be radians"):
+        printed = er3a.compare(read_arm(str(path), angle_unit="deg").robot, right)
+    assert [(each.code, each.unit) for each in printed.geometry.causes] == [("angle_unit", "radian")]
+
+
+@pytest.mark.parametrize("twist", ["1.571,-3", "0.5,1.2", "1.047,-0.785"])
+def test_twists_that_are_small_are_degrees(twist, tmp_path):
+    first, second = twist.split(",")
+    path = tmp_path / "small.csv"
+    rows = ["joint,a_mm,alpha_deg,d_mm", f"1,0,{first},400", f"2,300,{second},0", "3,0,0,100"]
+    path.write_text("\n".join(rows), encoding="utf-8")
+    assert np.degrees(read_arm(str(path)).robot.alpha[0]) == pytest.approx(float(first))
 
 
 def test_short_lengths_beside_long_ones_are_meant(tmp_path):

@@ -28,7 +28,7 @@ def compare(
     length_unit: Annotated[
         LengthUnit | None, typer.Option(help="of D-H tables; mm unless the lengths can't be")
     ] = None,
-    angle_unit: Annotated[AngleUnit, typer.Option(help="of D-H tables")] = "deg",
+    angle_unit: Annotated[AngleUnit | None, typer.Option(help="of D-H tables; deg unless the twists can't be")] = None,
     base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
     xacro: Xacro = None,

@@ -53,7 +53,9 @@ def new(
     name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
     convention: Annotated[Convention | None, typer.Option(help="of the table of --dh; standard if none")] = None,
     length_unit: Annotated[LengthUnit | None, typer.Option(help="of that table, where its columns don't say")] = None,
-    angle_unit: Annotated[AngleUnit, typer.Option(help="of that table, where its columns don't say")] = "deg",
+    angle_unit: Annotated[
+        AngleUnit | None, typer.Option(help="of that table, where its columns don't say; deg if not given")
+    ] = None,
 ):
     """Write a study to start from: robot file, targets and paths that the arm can do, a scene, a README."""
     from er3a.pipeline.new_study.write import arm_of, write_study

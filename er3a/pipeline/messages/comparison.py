@@ -35,7 +35,9 @@ CAUSES = {
     "other_convention": N_("the table is of the other D-H convention, standard or modified"),
     "all_alphas_negated": N_("the sign of every alpha is turned round"),
     "one_alpha_negated": N_("the sign is turned round"),
+    "offsets_negated": N_("the sign of every offset is turned round"),
     "unit": N_("the lengths are in another unit"),
+    "angle_unit": N_("the angles are in another unit"),
     "scale": N_("all lengths are scaled"),
     "rows_shifted": N_("values stand a row too high or too low"),
 }
@@ -75,9 +77,11 @@ def _detail(name: str, found: Comparison) -> str:
         return say(layer)
     if name == "zero" and not layer.same:
         moved = [(k, value) for k, value in enumerate(layer.offsets_deg, 1) if abs(value) > 1e-3]
-        return ", ".join(f"J{k} {value:+.6g}" for k, value in moved)
+        shown = ", ".join(f"J{k} {value:+.6g}" for k, value in moved)
+        return joined([shown, *(say(each) for each in layer.causes)])
     if name == "directions" and not layer.same:
-        return tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
+        shown = tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
+        return joined([shown, *(say(each) for each in layer.causes)])
     if name == "coupling":
         return tr("rows {rows}", rows=", ".join(map(str, layer.rows)))
     return "" if layer.same is not False else say(layer)

@@ -476,7 +476,7 @@ def arm_of(
     name: str | None = None,
     convention: Convention | None = None,
     length_unit: LengthUnit | None = None,
-    angle_unit: AngleUnit = "deg",
+    angle_unit: AngleUnit | None = None,
     ends: tuple[str | None, str | None] = (None, None),
     xacro: Sequence[str] = (),
     split: bool | Split = False,
@@ -504,7 +504,7 @@ def arm_of(
     if name is not None and not re.match(NAME_PATTERN, name):
         told = "small letters, digits, - and _, a letter or digit first, 64 at most"
         raise Er3aError(f"--name '{name}' can't be a robot's name: {told}")
-    if dh is None and (convention, length_unit, angle_unit) != (None, None, "deg"):
+    if dh is None and (convention, length_unit, angle_unit) != (None, None, None):
         raise Er3aError("--convention, --length-unit and --angle-unit say how a table is meant; give them with --dh")
     if urdf is None and (ends != (None, None) or xacro or split):
         raise Er3aError("--base, --tip, --xacro and --split say how a URDF is read; give them with --urdf")
