@@ -82,7 +82,6 @@ from er3a.program_check.program_check_findings import (
     ZoneTooLarge,
     ZoneWithoutSize,
 )
-from er3a.programs.branches import on_branch
 from er3a.programs.execution import Ending, Execution
 from er3a.programs.instructions import (
     ArmMotion,
@@ -204,7 +203,7 @@ def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals
     findings: list[CheckFinding] = list(placed.taken)
     joint = placed.motion.kind == "joint"
     if target.branch is not None and joint:
-        met = on_branch(placed.arm, rows, target.branch)
+        met = target.branch.met(placed.arm, rows)
         rows = rows[met] if met.any() else rows
         findings += () if met.any() else (_branch_not_met(target, joint),)
     elif target.configuration and target.branch is None and joint and _different(rows) > 1:
@@ -738,7 +737,7 @@ class StepChecker:
         told = (*findings, *way.findings)
         target = placed.motion.target
         if isinstance(target, PoseTarget) and target.branch is not None and way.end is not None:
-            arrived = on_branch(way.arm, way.end[None], target.branch)[0]
+            arrived = target.branch.met(way.arm, way.end[None])[0]
             told += () if arrived else (_branch_not_met(target, joint=False),)
         return self._measured(CheckedMotion(kind, placed, before, way, way.end, told, moments=way.moments))
 

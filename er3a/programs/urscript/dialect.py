@@ -49,7 +49,7 @@ from er3a.programs.syntax import (
     numbers,
     shown,
 )
-from er3a.programs.urscript_reader import CHANGED, LIST_METHODS, THREAD
+from er3a.programs.urscript.reader import CHANGED, LIST_METHODS, THREAD
 
 KINDS: dict[str, MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
 PARAMETERS = {
