@@ -217,6 +217,8 @@ class ArmMotion(ByValue):
     speed, acceleration : None where the program leaves them as they are on the controller
     turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
         as lengths do
+    load : what hangs on the flange, in its frame; a text where the program names a load without all its numbers; None
+        where it says nothing
     """
 
     kind: MotionKind
@@ -231,6 +233,7 @@ class ArmMotion(ByValue):
     base: NamedFrame = field(default_factory=NamedFrame)
     spline_block: int | None = None
     turn_speed: float | None = None
+    load: MassBody | str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,6 +106,10 @@ REMEDIES: dict[str, str] = {
     "speed_not_given": N_("Give a speed before the motion."),
     "zone_without_size": N_("Give the zone's size in mm."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
+    "load_not_examined": N_(
+        "List the program as a path of a study: its stage dynamics then computes torques with this load."
+    ),
+    "load_above_payload": N_("Carry less, or correct the load if it is wrong."),
 }
 SINGULAR: dict[EventType, str] = {
     "wrist": N_("Tilt the tool so that J5 stays away from 0, or cross this place by a joint move."),
@@ -260,6 +264,9 @@ TEXTS = texts(
         "program_form_inferred": "the structure of <{element}> is not documented; it was read like that of <while>",
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
         "program_nothing_moves": "no instruction moves the arm",
+        "load_not_examined": "{mass_kg:g} kg on the flange from here on; torques with this load are not examined",
+        "load_not_examined.text": "the load {text} has no known numbers; torques with it are not examined",
+        "load_above_payload": "{mass_kg:g} kg on the flange, and the arm may carry {payload_kg:g} kg",
         "written_zones_dropped": Plural(
             "zones",
             "{count} zone has no equivalent in this language: the arm stops there",
@@ -431,6 +438,11 @@ def _(found: found_in.SpeedNotGiven) -> str:
     if found.unit == "share":
         return sentence("speed_not_given.share", percent=found.assumed * 100)
     return say_as(found)
+
+
+@say.register
+def _(found: found_in.LoadNotExamined) -> str:
+    return say_as(found) if found.mass_kg is not None else sentence("load_not_examined.text", text=found.text)
 
 
 @say.register
