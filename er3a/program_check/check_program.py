@@ -114,6 +114,7 @@ class LocatedFinding:
     times : how often the instruction was carried out with it
     step : number of the step that it was found at first, None where it belongs to none
     moment : s from the start of that step's motion, when it begins; None of what is about the motion as a whole
+    joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where that motion does, and pass
     """
 
     level: Level
@@ -123,6 +124,7 @@ class LocatedFinding:
     times: int = 1
     step: int | None = None
     moment: float | None = None
+    joint_moves: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -221,6 +223,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
         if end == len(execution.steps):
             checker.close_loop(ending)
     located = _located(execution, robot, checker, end)
+    located = _with_joint_moves(located, checker, options.keep_on)
     missed = _not_examined(execution, located, end)
     verdicts = _verdicts(program, execution, checker.motions, located, missed)
     level: Level = worst_of(each.level for each in located)
@@ -327,6 +330,37 @@ def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
         else:
             found = LoadNotExamined(load.mass)
         yield LocatedFinding(level_of(found), found, step.place, step.calls)
+
+
+BY_JOINT_MOVES = frozenset(
+    (
+        *("above_limit", "below_limit", "slide_exceeded", "combination_exceeded", "way_out_of_reach"),
+        *("configuration_ends", "meets_singularity", "passes_singularity", "arrives_otherwise", "turns_at_start"),
+        *("configuration_changes", "joint_jumps", "whole_turn", "motion_collides", "clear_of_assumed", "undecided"),
+    )
+)
+"""Findings of motions that joint moves to another solution, or round by a point, may have not."""
+MOST_ADVISED = 20  # motions for which such moves are looked for
+
+
+def _with_joint_moves(
+    located: tuple[LocatedFinding, ...], checker: StepChecker, keep_on: KeepOn | None
+) -> tuple[LocatedFinding, ...]:
+    """Findings with joint moves that pass in place of the motion, where some were found."""
+    moves: dict[int, tuple[tuple[float, ...], ...]] = {}
+    for each in located:
+        if each.step is None or each.step in moves or each.finding.code not in BY_JOINT_MOVES:
+            continue
+        if len(moves) == MOST_ADVISED or (keep_on is not None and not keep_on("checking", each.step, 0)):
+            break
+        found = checker.joint_moves_instead(each.step)
+        moves[each.step] = tuple(tuple((np.round(np.degrees(row), 3) + 0.0).tolist()) for row in found)
+    return tuple(
+        replace(each, joint_moves=moves[each.step])
+        if each.step in moves and each.finding.code in BY_JOINT_MOVES
+        else each
+        for each in located
+    )
 
 
 def _which(finding: CheckFinding) -> str:

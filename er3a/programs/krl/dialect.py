@@ -478,7 +478,7 @@ class KrlDialect:
 
     def is_followed(self, name: str, value: Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
-        return name not in ORIENTATION_TYPES or value in ORIENTATION_TYPES[name]
+        return name != "$ROBROOT" and (name not in ORIENTATION_TYPES or value in ORIENTATION_TYPES[name])
 
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""

@@ -187,6 +187,7 @@ def _finding_at(each: LocatedFinding, starts: Mapping[int, float]) -> FindingAt:
         _without_path(each.finding),
         own,
         None if own is None or start is None else start + own,
+        each.joint_moves,
     )
 
 
