@@ -488,3 +488,12 @@ def test_tools_come_back_with_their_names_and_masses(tmp_path):
     unknown = run(tmp_path, "MoveAbsJ home,v200,z10,gripper;", DATA.replace("[2,[0", "[0.001,[0"), robot=ROBOT)
     named = write_program(unknown.listing(), "rapid", WriteOptions(ROBOT)).findings
     assert [each.name for each in named if isinstance(each, ToolNotGiven)] == ["the load of gripper"]
+
+
+def test_an_encoded_module_beside_is_named_and_refuses_nothing(tmp_path):
+    (tmp_path / "sealed.sys").write_bytes(b"%%%\n VERSION:1\n%%%\n\x01\x02\x03MODULE sealed\n")
+    move = "MoveAbsJ [[0,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\n"
+    (tmp_path / "a.mod").write_text(f"MODULE a\nPROC main()\n{move}sealed_move;\n{move}ENDPROC\nENDMODULE\n")
+    found = check_program(read_program(tmp_path / "a.mod"), ROBOT, CheckOptions(measures=False)).findings
+    told = {each.finding.code: (each.place.line, each.finding.text) for each in found if hasattr(each.finding, "text")}
+    assert told == {"program_not_understood": (0, "sealed.sys"), "may_move": (4, "sealed_move")}

@@ -269,7 +269,8 @@ def read_rapid(source: ProgramText) -> Program:
     cursors = [Cursor(text) for text in (*map(read_program_text, modules_of(source.path)), source)]
     procedures = {name: count for cursor in cursors for name, count in _procedures(cursor.tokens).items()}
     types: dict[str, Shape] = dict(SHAPES)
-    findings: list[ProgramFinding] = []
+    encoded = [each.name for each in _beside(source.path) if _is_encoded(each)]  # which may hold what is used here
+    findings: list[ProgramFinding] = [NotUnderstood(name, Place(source.path)) for name in encoded]
     readers = []
     for cursor in cursors:
         module, own_module = cursor.source.path.stem.upper(), cursor.source is source
@@ -1028,10 +1029,10 @@ def modules_of(path: Path) -> tuple[Path, ...]:
 
     Where the name of a procedure is known only when the program runs, all modules are taken. They lie beside it or, in
     a controller's backup, in the other folder of its task. A module with a routine ``main`` of its own is another
-    program.
+    program; one that is no text is left out.
     """
     used, given, late = _names(path)
-    waiting = {each: _names(each) for each in _beside(path)}
+    waiting = {each: _names(each) for each in _beside(path) if not _is_encoded(each)}
     waiting = {each: names for each, names in waiting.items() if "MAIN" not in names[1]}
     found: list[Path] = []
     while len(found) < MOST_MODULES:
@@ -1060,6 +1061,15 @@ def _beside(path: Path) -> list[Path]:
         for each in sorted(folder.iterdir())
         if each.suffix.lower() in SUFFIXES and each.is_file() and each.resolve() != path.resolve()
     ]
+
+
+def _is_encoded(path: Path) -> bool:
+    """Whether a module is no text, as those are that a maker has encoded."""
+    try:
+        read_program_text(path)
+    except InputError:
+        return True
+    return False
 
 
 def _names(path: Path) -> tuple[set[str], set[str], bool]:
