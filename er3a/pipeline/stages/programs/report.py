@@ -182,7 +182,7 @@ def _motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
             PlayedEvent(
                 t0,
                 t1,
-                tr("line {line}: {text}", line=line, text=words.get(line, "").strip()),
+                tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";")),
                 PLAYED[STATUSES[level]],
             )
             for line, level, t0, t1 in _stretches(rows)
