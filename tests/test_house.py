@@ -14,6 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 LONGEST_FUNCTION = 80
 MOST_POSITIONAL = 6
 IN_EVERY_STAGE = {"entry", "model", "compute", "record", "report"}
+IN_EVERY_LANGUAGE = {"language", "reader", "dialect", "writer"}
+LANGUAGES = "er3a/programs"  # a folder of it is a language of robot programs
 MESSAGES = "er3a/pipeline/messages"  # its modules are named after those that they speak for
 KERNELS = {"kernel", "inner_kernel"}
 
@@ -66,7 +68,8 @@ def test_no_function_takes_many_positional_arguments():
 def test_no_two_modules_of_different_rooms_share_a_name():
     places: dict[str, set[str]] = defaultdict(set)
     for path in map(Path, trees()):
-        if path.parent.as_posix() != MESSAGES and path.stem not in {"__init__", *IN_EVERY_STAGE}:
+        shared = IN_EVERY_LANGUAGE if path.parent.parent.as_posix() == LANGUAGES else IN_EVERY_STAGE
+        if path.parent.as_posix() != MESSAGES and path.stem not in {"__init__", *shared}:
             places[path.stem].add(path.as_posix())
     assert several(places) == {}
 
@@ -74,6 +77,14 @@ def test_no_two_modules_of_different_rooms_share_a_name():
 def test_stages_alone_have_the_modules_of_a_stage():
     contract = [Path(path) for path in trees() if Path(path).stem in IN_EVERY_STAGE]
     assert {path.parent.parent.as_posix() for path in contract} == {"er3a/pipeline/stages"}
+
+
+def test_languages_of_programs_have_the_same_modules():
+    modules = defaultdict(set)
+    for path in map(Path, trees()):
+        if path.parent.parent.as_posix() == LANGUAGES:
+            modules[path.parent.name].add(path.stem)
+    assert [name for name, found in modules.items() if not found >= IN_EVERY_LANGUAGE] == []
 
 
 def test_no_two_classes_share_a_name():

@@ -335,7 +335,7 @@ import re
 from er3a.programs.program_language import SIX_ANGLES, Language
 from er3a.programs.plain.reader import read_plain
 from er3a.programs.plain.writer import PlainWriter
-from er3a.programs.rpl_dialect import RplDialect
+from er3a.programs.rpl.dialect import RplDialect
 
 PLAIN = Language("PLAIN", (".plain",), re.compile(r"(?m)^GO "), read_plain, RplDialect, PlainWriter, SIX_ANGLES)
 '''
@@ -346,10 +346,10 @@ PLAIN = Language("PLAIN", (".plain",), re.compile(r"(?m)^GO "), read_plain, RplD
         "er3a/programs/plain/reader.py": reader,
         "er3a/programs/plain/writer.py": writer,
         "er3a/programs/languages.py": (
-            ('    "csv": Language(', '    "plain": PLAIN,\n    "csv": Language('),
+            ('    "csv": CSV', '    "plain": PLAIN,\n    "csv": CSV'),
             (
-                "from er3a.programs.program_files",
-                "from er3a.programs.plain.language import PLAIN\nfrom er3a.programs.program_files",
+                "from er3a.programs.program_findings",
+                "from er3a.programs.plain.language import PLAIN\nfrom er3a.programs.program_findings",
             ),
         ),
     }

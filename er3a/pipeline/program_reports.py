@@ -23,7 +23,7 @@ from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
 from er3a.pipeline.messages.language import as_text
-from er3a.pipeline.messages.programs import remedy, say
+from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import plain
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured
 from er3a.pipeline.stages.trajectory.motion import listed_motions
@@ -215,7 +215,8 @@ def _finding_record(each: LocatedFinding) -> dict[str, Any]:
         "level": each.level,
         "code": each.finding.code,
         "message": say(each.finding),
-        "remedy": remedy(each.finding),
+        "remedy": remedy_at(each.finding, each.joint_moves),
+        "joint_moves_deg": each.joint_moves,
         "moment_s": each.moment,
         "times": each.times,
         "called_from": [_place_record(place) for place in each.calls],

@@ -125,6 +125,7 @@ LeftOutSubject = Literal[
     "paths_not_run",
     "torque_peaks",
     "program_torques",
+    "program_loads",
     "drive_behaviour",
     "real_camera",
     "boardless_images",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
@@ -33,6 +33,8 @@ from er3a.program_check.program_check_findings import (
     BothSidesChecked,
     CheckFinding,
     Level,
+    LoadAbovePayload,
+    LoadNotExamined,
     MayMove,
     MotionNotReached,
     MovesBesideProgram,
@@ -49,6 +51,7 @@ from er3a.programs.instructions import ArmMotion, Decision, MovesBeside, Pause, 
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
+from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
@@ -111,6 +114,7 @@ class LocatedFinding:
     times : how often the instruction was carried out with it
     step : number of the step that it was found at first, None where it belongs to none
     moment : s from the start of that step's motion, when it begins; None of what is about the motion as a whole
+    joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where that motion does, and pass
     """
 
     level: Level
@@ -120,6 +124,7 @@ class LocatedFinding:
     times: int = 1
     step: int | None = None
     moment: float | None = None
+    joint_moves: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -217,7 +222,8 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     for ending in execution.endings:
         if end == len(execution.steps):
             checker.close_loop(ending)
-    located = _located(execution, checker, end)
+    located = _located(execution, robot, checker, end)
+    located = _with_joint_moves(located, checker, options.keep_on)
     missed = _not_examined(execution, located, end)
     verdicts = _verdicts(program, execution, checker.motions, located, missed)
     level: Level = worst_of(each.level for each in located)
@@ -253,7 +259,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     return tuple(sorted(order, key=lambda each: (files.get(each.place.file, len(files)), each.place.line)))
 
 
-def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[LocatedFinding, ...]:
+def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int) -> tuple[LocatedFinding, ...]:
     """All findings, like ones of an instruction grouped; ``end``: number of the first step that was not checked."""
     program = execution.program
     top = Place(program.file)
@@ -289,6 +295,7 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
             found.append(LocatedFinding("caution", beside, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
             found.append(LocatedFinding("note", BothSidesChecked(what.condition), step.place, step.calls))
+    found += _loads(execution, robot)
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
     for ending in execution.endings:
         if ending.kind not in ("end", "repeats", "joins"):
@@ -307,9 +314,58 @@ def _located(execution: Execution, checker: StepChecker, end: int) -> tuple[Loca
     return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
 
 
+def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
+    """Each load that the program says hangs on the flange, at the first motion with it."""
+    wrist, seen = robot.masses.wrist, set()
+    for step in execution.steps:
+        load = step.instruction.load if isinstance(step.instruction, ArmMotion) else None
+        if load is None or load in seen:
+            continue
+        seen.add(load)
+        found: CheckFinding
+        if isinstance(load, str):
+            found = LoadNotExamined(None, load)
+        elif wrist is not None and load.mass > wrist.payload:
+            found = LoadAbovePayload(load.mass, wrist.payload)
+        else:
+            found = LoadNotExamined(load.mass)
+        yield LocatedFinding(level_of(found), found, step.place, step.calls)
+
+
+BY_JOINT_MOVES = frozenset(
+    (
+        *("above_limit", "below_limit", "slide_exceeded", "combination_exceeded", "way_out_of_reach"),
+        *("configuration_ends", "meets_singularity", "passes_singularity", "arrives_otherwise", "turns_at_start"),
+        *("configuration_changes", "joint_jumps", "whole_turn", "motion_collides", "clear_of_assumed", "undecided"),
+    )
+)
+"""Findings of motions that joint moves to another solution, or round by a point, may have not."""
+MOST_ADVISED = 20  # motions for which such moves are looked for
+
+
+def _with_joint_moves(
+    located: tuple[LocatedFinding, ...], checker: StepChecker, keep_on: KeepOn | None
+) -> tuple[LocatedFinding, ...]:
+    """Findings with joint moves that pass in place of the motion, where some were found."""
+    moves: dict[int, tuple[tuple[float, ...], ...]] = {}
+    for each in located:
+        if each.step is None or each.step in moves or each.finding.code not in BY_JOINT_MOVES:
+            continue
+        if len(moves) == MOST_ADVISED or (keep_on is not None and not keep_on("checking", each.step, 0)):
+            break
+        found = checker.joint_moves_instead(each.step)
+        moves[each.step] = tuple(tuple((np.round(np.degrees(row), 3) + 0.0).tolist()) for row in found)
+    return tuple(
+        replace(each, joint_moves=moves[each.step])
+        if each.step in moves and each.finding.code in BY_JOINT_MOVES
+        else each
+        for each in located
+    )
+
+
 def _which(finding: CheckFinding) -> str:
     """What tells findings of one code at one instruction apart."""
-    names = ("joint", "type", "name", "text", "condition", "kind")
+    names = ("joint", "type", "name", "text", "condition", "kind", "mass_kg")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
 
@@ -410,11 +466,13 @@ class ProgramPart:
     Attributes
     ----------
     lines : of the first and the last instruction
+    load : what the program says hangs on the flange, as of its motions
     """
 
     kind: Literal["joint_sequence", "sequence"]
     lines: tuple[int, int]
     made: Command
+    load: MassBody | str | None = None
 
     def command(self, source: CommandSource) -> Command:
         """The path, with what errors call it."""
@@ -440,7 +498,9 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> list[P
         if motion.kind != "joint" and not np.allclose(motion.placed.arm.tool, robot.tool, rtol=0, atol=1e-12):
             problem = f"line {line} moves another tool than the robot's"
             raise source.error("program", problem, "Give the robot this tool in its file or in the study")
-        same = groups and (groups[-1][-1][1].kind == "joint") == (motion.kind == "joint")
+        before = groups[-1][-1][1] if groups else motion
+        loads = before.placed.motion.load, motion.placed.motion.load
+        same = groups and (before.kind == "joint") == (motion.kind == "joint") and loads[0] == loads[1]
         if same:
             groups[-1].append((line, motion))
         else:
@@ -461,11 +521,12 @@ def _part(group: list[tuple[int, CheckedMotion]]) -> ProgramPart:
     assert start is not None
     if motions[0].kind == "joint":
         points = np.stack([start, *(motion.end for motion in motions if motion.end is not None)])
-        return ProgramPart("joint_sequence", lines, JointSequenceCommand(points, 0.0, duration, RAMP_OF_A_DURATION))
+        joint_moves = JointSequenceCommand(points, 0.0, duration, RAMP_OF_A_DURATION)
+        return ProgramPart("joint_sequence", lines, joint_moves, motions[0].placed.motion.load)
     blends = [_blend(motion, way, after) for motion, (way, after) in zip(motions, pairwise(ways))] + [0.0]
     segments = tuple(_segment(motion, blend) for motion, blend in zip(motions, blends))
     command = ToolSequenceCommand(Start(joints=start), segments, duration, RAMP_OF_A_DURATION)
-    return ProgramPart("sequence", lines, command)
+    return ProgramPart("sequence", lines, command, motions[0].placed.motion.load)
 
 
 def _blend(motion: CheckedMotion, way: MotionWay, after: MotionWay) -> float:

@@ -404,6 +404,30 @@ class LoopComesBackOtherwise:
     code: Literal["loop_comes_back_otherwise"] = "loop_comes_back_otherwise"
 
 
+@dataclass(frozen=True)
+class LoadNotExamined:
+    """From here on the program says what hangs on the flange; no torque is computed with it.
+
+    Attributes
+    ----------
+    mass_kg : None where the text of the load does not give all its numbers
+    text : of such a load
+    """
+
+    mass_kg: float | None
+    text: str = ""
+    code: Literal["load_not_examined"] = "load_not_examined"
+
+
+@dataclass(frozen=True)
+class LoadAbovePayload:
+    """What the program says hangs on the flange is more than the arm's document allows."""
+
+    mass_kg: float
+    payload_kg: float
+    code: Literal["load_above_payload"] = "load_above_payload"
+
+
 CheckFinding = (
     ProgramFinding
     | AboveLimit
@@ -454,6 +478,8 @@ CheckFinding = (
     | BothSidesChecked
     | NotFollowedToEnd
     | LoopComesBackOtherwise
+    | LoadNotExamined
+    | LoadAbovePayload
 )
 
 FAILS = frozenset(
@@ -467,6 +493,7 @@ FAILS = frozenset(
             "too_fast",
             "motion_collides",
             "arc_has_no_circle",
+            "load_above_payload",
         ),
     )
 )
@@ -474,6 +501,7 @@ NOTES = frozenset(
     (
         *("way_not_known", "frame_taken_as_flange", "zone_without_size", "speed_not_given"),
         *("both_sides_checked", "program_form_inferred", "program_other_encoding", "spline_as_line"),
+        "load_not_examined",
     )
 )
 

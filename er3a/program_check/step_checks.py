@@ -81,8 +81,9 @@ from er3a.program_check.program_check_findings import (
     ZoneNotSettled,
     ZoneTooLarge,
     ZoneWithoutSize,
+    level_of,
+    worst_of,
 )
-from er3a.programs.branches import on_branch
 from er3a.programs.execution import Ending, Execution
 from er3a.programs.instructions import (
     ArmMotion,
@@ -90,6 +91,7 @@ from er3a.programs.instructions import (
     MovesBeside,
     Pause,
     PoseTarget,
+    Rate,
     Target,
     Unknown,
     UnresolvedTarget,
@@ -204,7 +206,7 @@ def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals
     findings: list[CheckFinding] = list(placed.taken)
     joint = placed.motion.kind == "joint"
     if target.branch is not None and joint:
-        met = on_branch(placed.arm, rows, target.branch)
+        met = target.branch.met(placed.arm, rows)
         rows = rows[met] if met.any() else rows
         findings += () if met.any() else (_branch_not_met(target, joint),)
     elif target.configuration and target.branch is None and joint and _different(rows) > 1:
@@ -608,6 +610,10 @@ class CheckedMotion(ByValue):
     moments: Mapping[CheckFinding, float] = field(default_factory=dict)
 
 
+MOST_SOLUTIONS = 8  # of a target, to which joint moves are tried
+VIA_TURNS = (20.0, 40.0)  # deg, by which joints are turned away on the way round
+
+
 class StepChecker:
     """Checks steps in their order."""
 
@@ -665,6 +671,57 @@ class StepChecker:
             self.returns.append((ending, LoopComesBackOtherwise(joint + 1, *other)))
         if isinstance(first.instruction, ArmMotion):
             self._corner(self._before[ending.step], ending.repeats_from)
+
+    def joint_moves_instead(self, number: int) -> tuple[Reals, ...]:
+        """Joint moves (n,), one or two, that take the tool where a motion does and pass its checks; empty if none was
+        found, and of arms with joints that slide.
+
+        The first that passes is taken: straight to the solution nearest to the start, or else round by the middle of
+        both with some joints turned away. They are checked at the share of full speed that is assumed.
+        """
+        checked = self.motions[number]
+        goal = self._goal_pose(checked)
+        if checked.start is None or goal is None or checked.placed.arm.slides.any():
+            return ()
+        try:
+            found = inverse(checked.placed.arm, goal, checked.start, self_motion_rows=True)
+        except PoseError:
+            return ()
+        rows = self._free(checked.placed, _as_written(found.q[found.within_limits]))
+        rows = rows[np.argsort(np.abs(rows - checked.start).max(axis=1), kind="stable")][:MOST_SOLUTIONS]
+        straight = [(row,) for row in rows]
+        vias = self._free(checked.placed, _vias(checked.placed.arm, checked.start, rows[0])) if len(rows) else ()
+        round_about = [(via, rows[0]) for via in vias]
+        for moves in (*straight, *round_about):
+            starts = (checked.start, *moves[:-1])
+            if all(self._passes(checked.placed, start, end) for start, end in zip(starts, moves)):
+                return tuple(moves)
+        return ()
+
+    def _goal_pose(self, checked: CheckedMotion) -> Reals | None:
+        """T_world_tool (4, 4) of a motion's target."""
+        placed, target = checked.placed, checked.placed.motion.target
+        if placed.missing or placed.motion.angle is not None:
+            return None
+        if isinstance(target, PoseTarget):
+            return None if placed.base is None else _pose(placed)
+        if isinstance(target, JointTarget) and checked.start is not None:
+            return forward(placed.arm, np.where(np.isnan(target.joints), checked.start, target.joints))
+        return None
+
+    def _free(self, placed: PlacedMotion, q: Reals) -> Reals:
+        """Those of joint vectors (k, n) at which the arm is as far from everything as it has to be."""
+        if self.obstacles is None or not len(q):
+            return q
+        free: Reals = q[self.obstacles.of(placed.arm).free(q, self.obstacles.assumed_margin)]
+        return free
+
+    def _passes(self, placed: PlacedMotion, start: Reals, end: Reals) -> bool:
+        """Whether a joint move with a motion's tool has no finding of more than a note."""
+        speed = Rate(self.rules.assumed.joint_share, "share")
+        move = ArmMotion("joint", JointTarget(end), speed=speed, tool=placed.motion.tool, base=placed.motion.base)
+        found = self._checked(move, start)
+        return found.way is not None and worst_of(level_of(each) for each in found.findings) in ("pass", "note")
 
     def _motion(self, motion: ArmMotion, before: Reals | None) -> CheckedMotion:
         key = (_key(motion), None if before is None else before.tobytes())
@@ -738,7 +795,7 @@ class StepChecker:
         told = (*findings, *way.findings)
         target = placed.motion.target
         if isinstance(target, PoseTarget) and target.branch is not None and way.end is not None:
-            arrived = on_branch(way.arm, way.end[None], target.branch)[0]
+            arrived = target.branch.met(way.arm, way.end[None])[0]
             told += () if arrived else (_branch_not_met(target, joint=False),)
         return self._measured(CheckedMotion(kind, placed, before, way, way.end, told, moments=way.moments))
 
@@ -861,6 +918,21 @@ def _zone_share(motion: ArmMotion, way: MotionWay) -> float:
     return MOST_OF_A_MOTION
 
 
+def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
+    """Joints (k, n) in rad between a start and an end, with one or two of those behind the first turned away."""
+    middle = (start + end) / 2
+    turns = [(1, 0), (-1, 0), (0, 1), (0, -1), (-1, -1), (1, 1), (-1, 1), (1, -1)]
+    away = np.zeros((len(VIA_TURNS) * len(turns), len(middle)))
+    away[:, 1:3] = np.radians(np.kron(np.array(VIA_TURNS)[:, None], turns))[:, : len(middle) - 1]
+    return _as_written(np.clip(middle + away, arm.lower, arm.upper))
+
+
+def _as_written(q: Reals) -> Reals:
+    """Joint angles (..., n) in rad, rounded to 0.001 deg, as they are told."""
+    found: Reals = np.radians(np.round(np.degrees(q), 3))
+    return found
+
+
 def _said(motion: ArmMotion) -> list[CheckFinding]:
     """What is to be said of a motion whatever the arm does."""
     found: list[CheckFinding] = []
@@ -882,7 +954,7 @@ def _key(motion: ArmMotion) -> Hashable:
         (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
     )
     rates = (motion.speed, motion.turn_speed, motion.acceleration)
-    return (motion.kind, targets, motion.angle, rates, motion.zone, frames)
+    return (motion.kind, targets, motion.angle, rates, motion.zone, frames, motion.load)
 
 
 def _target_key(target: Target | None) -> Hashable:

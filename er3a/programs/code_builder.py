@@ -292,12 +292,18 @@ Each = Callable[[Expression], Expression]
 
 
 def linked(routines: Iterable[Routine]) -> tuple[dict[str, Routine], tuple[ProgramFinding, ...]]:
-    """The routines by name, with calls of each other taken out of expressions; and what is to be said of the text."""
+    """The routines by name, with calls of each other taken out of expressions; and what is to be said of the text.
+
+    Of two routines with one name the later one counts; the other is kept under a name that nothing calls.
+    """
     found: list[ProgramFinding] = []
     by_name: dict[str, Routine] = {}
     for routine in routines:
         if routine.name in by_name:
             found.append(NameTwice(routine.name, routine.place))
+            former = by_name[routine.name]
+            hidden = f"{routine.name}@{len(by_name)}"
+            by_name[hidden] = replace(former, name=hidden)
         by_name[routine.name] = routine
     found += [finding for routine in by_name.values() for finding in not_understood(routine.code)]
     return {name: _linked(routine, by_name) for name, routine in by_name.items()}, tuple(found)

@@ -23,6 +23,8 @@ from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
 from er3a.programs.program_findings import NothingMoves, ProgramFinding
+from er3a.programs.program_language import Language
+from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
 
 TIME = "t_s"
@@ -120,3 +122,7 @@ def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int],
             raise InputError(source.path, f"line {line}, column {head[column]}", problem, "Write a number")
         found.append(value)
     return found
+
+
+SIGN = re.compile(r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*,")
+CSV = Language("CSV", (".csv",), SIGN, read_csv_program, RplDialect, writer=None, joints=None)

@@ -366,7 +366,7 @@ class ProgramMemory:
             if kind in ("REAL", "LREAL") and not isinstance(value, float):
                 return float(value)
             if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float) and abs(value) < LARGEST_WHOLE:
-                return round(value)
+                return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
         return value
 
     def _binary(self, expression: Binary) -> Value:

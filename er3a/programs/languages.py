@@ -6,54 +6,31 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 from er3a.errors import InputError
-from er3a.programs.csv_program import read_csv_program
-from er3a.programs.evaluation import MOST_ROBOT_AXES
+from er3a.programs.csv_program import CSV
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing
-from er3a.programs.krl_dialect import KrlDialect
-from er3a.programs.krl_reader import read_krl
-from er3a.programs.krl_writer import KrlWriter
+from er3a.programs.krl.language import KRL
 from er3a.programs.lexing import ProgramText, read_program_text
-from er3a.programs.program_files import POINTS
 from er3a.programs.program_findings import NothingMoves
-from er3a.programs.program_language import SIX_ANGLES, Language
+from er3a.programs.program_language import Language
 from er3a.programs.rapid.language import RAPID
-from er3a.programs.rpl_dialect import RplDialect
-from er3a.programs.rpl_reader import read_rpl
-from er3a.programs.rpl_writer import RplWriter, XplWriter
+from er3a.programs.rpl.language import RPL, XPL
 from er3a.programs.syntax import Fixed, LanguageName, Move, Program
-from er3a.programs.urscript_dialect import UrScriptDialect
-from er3a.programs.urscript_reader import read_urscript
-from er3a.programs.urscript_writer import UrScriptWriter
+from er3a.programs.urscript.language import URSCRIPT
 from er3a.programs.writing import WriteOptions, WrittenProgram
-from er3a.programs.xpl_reader import read_xpl
 from er3a.robots.robot import Robot
 
-ROBOT_AXES = range(1, MOST_ROBOT_AXES + 1)  # A1 to A6 of KRL; E1 to E6 are axes beside the arm
-KRL_SIGN = r"(?im)^\s*(?:&ACCESS|(?:GLOBAL\s+)?DEF(?:FCT)?\s+[\w$\[\]\s]*\([^)]*\)\s*(?:;.*)?$|(?:S?PTP|S?LIN)\s+[{X])"
-URSCRIPT_SIGN = r"(?m)^\s*(?:def\s+\w+\(.*\)\s*:|move[jlpc]\(|set_tcp\()"
-RPL_SIGN = r"(?m)\bM(?:JOINT|LIN)\s*\(|:=|^\s*END_\w+\s*;"
-CSV_SIGN = r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*,"
 LANGUAGES: dict[LanguageName, Language] = {
-    "krl": Language("KRL", (".src", ".sub"), re.compile(KRL_SIGN), read_krl, KrlDialect, KrlWriter, ROBOT_AXES),
-    "urscript": Language(
-        title="URScript",
-        suffixes=(".script", ".urscript"),
-        sign=re.compile(URSCRIPT_SIGN),
-        reader=read_urscript,
-        dialect=UrScriptDialect,
-        writer=UrScriptWriter,
-        joints=SIX_ANGLES,
-    ),
-    "rpl": Language("RPL", (".pgm",), re.compile(RPL_SIGN), read_rpl, RplDialect, RplWriter, SIX_ANGLES),
-    "xpl": Language("XPL", (".xpl",), None, read_xpl, RplDialect, XplWriter, SIX_ANGLES, opening="<"),
+    "krl": KRL,
+    "urscript": URSCRIPT,
+    "rpl": RPL,
+    "xpl": XPL,
     "rapid": RAPID,
-    "csv": Language("CSV", (".csv",), re.compile(CSV_SIGN), read_csv_program, RplDialect, None, None),
+    "csv": CSV,
 }
 """Languages by name, in the order in which their signs are looked for."""
 SUFFIXES: dict[str, LanguageName] = {suffix: name for name, each in LANGUAGES.items() for suffix in each.suffixes}
@@ -70,9 +47,10 @@ def read_program(path: str | Path) -> Program:
         for a file that is none of these, or whose blocks, texts or comments have no end
     """
     path = Path(path)
-    owner = next((program for program, points in POINTS.items() if points == path.suffix.lower()), None)
+    owner = next((each for each in LANGUAGES.values() if each.points and each.points == path.suffix.lower()), None)
     if owner is not None:
-        raise InputError(path, None, "holds the points of a program, not the program", f"Give its {owner} file")
+        remedy = f"Give its {owner.suffixes[0]} file"
+        raise InputError(path, None, "holds the points of a program, not the program", remedy)
     source = read_program_text(path)
     program = LANGUAGES[language_of(source)].reader(source)
     if not _moves(program) and not any(isinstance(each, NothingMoves) for each in program.findings):
@@ -100,6 +78,12 @@ def language_of(source: ProgramText) -> LanguageName:
     if not shown:
         raise InputError(source.path, None, "is no program that is known", f"Give one in {KNOWN}")
     return shown[0]
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """A program's file and those that belong to it: modules that it calls, points, the controller's own data."""
+    name = SUFFIXES.get(path.suffix.lower())
+    return (path, *(LANGUAGES[name].companions(path) if name is not None and path.is_file() else ()))
 
 
 def _moves(program: Program) -> bool:

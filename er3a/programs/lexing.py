@@ -269,6 +269,15 @@ def read_program_text(path: Path) -> ProgramText:
     return ProgramText(path, text.rstrip("\x1a"), encoding)
 
 
+def data_file_of(path: Path, suffix: str) -> Path | None:
+    """The file with the same name and another suffix beside a file, however its letters are written."""
+    for name in (path.stem + suffix, path.stem + suffix.upper(), path.stem + suffix.capitalize()):
+        beside = path.with_name(name)
+        if beside.is_file():
+            return beside
+    return None
+
+
 def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:
     """Text and encoding: by its mark, as UTF-8, as UTF-16 without a mark, as GBK, or as Windows-1252.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from er3a.programs.evaluation import Dialect
 from er3a.programs.instructions import Listing
@@ -28,6 +29,8 @@ class Language:
     dialect : how its expressions, motions and functions are meant when a program runs
     writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
     joints : how many joint angles a target can have; None for any number, of joints that slide too
+    points : suffix of the file with a program's points, where they stand in one of their own
+    companions : what finds the files that belong to a program: modules that it calls, points, the controller's data
     """
 
     title: str
@@ -38,3 +41,5 @@ class Language:
     writer: Callable[[Listing, WriteOptions], Writer] | None
     joints: range | None
     opening: str = ""
+    points: str = ""
+    companions: Callable[[Path], tuple[Path, ...]] = lambda path: ()

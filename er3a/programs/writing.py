@@ -18,7 +18,6 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Reals
-from er3a.programs.branches import on_branch
 from er3a.programs.instructions import (
     ArmMotion,
     Aside,
@@ -258,7 +257,7 @@ def _chain(found: Solutions, reference: Reals, arm: Robot, branch: MeantSolution
     chain: list[Reals] = []
     rows = np.where((found.solved & found.within_limits)[..., None], found.q, np.inf)
     for solutions in rows:
-        if branch is not None and (met := on_branch(arm, solutions, branch) & np.isfinite(solutions[:, 0])).any():
+        if branch is not None and (met := branch.met(arm, solutions) & np.isfinite(solutions[:, 0])).any():
             solutions = np.where(met[:, None], solutions, np.inf)
         away = np.abs(solutions - reference).max(axis=1)
         best = int(away.argmin())

@@ -69,6 +69,41 @@ def axes(q) -> str:
     return "{" + ", ".join(f"A{i + 1} {np.degrees(angle):.6f}" for i, angle in enumerate(q)) + "}"
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.src", f"DEF a( )\nb( )\nEND\nDEF b( )\nPTP {axes(FAR)}\nEND\nDEF b( )\nPTP {axes(NEAR)}\nEND\n"),
+        (
+            "a.script",
+            f"def b():\n #\nend\n\ndef b():\n movej({NEAR_TEXT})\nend\ndef b():\n movej({FAR_TEXT})\nend\nb()\n",
+        ),
+        (
+            "a.mod",
+            "MODULE a\nPROC main()\nb;\nENDPROC\nPROC b()\nMoveAbsJ p,v50,fine,tool0;\nENDPROC\nPROC b()\n"
+            "MoveAbsJ [[10,-15,-5,5,-60,10],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\nENDPROC\nENDMODULE\n",
+        ),
+    ],
+)
+def test_motions_of_a_routine_that_another_of_its_name_replaces_are_named(tmp_path, name, text):
+    found = check(tmp_path, text, name)
+    assert codes(found)["program_name_twice"]
+    replaced = 5 if name == "a.src" else 6
+    assert [(each.place.line, each.what) for each in found.not_examined] == [(replaced, "motion")]
+
+
+def test_real_numbers_are_rounded_to_whole_ones_as_usual(tmp_path):
+    body = (
+        "INT I\nDECL AXIS Q\nQ={A1 0,A2 0,A3 0,A4 0,A5 -50,A6 0}\nI=2.5\nQ.A1=I\nI=3.49\nQ.A2=-I\nI=-0.6\nQ.A3=I\nPTP Q"
+    )
+    (found,) = motions(tmp_path, krl(body), "a.src")
+    np.testing.assert_allclose(np.degrees(found.target.joints), [3, -3, -1, 0, -50, 0])
+
+
+def test_a_robot_that_a_program_places_elsewhere_is_named(tmp_path):
+    body = f"$ROBROOT={{X 0,Y 0,Z 500,A 0,B 0,C 0}}\nPTP {axes(NEAR)}"
+    assert codes(check(tmp_path, krl(body), "a.src"))["program_not_understood"] == [2]
+
+
 # URScript: where a program begins
 
 

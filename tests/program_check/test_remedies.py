@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
-from er3a.pipeline.messages.programs import PACED, REMEDIES, remedies, remedy
+from er3a.files.scene_file import load_scene
+from er3a.kinematics.forward import forward
+from er3a.pipeline.messages.programs import PACED, REMEDIES, remedies, remedy, remedy_at
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.program_check.program_check_findings import (
     NOTES,
@@ -66,3 +68,46 @@ def test_a_line_at_the_pace_advised_passes(tmp_path, line, acceleration):
 
 def test_a_zone_may_take_half_of_the_shorter_motion():
     assert remedy(ZoneTooLarge(80.0, 20.0)) == "Make the zone 10.0 mm at most."
+
+
+SCENE = load_scene("data/scenes/table_and_post.yaml")
+ANGLES = re.compile(r"\(([^)]*)\) deg")
+HEAD = "DEF a( )\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n$VEL.CP=0.05\nBAS(#VEL_PTP,10)\n"
+
+
+@pytest.mark.parametrize(
+    ("code", "start", "line"),
+    [
+        ("above_limit", "0,-10,-10,0,-70,0", "PTP {A4 185}"),
+        ("whole_turn", "0,-10,-10,0,-70,-100", "PTP {A6 300}"),
+        ("motion_collides", "0,-10,-10,0,-70,0", "PTP {A1 100}"),
+        ("configuration_changes", "0,-10,-10,0,-70,0", "PTP {A4 170,A5 70,A6 170}"),
+        ("passes_singularity", "0,-10,-10,0,-30,0", "LIN {A1 1,A5 30}"),
+    ],
+)
+def test_joint_moves_that_are_advised_pass(tmp_path, code, start, line):
+    """Carried out: the line replaced by the moves that its remedy gives, at the speed at which they were checked."""
+
+    def found(*lines: str):
+        (tmp_path / "a.src").write_text(HEAD + "".join(f"{each}\n" for each in lines) + "END\n")
+        options = CheckOptions(start=np.radians([float(each) for each in start.split(",")]), scene=SCENE)
+        return check_program(read_program(tmp_path / "a.src"), ROBOT, options)
+
+    before = found(line)
+    (advised,) = [each for each in before.findings if each.finding.code == code]
+    moves = [angles.split(", ") for angles in ANGLES.findall(remedy_at(advised.finding, advised.joint_moves))]
+    assert moves
+    lines = ["PTP {" + ",".join(f"A{i} {angle}" for i, angle in enumerate(move, 1)) + "}" for move in moves]
+    after = found(*lines)
+    assert [verdict.level for verdict in after.verdicts] == ["pass"] * len(moves)
+    if code != "above_limit":  # of which no arm has the end
+        ends = [list(check.motions.values())[-1].end for check in (before, after)]
+        np.testing.assert_allclose(*(forward(ROBOT, end)[:3, 3] for end in ends if end is not None), atol=1e-4)
+
+
+def test_what_no_joint_move_mends_says_so_by_not_advising_one(tmp_path):
+    (tmp_path / "a.src").write_text(f"{HEAD}PTP {{A2 -80,A3 -10}}\nEND\n")  # into the table
+    options = CheckOptions(start=np.radians([0, -10, -10, 0, -70, 0]), scene=SCENE)
+    found = check_program(read_program(tmp_path / "a.src"), ROBOT, options).findings
+    assert [(each.finding.code, each.joint_moves) for each in found] == [("motion_collides", ())]
+    assert "joint move" not in remedy_at(found[0].finding, found[0].joint_moves)

@@ -11,9 +11,8 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.instructions import ArmMotion
-from er3a.programs.languages import read_program
+from er3a.programs.languages import files_of, read_program
 from er3a.programs.machine import execute
-from er3a.programs.program_files import files_of
 
 FILES = {
     "cell.src": "DEF CELL( )\nDECL INT I\nPTP XP1\nFOR I=1 TO 2\nPICK(5.0)\nENDFOR\nHELP( )\nSUB( )\nEND\n"

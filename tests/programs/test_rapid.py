@@ -14,7 +14,6 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.branches import on_branch
 from er3a.programs.instructions import (
     ArmMotion,
     JointTarget,
@@ -27,9 +26,8 @@ from er3a.programs.instructions import (
     UnresolvedTarget,
     Zone,
 )
-from er3a.programs.languages import read_program, write_program
+from er3a.programs.languages import files_of, read_program, write_program
 from er3a.programs.machine import execute
-from er3a.programs.program_files import files_of
 from er3a.programs.program_findings import NotSimulated, NotUnderstood, ToolNotGiven
 from er3a.programs.rapid.data_types import branch_of
 from er3a.programs.writing import WriteOptions
@@ -345,13 +343,13 @@ def test_of_several_solutions_the_one_with_the_configuration_is_taken(tmp_path):
         quarters = np.floor(np.degrees(row[[0, 3, 5]]) / 90).astype(int)
         for cfx in range(8):
             conf = (*quarters.tolist(), cfx)
-            if not on_branch(ROBOT, row[None], branch_of(tuple(map(float, conf)), 6))[0]:
+            if not branch_of(tuple(map(float, conf)), 6).met(ROBOT, row[None])[0]:
                 continue
             text = f"[[{x:.9f},{y:.9f},{z:.9f}],[{','.join(f'{each:.12f}' for each in turn)}],{list(conf)},{NONE}]"
             program = read_program(saved(tmp_path, f"MoveJ {text},@;"))
             check = check_program(program, ROBOT, CheckOptions(start=np.zeros(6)))
             end = check.motions[check.main[0]].end
-            met = on_branch(ROBOT, rows, branch_of(tuple(map(float, conf)), 6))
+            met = branch_of(tuple(map(float, conf)), 6).met(ROBOT, rows)
             nearest = rows[met][np.abs(rows[met]).max(axis=1).argmin()]
             np.testing.assert_allclose(end, nearest, atol=1e-6)
             assert "configuration_not_met" not in {each.finding.code for each in check.findings}
@@ -490,3 +488,12 @@ def test_tools_come_back_with_their_names_and_masses(tmp_path):
     unknown = run(tmp_path, "MoveAbsJ home,v200,z10,gripper;", DATA.replace("[2,[0", "[0.001,[0"), robot=ROBOT)
     named = write_program(unknown.listing(), "rapid", WriteOptions(ROBOT)).findings
     assert [each.name for each in named if isinstance(each, ToolNotGiven)] == ["the load of gripper"]
+
+
+def test_an_encoded_module_beside_is_named_and_refuses_nothing(tmp_path):
+    (tmp_path / "sealed.sys").write_bytes(b"%%%\n VERSION:1\n%%%\n\x01\x02\x03MODULE sealed\n")
+    move = "MoveAbsJ [[0,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\n"
+    (tmp_path / "a.mod").write_text(f"MODULE a\nPROC main()\n{move}sealed_move;\n{move}ENDPROC\nENDMODULE\n")
+    found = check_program(read_program(tmp_path / "a.mod"), ROBOT, CheckOptions(measures=False)).findings
+    told = {each.finding.code: (each.place.line, each.finding.text) for each in found if hasattr(each.finding, "text")}
+    assert told == {"program_not_understood": (0, "sealed.sys"), "may_move": (4, "sealed_move")}

@@ -376,3 +376,28 @@ def test_moments_about_a_joint_that_slides_are_refused():
     wrist_group = WristLoadFields.model_validate({"rows": [{"joint": 3, "moment_n_m": 4.0}]})
     with pytest.raises(ValueError, match="joint 3 slides"):
         check_masses(None, None, wrist_group, [False, False, True, False])
+
+
+def test_the_load_that_a_program_names_counts_for_its_stretches(tmp_path):
+    move = "movej([{}, -0.17, -0.17, 0, -1.22, 0])\n"
+    text = f"def p():\n{move.format(0.2)}set_payload(2, [0.02, 0, 0.09])\n{move.format(0)}set_payload(get_flag(1))\n"
+    (tmp_path / "moves.script").write_text(f"{text}{move.format(0.2)}end\n")
+    entry = {"kind": "program", "name": "moves", "title": "Moves", "program": str(tmp_path / "moves.script")}
+    entry |= {"start_deg": [0, -10, -10, 0, -70, 0], "samples": 11}
+    study = a_study(tmp_path, limited(1.0), entry={"payload": CLAIM | {"body": LOAD}})
+    paths = yaml.safe_load((tmp_path / "paths.yaml").read_text())
+    (tmp_path / "paths.yaml").write_text(yaml.safe_dump(paths | {"paths": [entry]}))
+    found = computed(tmp_path, study)
+    summary, torques = found.results.summary, found.results.torques
+    assert [each.program_load_kg for each in summary.paths] == [None, 2.0, None]
+    assert [each.program_load_open for each in summary.paths] == ["", "", "set_payload(get_flag(1))"]
+    arm, own = study.robot("er3a_c60"), Load(1.5, (0.02, 0.0, 0.09), tuple(LOAD["inertia_kg_m2"]))
+    for name, load in (("moves_1", own), ("moves_2", Load(2.0, (0.02, 0.0, 0.09))), ("moves_3", own)):
+        rows = torques.take(torques.path == name)
+        np.testing.assert_allclose(rows.gravity, er3a.gravity(arm, np.radians(rows.q), load=load), atol=1e-9)
+    payloads = {use.path: use.asked for use in summary.uses if use.quantity == "payload"}
+    assert payloads == {None: 1.5, "moves_2": 2.0}
+    left = {each.subject: each.names for each in summary.not_examined}
+    assert left["program_loads"] == ("moves_3: set_payload(get_flag(1))",)
+    report(study, found, tmp_path / "page.html")
+    assert "With 2 kg on the flange, which the program names" in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -38,6 +38,7 @@ TEXTS = texts(
         "left_out.paths_not_run": "paths that may not be run as they are: motors and limits don't count them",
         "left_out.torque_peaks": "torques of paths between the {amount:,.0f} times computed",
         "left_out.program_torques": "torques of programs that are not among the paths",
+        "left_out.program_loads": "torques with the loads that programs name",
         "left_out.drive_behaviour": (
             "what changes with speed, heat and wear in motors, gears and brakes, and what elasticity adds"
         ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import singledispatch
 from typing import Any
 
@@ -14,7 +14,7 @@ from er3a.pipeline.messages.kinematics import SINGULARITIES, branch_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.planning import unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
-from er3a.pipeline.stages.programs.model import ProgramCounts, ProgramSummary
+from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
 from er3a.planning.motion_faults import TooFast
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.program_check_findings import (
@@ -47,10 +47,7 @@ REASONS: dict[Unresolved, str] = {
     "too_many_joints": N_("it refers to axes that the arm does not have"),
 }
 NEARER = N_("Move the target or the workpiece nearer to the arm, or tilt the tool towards the arm.")
-OTHER_SOLUTION = N_(
-    "Teach the target in another configuration or with the tool turned otherwise, or go through a via point that keeps "
-    "the joint away from its limit."
-)
+OTHER_SOLUTION = N_("Turn the tool otherwise at the target, or move the target or the workpiece.")
 BY_HAND = N_("Watch this line at low speed on the controller, or replace it by an instruction that is understood.")
 FURTHER = N_("Give the check more time, or in a study raise most_steps, most_branches or loop_rounds of programs.")
 REMEDIES: dict[str, str] = {
@@ -60,7 +57,7 @@ REMEDIES: dict[str, str] = {
     "combination_exceeded": OTHER_SOLUTION,
     "target_out_of_reach": NEARER,
     "way_out_of_reach": NEARER,
-    "configuration_ends": N_("Go there by a joint move, or begin the line in another configuration."),
+    "configuration_ends": N_("Begin the line in another configuration."),
     "more_than_full_speed": N_("Ask for 100 % at most."),
     "configuration_changes": N_(
         "If the change is not meant, give the target's configuration or joint angles; if it is, make it where there "
@@ -68,16 +65,14 @@ REMEDIES: dict[str, str] = {
     ),
     "joint_jumps": N_("Teach the target with this joint near to where it comes from."),
     "whole_turn": N_("Teach the target with the nearer angle, unless the turn is meant to unwind cables."),
-    "arrives_otherwise": N_("Teach the target again where the line arrives, or go there by a joint move."),
-    "turns_at_start": N_("Turn the joint by a joint move first, or begin the line beside the singular pose."),
+    "arrives_otherwise": N_("Teach the target again where the line arrives."),
+    "turns_at_start": N_("Begin the line beside the singular pose."),
     "turn_not_met": N_("Correct the target's Turn (T), or teach the target again."),
     "configuration_not_met": N_("Teach the target again, or correct its configuration."),
     "configuration_guessed": N_("Give start_deg of the program, or begin with a move to joint angles."),
     "moves_beside": BY_HAND,
     "never_reached": N_("Remove this motion, or check what leads to it as a program of its own."),
-    "motion_collides": N_(
-        "Go round by a via point, take another configuration or tool orientation, or move what stands in the way."
-    ),
+    "motion_collides": N_("Take another tool orientation, or move what stands in the way."),
     "clear_of_assumed": N_("Give shapes from a drawing or model in the robot's file, or keep the motion farther away."),
     "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
@@ -106,12 +101,16 @@ REMEDIES: dict[str, str] = {
     "speed_not_given": N_("Give a speed before the motion."),
     "zone_without_size": N_("Give the zone's size in mm."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
+    "load_not_examined": N_(
+        "List the program as a path of a study: its stage dynamics then computes torques with this load."
+    ),
+    "load_above_payload": N_("Carry less, or correct the load if it is wrong."),
 }
 SINGULAR: dict[EventType, str] = {
-    "wrist": N_("Tilt the tool so that J5 stays away from 0, or cross this place by a joint move."),
-    "elbow": N_("Keep the target nearer to the arm, so that it is not stretched, or cross this place by a joint move."),
-    "shoulder": N_("Lead the wrist past axis 1 at a distance by a via point, or cross this place by a joint move."),
-    "dependent_axes": N_("Shift or tilt the path, or cross this place by a joint move."),
+    "wrist": N_("Tilt the tool so that J5 stays away from 0."),
+    "elbow": N_("Keep the target nearer to the arm, so that it is not stretched."),
+    "shoulder": N_("Lead the wrist past axis 1 at a distance by a via point."),
+    "dependent_axes": N_("Shift or tilt the path."),
 }
 STOPPED: dict[EndKind, str] = {
     "drifts": N_("Let the loop come back to where it began, or give it a fixed number of rounds."),
@@ -260,6 +259,9 @@ TEXTS = texts(
         "program_form_inferred": "the structure of <{element}> is not documented; it was read like that of <while>",
         "program_other_encoding": "the file is not UTF-8; it was read as {encoding}",
         "program_nothing_moves": "no instruction moves the arm",
+        "load_not_examined": "{mass_kg:g} kg on the flange from here on; torques with this load are not examined",
+        "load_not_examined.text": "the load {text} has no known numbers; torques with it are not examined",
+        "load_above_payload": "{mass_kg:g} kg on the flange, and the arm may carry {payload_kg:g} kg",
         "written_zones_dropped": Plural(
             "zones",
             "{count} zone has no equivalent in this language: the arm stops there",
@@ -307,6 +309,8 @@ TEXTS = texts(
             "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
         ),
         "written_unsafe": "the path {path} is not safe: {verdict}",
+        "remedy.joint_move": "Go there by a joint move to ({end}) deg: it passes these checks.",
+        "remedy.joint_moves": "Go there by joint moves to ({via}) deg, then ({end}) deg: they pass these checks.",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.slower": (
             "Lower the speed of this line to {percent:g} % of its own or less, and its acceleration to "
@@ -434,6 +438,11 @@ def _(found: found_in.SpeedNotGiven) -> str:
 
 
 @say.register
+def _(found: found_in.LoadNotExamined) -> str:
+    return say_as(found) if found.mass_kg is not None else sentence("load_not_examined.text", text=found.text)
+
+
+@say.register
 def _(found: found_in.RestNotChecked) -> str:
     if not found.targets:
         return say_as(found)
@@ -481,6 +490,16 @@ def _(found: ZoneTooLarge) -> str:
     return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
 
 
+def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> str:
+    """What to do about a finding: ``joint_moves`` (deg) that pass, or else what may help and was not tried."""
+    if not joint_moves:
+        return remedy(finding)
+    *via, end = [", ".join(f"{value:g}" for value in row) for row in joint_moves]
+    if via:
+        return sentence("remedy.joint_moves", via=via[0], end=end)
+    return sentence("remedy.joint_move", end=end)
+
+
 def _pace(found: TooFast | FasterThanAssumed | AcceleratesMoreThanAssumed) -> float:
     """The share of its pace at which the joint keeps its limit: speeds go with it, accelerations with its square."""
     match found:
@@ -498,13 +517,13 @@ def _slower(pace: float) -> str:
     return sentence("remedy.slower", percent=percent, acceleration=math.floor(percent**2 / 10) / 10)
 
 
-def remedies(findings: Iterable[CheckFinding]) -> list[str]:
+def remedies(findings: Iterable[CheckFinding | FindingAt]) -> list[str]:
     """What to do about findings at one line, each thing once; of paces the lowest."""
-    checked = list(findings)
-    paced = [each for each in checked if isinstance(each, PACED)]
+    checked = [(each.finding, each.joint_moves) if isinstance(each, FindingAt) else (each, ()) for each in findings]
+    paced = [each for each, _ in checked if isinstance(each, PACED)]
     slowest = min(paced, key=_pace, default=None)
-    kept = [each for each in checked if not isinstance(each, PACED) or each is slowest]
-    return list(dict.fromkeys(text for each in kept if (text := remedy(each))))
+    kept = [(each, moves) for each, moves in checked if not isinstance(each, PACED) or each is slowest]
+    return list(dict.fromkeys(text for each, moves in kept if (text := remedy_at(each, moves))))
 
 
 def cycle_text(program: ProgramSummary) -> str:

@@ -34,6 +34,7 @@ from er3a.programs.instructions import (
 from er3a.programs.rapid.data_types import (
     JOINTTARGET,
     LEAST_LOAD,
+    LOADDATA,
     NO_AXIS,
     ROBTARGET,
     SPEEDDATA,
@@ -71,6 +72,7 @@ from er3a.programs.syntax import (
     numbers,
     shown,
 )
+from er3a.robots.masses import MassBody, moved, together
 
 ROBOT_BASE = NamedFrame("wobj0", np.eye(4))
 JOINT_FORMS = ("MOVEJ", "TRIGGJ")
@@ -79,7 +81,7 @@ SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
 SETTINGS = ("CONFJ", "CONFL", "ACCSET", "VELSET", "PDISPSET", "PDISPON", "PDISPOFF", "PATHACCLIM")
 """Instructions that motions behind them depend on, and that are followed."""
-MODAL = ("%CONFJ", "%CONFL", "%ACC", "%SPEED", "%PDISP", "%ACCLIM")
+MODAL = ("%CONFJ", "%CONFL", "%ACC", "%SPEED", "%PDISP", "%ACCLIM", "%GRIPLOAD")
 OUTPUTS = frozenset(
     (
         *(
@@ -97,7 +99,7 @@ OUTPUTS = frozenset(
 HARMLESS_TEXT = """
 ACTEVENTBUFFER ALIASIO BITCLEAR BITSET BOOKERRNO CANCELLOAD CLEARIOBUFF CLEARRAWBYTES CLKRESET CLKSTART CLKSTOP CLOSE
 CLOSEDIR COPYFILE COPYRAWBYTES DEACTEVENTBUFFER ERRLOG ERRRAISE ERRWRITE EXITCYCLE FRICIDINIT GETDATAVAL GETSYSDATA
-GETTRAPDATA GRIPLOAD IDELETE IDISABLE IENABLE IERROR INVERTDO IODISABLE IOENABLE IPERS IRMQMESSAGE ISIGNALAI
+GETTRAPDATA IDELETE IDISABLE IENABLE IERROR INVERTDO IODISABLE IOENABLE IPERS IRMQMESSAGE ISIGNALAI
 ISIGNALAO ISIGNALDI ISIGNALDO ISIGNALGI ISIGNALGO ISLEEP ITIMER IVARVALUE IWATCH LOAD MAKEDIR MECHUNITLOAD MOTIONSUP
 OPEN OPENDIR PACKDNHEADER PACKRAWBYTES PDISPOFF PROCERRRECOVERY PULSEDO READANYBIN READBLOCK READCFGDATA READERRDATA
 READRAWBYTES REMOVEDIR REMOVEFILE RENAMEFILE RESET RESETPPMOVED RESTOPATH REWIND RMQEMPTYQUEUE RMQFINDSLOT RMQGETMESSAGE
@@ -164,7 +166,7 @@ class RapidDialect:
 
     modal = frozenset(MODAL)
     local_by_default = False
-    setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF"))
+    setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF", "GRIPLOAD"))
     whole_division = False
     first_index = 1
 
@@ -269,6 +271,7 @@ class RapidDialect:
             zone,
             *frames,
             turn_speed=turn,
+            load=_load(memory, tool, options.get("TLOAD")),
         )
 
     def _target(
@@ -305,6 +308,10 @@ class RapidDialect:
         """Settings, outputs, what is harmless; the rest is unknown."""
         call = doing.what
         assert isinstance(call, Invocation)
+        if call.function == "GRIPLOAD":
+            given = call.arguments[0] if len(call.arguments) == 1 else None
+            memory.write("%GRIPLOAD", UNCLEAR if given is None else memory.value(given))
+            return Aside(doing.text)
         if call.function in SETTINGS:
             return None if _set(memory, call) else Unknown(doing.text, may_move=False)
         if call.function in OUTPUTS and call.arguments:
@@ -317,7 +324,7 @@ class RapidDialect:
     def harmless(self, call: Invocation) -> bool:
         """Functions and instructions whose exact name is known, and that set nothing."""
         name = call.function
-        if name in SETTINGS or name == LATE:
+        if name in SETTINGS or name in (LATE, "GRIPLOAD"):
             return False
         return name[:1] == "%" or name in PARAMETERS or name in HARMLESS or name in ASKED or name in ASIDE_NAMED | WAITS
 
@@ -411,6 +418,29 @@ def _tool(memory: ProgramMemory, expression: object, value: Value) -> tuple[Name
         pose = _mapped(memory, name)
     load = load_of(part(typed(value, TOOLDATA), "TLOAD"))
     return NamedFrame(name, pose, load if load is not None and load.mass > LEAST_LOAD else None), stationary
+
+
+def _load(memory: ProgramMemory, tool: NamedFrame, total: Value | None) -> MassBody | str | None:
+    """What the program says hangs on the flange: the tool, and what GripLoad says is in it (in the tool's frame).
+
+    ``\\TLoad`` says all of it; load0 there is as if it were not given (1 MoveL).
+    """
+    whole = load_of(typed(total, LOADDATA)) if total is not None else None
+    if total is not None and whole is None:
+        return f"\\TLoad {total.text if isinstance(total, Unclear) else ''}".strip()
+    if whole is not None and whole.mass > LEAST_LOAD:
+        return whole
+    value = memory.read("%GRIPLOAD")
+    if value is None:
+        return tool.load
+    gripped = load_of(typed(value, LOADDATA))
+    if gripped is None:
+        return f"GripLoad {value.text if isinstance(value, Unclear) else ''}".strip()
+    if gripped.mass <= LEAST_LOAD:
+        return tool.load
+    if tool.pose is None:
+        return f"GripLoad ({tool.name})"
+    return together([*([tool.load] if tool.load else []), moved(gripped, tool.pose)])
 
 
 def _base(memory: ProgramMemory, expression: object, value: Value | None) -> tuple[NamedFrame, bool]:

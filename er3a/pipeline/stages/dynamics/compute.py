@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,12 +59,12 @@ from er3a.pipeline.stages.dynamics.model import (
 )
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
 from er3a.pipeline.stages.trajectory.judgement import verdict_of as verdict_of_motion
-from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, near_singular, study_motions
+from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, limits_of, near_singular, study_motions
 from er3a.pipeline.study import Study
 from er3a.planning.path_verdicts import NOT_TO_BE_RUN, PathVerdict
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
 from er3a.robots.joint_limits import shown
-from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
+from er3a.robots.masses import LinkMass, Load, MassBody, Masses, no_body, together
 from er3a.robots.robot import Grade, Robot
 
 DynamicsVerdict = Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
@@ -222,6 +222,7 @@ class PathTorques:
     asked : whether the path is to be run, not to show a fault
     demand, imbalance : None where the arm can't follow it
     inertia : (n, 2), least and greatest that each joint moves, without rotor
+    load : that the program names which the path is from
     """
 
     summary: PathLoad
@@ -230,6 +231,7 @@ class PathTorques:
     demand: Demand | None
     inertia: Reals
     imbalance: float | None
+    load: Load | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +288,8 @@ def path_torques(
         torque_times=timed,
         kinematic_s=kinematic,
         no_law=no_law,
+        program_load_kg=named.mass if isinstance(named := program_load(motion), MassBody) else None,
+        program_load_open=named if isinstance(named, str) else "",
     )
     rows = TorqueRows(
         path=np.full(len(t), entry.name, object),
@@ -297,7 +301,9 @@ def path_torques(
         power_w=tau * qd,
     )
     inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
-    return PathTorques(summary, asked, rows, needed, inertia, power_imbalance(arm.model, parts, q, qd, qdd))
+    imbalance = power_imbalance(arm.model, parts, q, qd, qdd)
+    own_load = arm.load if summary.program_load_kg is not None else None
+    return PathTorques(summary, asked, rows, needed, inertia, imbalance, own_load)
 
 
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
@@ -390,18 +396,23 @@ UNITS = {"payload": "kg", "moment": "N m", "inertia": "kg m²"}
 
 
 def wrist_uses(
-    robot: Robot, load: Load | None, grade: Grade, gravity: float, paths: tuple[PathLoad, ...]
+    robot: Robot, load: Load | None, grade: Grade, gravity: float, paths: Sequence[PathTorques]
 ) -> tuple[Use, ...]:
-    """All that the wrist's data limit; upper ends by the load's tolerances."""
+    """All that the wrist's data limit, for the study's load and those that programs name; upper ends by the loads'
+    tolerances."""
     wrist = robot.masses.wrist
-    if wrist is None or load is None:
+    if wrist is None:
         return ()
+    named = [(each.summary.name, each.load) for each in paths if each.summary.counts and each.load]
+    loads: list[tuple[str | None, Load, Grade]] = [(None, load, grade)] if load else []
+    loads += [(path, each, "claim") for path, each in named]
     uses = [
-        Use(use.quantity, use.joint, None, use.asked, use.most, use.allowed, UNITS[use.quantity])
-        for use in wrist_use(robot, wrist, load, gravity, tolerances_of(load, grade))
+        Use(use.quantity, use.joint, path, use.asked, use.most, use.allowed, UNITS[use.quantity])
+        for path, each, known in loads
+        for use in wrist_use(robot, wrist, each, gravity, tolerances_of(each, known))
     ]
     allowed = dict(wrist.moment)
-    for path in paths:
+    for path in (each.summary for each in paths):
         for moment in path.wrist if path.counts else ():
             asked = moment.moment_n_m
             if moment.joint in allowed:
@@ -453,7 +464,7 @@ def compute(study: Study, name: str) -> DynamicsResults:
     summaries = tuple(path.summary for path in paths)
     uses = (
         *drive_uses(robot, summaries, holding),
-        *wrist_uses(robot, load, load_grade, settings.gravity_m_s2, summaries),
+        *wrist_uses(robot, load, load_grade, settings.gravity_m_s2, paths),
     )
     uses = tuple(sorted(uses, key=lambda use: -use.ratio))
     findings = mass_findings(robot) if moving else ()
@@ -545,6 +556,8 @@ def _left_out(
         LeftOut(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
         for subject, numbers in names.items()
     ]
+    if open_loads := [f"{path.name}: {path.program_load_open}" for path in paths if path.program_load_open]:
+        found.append(LeftOut("program_loads", tuple(open_loads)))
     if not_run := (*skipped, *(path.name for path in paths if not path.counts)):
         found.append(LeftOut("paths_not_run", not_run))
     return (*found, LeftOut("torque_peaks", amount=samples), LeftOut("program_torques"), LeftOut("drive_behaviour"))
@@ -566,8 +579,28 @@ def _paths(
         if each.motion is None:
             skipped.append(each.name)
         else:
-            found.append(path_torques(arm, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
+            loaded = with_load(arm, program_load(each.motion))
+            found.append(path_torques(loaded, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
     return found, tuple(skipped)
+
+
+def program_load(motion: Motion) -> MassBody | str | None:
+    """What the program that a path is from says hangs on the flange; None for other paths."""
+    load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
+    impossible = isinstance(load, MassBody) and no_body(load) is not None
+    return f"{load.mass:g} kg" if isinstance(load, MassBody) and impossible else load
+
+
+def with_load(arm: LoadedArm, load: MassBody | str | None) -> LoadedArm:
+    """The arm with the load that a program names instead of the study's, where it gives its numbers.
+
+    What the surroundings do to the tool stays the study's.
+    """
+    if not isinstance(load, MassBody):
+        return arm
+    outer = arm.load or Load(0.0)
+    known = Load(load.mass, load.centre, load.inertia, force=outer.force, moment=outer.moment)
+    return replace(arm, load=known, load_grade="claim")
 
 
 def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:

@@ -270,6 +270,8 @@ class PathLoad:
     payload, speed_scale : None where no torque limit is known
     torque_times : at more and more nodes; empty without peak torques, or by ``no_law``
     kinematic_s : shortest time under joint speeds and assumed accelerations
+    program_load_kg : what hangs on the flange, where the path is of a program that says so; None: the study's load
+    program_load_open : the program's text for a load whose numbers it does not give; the study's load counts
     """
 
     name: str
@@ -285,6 +287,8 @@ class PathLoad:
     torque_times: tuple[ShortestTime, ...]
     kinematic_s: float | None
     no_law: NoTimeLaw | None
+    program_load_kg: float | None = None
+    program_load_open: str = ""
 
     @property
     def hardest(self) -> JointLoad:

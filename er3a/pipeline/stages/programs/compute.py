@@ -36,7 +36,14 @@ from er3a.pipeline.stages.trajectory.motion import assumed_speeds, near_singular
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
 from er3a.program_check.motion_checks import AssumedRates
-from er3a.program_check.program_check_findings import CheckFinding, ExternalAxesLeftOut, Level, worst_of
+from er3a.program_check.program_check_findings import (
+    CheckFinding,
+    ExternalAxesLeftOut,
+    Level,
+    LoadAbovePayload,
+    LoadNotExamined,
+    worst_of,
+)
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.languages import read_program
@@ -108,8 +115,22 @@ def _left_out(programs: Sequence[ProgramSummary], unknown_starts: Sequence[str])
     )
     if outer:
         yield LeftOut("outer_axes", outer)
+    loads = tuple(dict.fromkeys(f"{each.name}: {text}" for each in programs for text in _loads(each)))
+    if loads:
+        yield LeftOut("program_loads", loads)
     yield LeftOut("controller_ramps")
     yield LeftOut("torques")
+
+
+def _loads(program: ProgramSummary) -> Iterator[str]:
+    """The loads that a program names, as kg or as its text has them."""
+    for at in program.findings:
+        if isinstance(at.finding, (LoadAbovePayload, LoadNotExamined)):
+            yield (
+                at.finding.text
+                if isinstance(at.finding, LoadNotExamined) and at.finding.text
+                else f"{at.finding.mass_kg:g} kg"
+            )
 
 
 def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
@@ -166,6 +187,7 @@ def _finding_at(each: LocatedFinding, starts: Mapping[int, float]) -> FindingAt:
         _without_path(each.finding),
         own,
         None if own is None or start is None else start + own,
+        each.joint_moves,
     )
 
 

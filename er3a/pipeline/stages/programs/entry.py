@@ -12,7 +12,7 @@ from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
-from er3a.programs.program_files import files_of
+from er3a.programs.languages import files_of
 
 
 class ProgramsSettings(StrictModel):

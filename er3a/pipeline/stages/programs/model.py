@@ -67,6 +67,7 @@ class FindingAt:
     file : the name of the file that holds the line
     motion_s : s from the start of the instruction's motion, when it begins; None of what is about a motion as a whole
     program_s : the same on the clock of the table of motion; None off the way that is kept there
+    joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where the motion does, and pass
     """
 
     file: str
@@ -77,6 +78,7 @@ class FindingAt:
     finding: CheckFinding
     motion_s: float | None = None
     program_s: float | None = None
+    joint_moves: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from markupsafe import Markup, escape
 
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, remedies, remedy
+from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, remedies, remedy_at
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
@@ -96,9 +96,8 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
             found[each.line].append(each)
         else:
             line = str(each.line) if each.line else "–"
-            elsewhere.append(
-                [each.file, line, level_word(each.level), _remark(program.name, each), remedy(each.finding) or "–"]
-            )
+            to_do = remedy_at(each.finding, each.joint_moves) or "–"
+            elsewhere.append([each.file, line, level_word(each.level), _remark(program.name, each), to_do])
     text = results.lines.take(results.lines.program == program.name)
     rows = results.instructions.take(results.instructions.program == program.name)
     motion = results.motion.take(results.motion.program == program.name)
@@ -147,7 +146,7 @@ def _listing(
         here = found.get(number, [])
         levels: list[Level] = [*(each.level for each in here), *rows.level[moves[number]].tolist()]
         level = worst_of(levels) if levels else None
-        remarks, to_do = [_remark(name, each) for each in here], remedies(each.finding for each in here)
+        remarks, to_do = [_remark(name, each) for each in here], remedies(here)
         leads = Markup(), Markup()
         if number in played:
             t0, t1 = played[number]
@@ -183,7 +182,7 @@ def _motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
             PlayedEvent(
                 t0,
                 t1,
-                tr("line {line}: {text}", line=line, text=words.get(line, "").strip()),
+                tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";")),
                 PLAYED[STATUSES[level]],
             )
             for line, level, t0, t1 in _stretches(rows)

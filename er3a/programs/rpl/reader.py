@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
-from er3a.programs.program_files import data_file_of
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
 from er3a.programs.syntax import (
     Assign,
@@ -344,3 +344,9 @@ def _for(builder: CodeBuilder, place: Place, head: str, text: str) -> None:
     except MisreadError as error:
         raise fault(place, f"this FOR can't be read ({error})", "Write FOR i := 1 TO 9 DO") from None
     builder.open_for(place, name, first, last, step, text)
+
+
+def companions(path: Path) -> tuple[Path, ...]:
+    """What belongs to a .pgm file: the points beside it."""
+    points = data_file_of(path, ".var")
+    return () if points is None else (points,)

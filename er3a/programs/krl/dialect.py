@@ -44,6 +44,7 @@ from er3a.programs.syntax import (
     numbers,
     shown,
 )
+from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
 AXIS_KEYS = ("A1", "A2", "A3", "A4", "A5", "A6")
@@ -105,14 +106,14 @@ def relative(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[st
         if memory.here.joints is None or not isinstance(change, JointTarget):
             return UnresolvedTarget(text, "position_unknown")
         return JointTarget(memory.here.joints + change.joints)
-    moved, seen = record_pose(value), memory.here.seen(*frames, memory.cell.flange)
-    if moved is None or seen is None:
+    offset, seen = record_pose(value), memory.here.seen(*frames, memory.cell.flange)
+    if offset is None or seen is None:
         return UnresolvedTarget(text, "position_unknown")
     if in_tool:
-        return PoseTarget(seen @ moved)
+        return PoseTarget(seen @ offset)
     found = seen.copy()
-    found[:3, 3] += moved[:3, 3]
-    found[:3, :3] = moved[:3, :3] @ seen[:3, :3]
+    found[:3, 3] += offset[:3, 3]
+    found[:3, :3] = offset[:3, :3] @ seen[:3, :3]
     return PoseTarget(found)
 
 
@@ -221,7 +222,7 @@ def set_by_bas(memory: ProgramMemory, call: Invocation) -> bool:
         case "#ACC_CP":
             _line_acceleration(memory, given)
         case "#TOOL":
-            _number(memory, "$TOOL", "TOOL_DATA", given)
+            _tool_number(memory, given)
         case "#BASE":
             _number(memory, "$BASE", "BASE_DATA", given)
         case "#EX_BASE":
@@ -259,7 +260,7 @@ def _initial(memory: ProgramMemory) -> None:
     memory.write("$ORI_TYPE", "#VAR")
     memory.write("$IPO_MODE", "#BASE")
     _number(memory, "$BASE", "BASE_DATA", 0)
-    _number(memory, "$TOOL", "TOOL_DATA", 1)
+    _tool_number(memory, 1)
 
 
 def _field(data: Value | None, name: str, kept_as: str) -> Value:
@@ -341,8 +342,33 @@ def _number(memory: ProgramMemory, variable: str, array: str, given: Value) -> N
     memory.write(variable + "%name", name)
 
 
+def _tool_number(memory: ProgramMemory, given: Value) -> None:
+    """Tool and load by their number, as controllers' own bas.src sets both."""
+    _number(memory, "$TOOL", "TOOL_DATA", given)
+    memory.write("$LOAD", memory.read(f"LOAD_DATA[{number(given) or 0:g}]") or 0)
+
+
+def load_of(value: Value | None) -> MassBody | str | None:
+    """What a LOAD says hangs on the flange; None of a mass below 0, which stands for one that is not known.
+
+    ``{M kg, CM {X mm, Y, Z, A deg, B, C}, J {X kg m^2, Y, Z}}``: J about the axes of CM, through the centre of mass.
+    """
+    if not isinstance(value, Record):
+        return value.text if isinstance(value, Unclear) else None
+    mass, moments = number(value.get("M")), value.get("J")
+    if mass is not None and mass <= 0:
+        return None
+    centre = record_pose(value.get("CM"))
+    parts = [number(moments.get(key)) for key in "XYZ"] if isinstance(moments, Record) else [0.0] * 3
+    given = [each for each in parts if each is not None]
+    if mass is None or not math.isfinite(mass) or centre is None or len(given) < 3:
+        return "LOAD"
+    x, y, z = given
+    return moved(MassBody(mass, inertia=(x, y, z, 0.0, 0.0, 0.0)), centre)
+
+
 def _tool_data(memory: ProgramMemory, data: Record) -> None:
-    _number(memory, "$TOOL", "TOOL_DATA", data.get("TOOL_NO") or 0)
+    _tool_number(memory, data.get("TOOL_NO") or 0)
     memory.write("$IPO_MODE", data.get("IPO_FRAME") or "#BASE")
 
 
@@ -384,7 +410,7 @@ def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
 
 
 KINDS: dict[str, MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
-MODAL = ("$TOOL", "$BASE", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE")
+MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
 HARMLESS_TEXT = """
 CAST_FROM CAST_TO CCLOSE CHECKHOME CIOCTL CLEAR_KRLMSG COPEN CREAD CWRITE DELETE_BACKWARD_BUFFER EB EB_ABS EK
@@ -428,6 +454,7 @@ class Settings(NamedTuple):
     speed: Rate | None
     acceleration: Rate | None
     zone: Zone
+    load: MassBody | str | None
 
 
 class KrlDialect:
@@ -451,7 +478,7 @@ class KrlDialect:
 
     def is_followed(self, name: str, value: Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
-        return name not in ORIENTATION_TYPES or value in ORIENTATION_TYPES[name]
+        return name != "$ROBROOT" and (name not in ORIENTATION_TYPES or value in ORIENTATION_TYPES[name])
 
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""
@@ -530,7 +557,7 @@ class KrlDialect:
     def _motion(self, memory: ProgramMemory, move: Move, angle: float | None) -> ArmMotion:
         plain = move.form.removesuffix("_REL")
         kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
-        tool, base, speed, acceleration, zone = _settings(memory, kind, move)
+        tool, base, speed, acceleration, zone, load = _settings(memory, kind, move)
         values = [self._argument(memory, each) for each in move.arguments]
         if len(values) != (2 if kind == "arc" else 1):
             values = [UNREAD, UNREAD]
@@ -555,6 +582,7 @@ class KrlDialect:
             tool,
             base,
             block if isinstance(block, int) and block else None,
+            load=load,
         )
 
     def _unturned(self, memory: ProgramMemory, goal: Target, frames: Frames) -> Target:
@@ -618,6 +646,7 @@ def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> Settings:
             _speed(memory, kind),
             _acceleration(memory, kind),
             _zone(memory, kind, move.words),
+            load_of(memory.read("$LOAD")),
         )
         memory.kept[key] = found
     return found

@@ -49,7 +49,8 @@ from er3a.programs.syntax import (
     numbers,
     shown,
 )
-from er3a.programs.urscript_reader import CHANGED, LIST_METHODS, THREAD
+from er3a.programs.urscript.reader import CHANGED, LIST_METHODS, THREAD
+from er3a.robots.masses import MassBody
 
 KINDS: dict[str, MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
 PARAMETERS = {
@@ -87,11 +88,11 @@ request_integer_from_primary_client request_string_from_primary_client rpc_facto
 set_analog_inputrange set_analog_out set_analog_outputdomain set_baselight_off set_baselight_solid
 set_configurable_digital_input_action set_configurable_digital_out set_conveyor_tick_count set_digital_out
 set_euromap_output set_euromap_runstate_dependent_choice set_flag set_gp_boolean_input_action set_gravity
-set_input_actions_to_default set_payload set_payload_cog set_payload_mass
+set_input_actions_to_default
 set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
 set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
 set_runstate_tool_digital_output_to_value set_safety_mode_transition_hardness set_standard_analog_input_domain
-set_standard_analog_out set_standard_digital_input_action set_standard_digital_out set_target_payload
+set_standard_analog_out set_standard_digital_input_action set_standard_digital_out
 set_tool_analog_input_domain set_tool_communication set_tool_digital_input_action set_tool_digital_out
 set_tool_digital_output_mode set_tool_output_mode set_tool_voltage sleep socket_close socket_get_var socket_open
 socket_read_ascii_float socket_read_binary_integer socket_read_byte_list socket_read_line socket_read_string
@@ -111,6 +112,13 @@ OUTPUTS = {
     "set_standard_analog_out": "standard_analog_out",
     "set_flag": "flag",
 }
+LOADS = {
+    "set_payload": ("m", "cog"),
+    "set_payload_mass": ("m",),
+    "set_payload_cog": ("cog", "transition_time"),
+    "set_target_payload": ("m", "cog", "inertia", "transition_time"),
+}
+"""Functions that say what hangs on the flange, by their parameters."""
 SIGNATURES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("get_actual_joint_positions", "get_target_joint_positions", "get_actual_tcp_pose"), ()),
     **dict.fromkeys(("get_target_tcp_pose", "get_target_waypoint", "get_tcp_offset"), ()),
@@ -170,9 +178,9 @@ class UrScriptDialect:
             and each.value.function == "rpc_factory"
         )
 
-    modal = frozenset(("%tcp",))
+    modal = frozenset(("%tcp", "%load"))
     local_by_default = True
-    setters = frozenset(("set_tcp",))
+    setters = frozenset(("set_tcp", *LOADS))
     whole_division = False
     first_index = 0
 
@@ -265,6 +273,7 @@ class UrScriptDialect:
             zone,
             _tool(memory),
             ROBOT_BASE,
+            load=_load(memory.read("%load")),
         )
 
     def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
@@ -280,6 +289,10 @@ class UrScriptDialect:
                 return Unknown(doing.text)
             memory.write("%tcp", given["pose"])
             return None
+        if call.function in LOADS:
+            loaded = _placed(LOADS[call.function], values, keywords)
+            memory.write("%load", Unclear(doing.text) if loaded is None else _load_set(memory.read("%load"), loaded))
+            return Aside(doing.text)
         output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
         if output is not None and len(output) == 2:
             return Output(f"{OUTPUTS[call.function]}[{shown(output['n'])}]", shown(output["b"]))
@@ -315,6 +328,26 @@ def _tool(memory: ProgramMemory) -> NamedFrame:
         return NamedFrame("", memory.cell.tool)
     pose = _pose(value)
     return NamedFrame(value.text if isinstance(value, Unclear) else "", pose)
+
+
+def _load_set(before: Value | None, given: dict[str, Value]) -> Value:
+    """Mass (kg), centre of mass (m, in the flange's frame) and inertia (kg m^2, about it); what a call leaves out stays
+    as it was, but for the inertia, which only ``set_target_payload`` sets."""
+    kept = dict(before.items) if isinstance(before, Record) else {}
+    return Record("load", tuple((kept | given | {"inertia": given.get("inertia", (0.0,) * 6)}).items()))
+
+
+def _load(value: Value | None) -> MassBody | str | None:
+    """What the program says hangs on the flange."""
+    if not isinstance(value, Record):
+        return value.text if isinstance(value, Unclear) else None
+    mass, centre, inertia = (value.get(key) for key in ("m", "cog", "inertia"))
+    parts = (mass, *(centre if isinstance(centre, tuple) else ()), *(inertia if isinstance(inertia, tuple) else ()))
+    plain = numbers(parts)
+    if plain is None or len(plain) != 10 or not finite(plain) or plain[0] < 0:
+        return "set_payload" if mass is None else f"set_payload({shown(mass)})"
+    kg, x, y, z, xx, yy, zz, xy, xz, yz = plain
+    return MassBody(kg, (x, y, z), (xx, yy, zz, xy, xz, yz)) if kg else None
 
 
 def _rate(value: Value, unit: str) -> Rate | None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import Output, Pause, PoseTarget, numbers_of
-from er3a.programs.urscript_dialect import DEFAULTS
+from er3a.programs.urscript.dialect import DEFAULTS
 from er3a.programs.writing import ReadyMotion, Writer, duration, fixed, leading_joint_speed, short, tool_speed
 
 DIGITS = 9

@@ -16,7 +16,7 @@ from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.lexing import ProgramText
 from er3a.programs.program_findings import FormInferred
-from er3a.programs.rpl_reader import expression, initial
+from er3a.programs.rpl.reader import expression, initial
 from er3a.programs.syntax import (
     Assign,
     Doing,

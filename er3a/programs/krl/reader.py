@@ -9,12 +9,12 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked, mapped, not_understood, within
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
-from er3a.programs.program_files import data_file_of, modules_of, shared_data_of
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
 from er3a.programs.syntax import (
     Aggregate,
@@ -635,3 +635,53 @@ def split_comment(line: str, place: Place) -> tuple[str, str]:
             if len(parts) % 2 == 0:
                 raise fault(place, "a text has no end", 'Close it with "')
     return (line.strip(), "") if at < 0 else (line[:at].strip(), line[at + 1 :].strip())
+
+
+CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
+MOST_MODULES = 200
+BASICS, BASICS_FILES = "BAS", ("bas.src", "BAS.SRC", "Bas.src", "BAS.src")
+DEEPEST = 6  # folders of an archive
+
+
+def companions(path: Path) -> tuple[Path, ...]:
+    """What belongs to a .src file: the modules that it calls, the points of each, and the controller's own data."""
+    modules = modules_of(path)
+    data = (data_file_of(module, ".dat") for module in (path, *modules))
+    return tuple(file for file in (*modules, *data, shared_data_of(path)) if file is not None)
+
+
+def modules_of(path: Path) -> tuple[Path, ...]:
+    """The modules that a .src file calls, and those that these call, in the order in which they are met.
+
+    They lie beside it; the controller's own bas.src may also lie where an archive has it.
+    """
+    beside = {
+        each.stem.upper(): each
+        for each in sorted(path.parent.iterdir())
+        if each.suffix.lower() == ".src" and each.is_file()
+    }
+    if BASICS not in beside and (basics := _in_archive(path, BASICS_FILES)) is not None:
+        beside[BASICS] = basics
+    beside.pop(path.stem.upper(), None)
+    found: list[Path] = []
+    waiting = [path]
+    while beside and waiting and len(found) < MOST_MODULES:
+        called = dict.fromkeys(name.upper() for name in CALL.findall(read_program_text(waiting.pop(0)).text))
+        new = [beside.pop(name) for name in called if name in beside]
+        found += new
+        waiting += new
+    return tuple(found)
+
+
+def shared_data_of(path: Path) -> Path | None:
+    """The controller's own $config.dat, with its tools, bases and points: beside a program, or as in an archive."""
+    return _in_archive(path, ("$config.dat", "$CONFIG.DAT", "$Config.dat"))
+
+
+def _in_archive(path: Path, names: Iterable[str]) -> Path | None:
+    """A file of the controller beside a program, or in the folder System beside one of the folders above it."""
+    for folder in (path.parent, *(above / "System" for above in list(path.resolve().parents)[1:DEEPEST])):
+        for name in names:
+            if (folder / name).is_file():
+                return folder / name
+    return None

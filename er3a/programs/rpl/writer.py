@@ -16,7 +16,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone, chords, numbers_of
-from er3a.programs.rpl_dialect import SPEED, ZONE
+from er3a.programs.rpl.dialect import SPEED, ZONE
 from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, fixed, share_of_max, short, tool_speed
 
 DIGITS = 6

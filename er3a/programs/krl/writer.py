@@ -22,7 +22,7 @@ from er3a.programs.instructions import (
     Zone,
     numbers_of,
 )
-from er3a.programs.krl_dialect import AXIS_KEYS, FRAME_KEYS
+from er3a.programs.krl.dialect import AXIS_KEYS, FRAME_KEYS
 from er3a.programs.writing import (
     ReadyMotion,
     WriteOptions,

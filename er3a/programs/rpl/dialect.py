@@ -22,7 +22,7 @@ from er3a.programs.instructions import (
     Zone,
     pose_of,
 )
-from er3a.programs.rpl_reader import CONFIGURATION, FIELDS, JOINTS, OUTER, POSITION
+from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, OUTER, POSITION
 from er3a.programs.syntax import (
     Doing,
     Expression,

@@ -1,0 +1,1 @@
+"""KUKA KRL: its record, reader, dialect and writer."""

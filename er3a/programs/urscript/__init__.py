@@ -1,0 +1,1 @@
+"""URScript: its record, reader, dialect and writer."""

@@ -1,0 +1,122 @@
+"""What programs say hangs on the flange: the same part in three languages, written by hand in the flange's frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from er3a.files.robot_library import load_robot
+from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
+from er3a.program_check.program_check_findings import LoadAbovePayload, LoadNotExamined
+from er3a.programs.languages import read_program
+from er3a.programs.machine import execute
+from er3a.robots.masses import MassBody
+
+HOME = "0,-10,-10,0,-70,0"
+MOVES = {
+    "krl": "PTP {A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}\n",
+    "urscript": "  movej([0,-0.17,-0.17,0,-1.22,0])\n",
+    "rapid": "MoveAbsJ [[0,-10,-10,0,-70,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tG;\n",
+}
+SUFFIX = {"krl": ".src", "urscript": ".script", "rapid": ".mod"}
+RAPID = (
+    "MODULE M\nPERS tooldata tG:=[TRUE,[[0,0,100],[0.7071067811865476,0,0,0.7071067811865476]],"
+    "[1,[0,0,50],[1,0,0,0],0.01,0.02,0.03]];\nPERS loaddata part:=[1,[20,0,50],[1,0,0,0],0.004,0.005,0.006];\n"
+    "PERS loaddata whole:=[2.5,[0,0,60],[1,0,0,0],0,0,0];\nPROC main()\n{body}ENDPROC\nENDMODULE\n"
+)
+WRAPPED = {"krl": "DEF P( )\n{body}END\n", "urscript": "def p():\n{body}end\n", "rapid": RAPID}
+
+
+def loads(language: str, tmp_path, *settings: str) -> list[MassBody | str | None]:
+    """The load of a motion behind each setting."""
+    file = tmp_path / f"p{SUFFIX[language]}"
+    body = "".join(f"{each}\n{MOVES[language]}" for each in settings)
+    file.write_text(WRAPPED[language].replace("{body}", body))
+    run = execute(read_program(file), load_robot("er3a_c60"))
+    return [motion.load for motion in run.listing().motions]
+
+
+def same(load: MassBody | str | None, mass: float, centre: tuple[float, ...], inertia: tuple[float, ...]) -> None:
+    assert isinstance(load, MassBody)
+    assert load.mass == pytest.approx(mass)
+    np.testing.assert_allclose(load.centre, centre, atol=1e-12)
+    np.testing.assert_allclose(load.inertia, inertia, atol=1e-12)
+
+
+def test_krl_gives_loads_by_variable_number_and_tool(tmp_path):
+    record = "{M 2.5,CM {X 10,Y 0,Z 50,A 90,B 0,C 0},J {X 0.1,Y 0.2,Z 0.3}}"
+    (tmp_path / "$config.dat").write_text(
+        "DEFDAT $CONFIG PUBLIC\nDECL FRAME TOOL_DATA[16]\nDECL LOAD LOAD_DATA[16]\n"
+        "TOOL_DATA[3]={X 0,Y 0,Z 100,A 0,B 0,C 0}\n"
+        "LOAD_DATA[3]={M 4,CM {X 0,Y 0,Z 70,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\n"
+        "LOAD_DATA[4]={M -1,CM {X 0,Y 0,Z 0,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}\nENDDAT\n"
+    )
+    settings = ("", f"$LOAD={record}", "$LOAD.M=3", "BAS(#TOOL,3)", "$LOAD=LOAD_DATA[4]", "$LOAD=LOAD_DATA[9]")
+    before, turned, heavier, numbered, unknown, open_ = loads("krl", tmp_path, *settings)
+    assert before is None
+    same(turned, 2.5, (0.01, 0, 0.05), (0.2, 0.1, 0.3, 0, 0, 0))  # 90 deg about z: the axes x and y change places
+    same(heavier, 3, (0.01, 0, 0.05), (0.2, 0.1, 0.3, 0, 0, 0))
+    same(numbered, 4, (0, 0, 0.07), (0,) * 6)
+    assert unknown is None
+    assert open_ == "LOAD_DATA[9]"
+
+
+def test_urscript_keeps_what_a_call_leaves_out(tmp_path):
+    settings = (
+        *("  set_payload(1.5)", "  set_payload(1.5, [0, 0.01, 0.05])", "  set_payload_mass(2)"),
+        *("  set_payload_cog([0, 0, 0.1])", "  set_target_payload(3, [0, 0, 0.2], [0.1, 0.2, 0.3, 0, 0.01, 0])"),
+        *("  set_payload(cog=[0, 0, 0.1], m=1)", "  set_payload(0, [0, 0, 0])", "  set_payload(1, [0, 0, 0], 7)"),
+    )
+    found = loads("urscript", tmp_path, *settings)
+    assert found[0] == "set_payload(1.5)"  # the centre is the controller's, which the program does not give
+    same(found[1], 1.5, (0, 0.01, 0.05), (0,) * 6)
+    same(found[2], 2, (0, 0.01, 0.05), (0,) * 6)
+    same(found[3], 2, (0, 0, 0.1), (0,) * 6)
+    same(found[4], 3, (0, 0, 0.2), (0.1, 0.2, 0.3, 0, 0.01, 0))
+    same(found[5], 1, (0, 0, 0.1), (0,) * 6)
+    assert found[6] is None
+    assert isinstance(found[7], str)
+
+
+def test_rapid_adds_the_part_to_the_tool(tmp_path):
+    settings = ("", "GripLoad part;", "GripLoad load0;")
+    tool, both, again = loads("rapid", tmp_path, *settings)
+    same(tool, 1, (0, 0, 0.05), (0.01, 0.02, 0.03, 0, 0, 0))
+    # The tool is turned by 90 deg about z, so the part's centre (20, 0, 50) lies at (0, 20, 150) before the flange, the
+    # centre of both at (0, 10, 100); each is (0, 10, 50) mm from it: 0.0026, 0.0025, 0.0001 and -0.0005 kg m^2 each.
+    inertia = (0.01 + 0.005 + 0.0052, 0.02 + 0.004 + 0.005, 0.03 + 0.006 + 0.0002, 0, 0, -0.001)
+    same(both, 2, (0, 0.01, 0.1), inertia)
+    same(again, 1, (0, 0, 0.05), (0.01, 0.02, 0.03, 0, 0, 0))
+    file = tmp_path / "p.mod"
+    file.write_text(file.read_text().replace(",fine,tG;", ",fine,tG\\TLoad:=whole;"))
+    (all_of_it, *_) = execute(read_program(file), load_robot("er3a_c60")).listing().motions
+    same(all_of_it.load, 2.5, (0, 0, 0.06), (0,) * 6)
+
+
+def checked(tmp_path, text: str, robot: str = "er3_600") -> ProgramCheck:
+    (tmp_path / "p.script").write_text(text)
+    start = np.radians([float(each) for each in HOME.split(",")])
+    return check_program(read_program(tmp_path / "p.script"), load_robot(robot), CheckOptions(start, measures=False))
+
+
+def test_a_load_is_named_once_and_one_above_the_payload_fails(tmp_path):
+    move = MOVES["urscript"]
+    text = (
+        f"def p():\n  set_payload(2, [0, 0, 0.05])\n{move}{move}  set_payload(3.5, [0, 0, 0.05])\n{move}"
+        f"  set_payload(2, [0, 0, 0.05])\n{move}end\n"
+    )
+    found = checked(tmp_path, text)
+    said = [each for each in found.findings if isinstance(each.finding, (LoadNotExamined, LoadAbovePayload))]
+    assert [(each.place.line, each.level, each.finding) for each in said] == [
+        (3, "note", LoadNotExamined(2.0)),
+        (6, "fail", LoadAbovePayload(3.5, 3.0)),
+    ]
+
+
+def test_a_load_behind_a_branch_is_followed_on_both_sides(tmp_path):
+    move = MOVES["urscript"]
+    text = (
+        f"def p():\n  set_payload(1, [0, 0, 0.05])\n  if get_digital_in(1):\n    set_payload(5, [0, 0, 0.05])\n  end\n"
+        f"{move}end\n"
+    )
+    assert any(isinstance(each.finding, LoadAbovePayload) for each in checked(tmp_path, text).findings)
