@@ -526,16 +526,15 @@ def test_the_panel_names_the_nearest_pair_and_turns_red_where_links_touch(panel)
 def test_solutions_say_what_they_collide_with_before_they_are_chosen(panel, degrees):
     robot, scene = load_robot("er3a_c60"), load_scene(ROOT / "data/scenes/table_and_post.yaml")
     panel.move(*degrees)
-    panel.until(lambda: f"{degrees[0]:.1f}" in panel.text("#branches .row-joints"))
-    shown = panel.browser.find_elements(By.CSS_SELECTOR, ".branch > .solution")
-    angles = [
-        [each.text.replace("−", "-") for each in one.find_elements(By.CSS_SELECTOR, ".row-joints span")]
-        for one in shown
-    ]
-    found = clearance(robot, np.radians(np.array(angles, dtype=float)), scene)
-    assert ["Collision" in one.text for one in shown] == (found.distance <= 0).tolist()
-    colliding = ", of these" in panel.text("#count")
-    assert colliding == bool((found.distance <= 0).any())
+    here = "const here = document.querySelector('.solution[aria-pressed=true] .row-joints span');"
+    panel.until(lambda: panel.browser.execute_script(here + "return here?.textContent") == f"{degrees[0]:.1f}")
+    ask = """return [...document.querySelectorAll(".branch > .solution")].map((one) => [
+      [...one.querySelectorAll(".row-joints span")].map((angle) => Number(angle.textContent.replace("−", "-"))),
+      one.textContent.includes("Collision")])"""
+    shown = panel.browser.execute_script(ask)
+    found = clearance(robot, np.radians([angles for angles, _ in shown]), scene)
+    assert [told for _, told in shown] == (found.distance <= 0).tolist()
+    assert (", of these" in panel.text("#count")) == bool((found.distance <= 0).any())
 
 
 def test_what_would_hide_the_arm_lets_it_through(panel):
