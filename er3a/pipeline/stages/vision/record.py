@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -125,13 +124,12 @@ def _sampled(rows: SampleRows, home: Reals) -> Run:
     poses = np.flatnonzero(np.isfinite(rows.q_deg).all(axis=1)) if len(rows) else np.empty(0, dtype=int)
     times = SAMPLE_S * np.arange(len(poses) + 1, dtype=float)
 
-    def texts() -> Iterator[tuple[float, str]]:
-        for t, k in zip(times[1:].tolist(), poses):
-            used, residual = "used" if rows.used[k] else "**left out**", np.linalg.norm(rows.residual_mm[k])
-            yield t, f"Sample {escaped(rows.sample[k])}, {used}: residual {residual:.3g} mm"
-
+    texts = []
+    for t, k in zip(times[1:].tolist(), poses):
+        used, residual = "used" if rows.used[k] else "**left out**", np.linalg.norm(rows.residual_mm[k])
+        texts.append((t, f"Sample {escaped(rows.sample[k])}, {used}: residual {residual:.3g} mm"))
     q = np.concatenate([home[None], np.radians(rows.q_deg[poses])]) if len(poses) else home[None]
-    return Run("samples", "The arm waits.", times, q, texts=list(texts()), pause_s=SAMPLE_S)
+    return Run("samples", "The arm waits.", times, q, texts=texts, pause_s=SAMPLE_S)
 
 
 def _grasped(results: VisionResults, each: ObjectResult, home: Reals) -> Run:
