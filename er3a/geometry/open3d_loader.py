@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from contextlib import suppress
 from functools import cache
 from types import ModuleType
 
@@ -16,9 +17,10 @@ from types import ModuleType
 def load_open3d() -> ModuleType:
     """The ``open3d`` module; its import takes seconds, so it is done on first use."""
     if sys.platform == "linux":
-        import libusb_package
+        with suppress(ModuleNotFoundError):  # a conda environment has the library where its open3d finds it
+            import libusb_package
 
-        ctypes.CDLL(str(libusb_package.get_library_path()), mode=ctypes.RTLD_GLOBAL)
+            ctypes.CDLL(str(libusb_package.get_library_path()), mode=ctypes.RTLD_GLOBAL)
     import open3d
 
     return open3d

@@ -11,7 +11,8 @@ from selenium.webdriver.support.wait import WebDriverWait
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import frames
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player, stretch
+from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
+from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.page import render
 from testing.small_study import ROOT

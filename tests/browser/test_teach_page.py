@@ -520,3 +520,34 @@ def test_the_panel_names_the_nearest_pair_and_turns_red_where_links_touch(panel)
     count = f".data; let n = 0; for (let i = 0; i < d.length; i += 4) {each}; return n"
     assert panel.browser.execute_script(red + count) > 200
     assert panel.clean()
+
+
+@pytest.mark.parametrize("degrees", [(40, -30, 20, 10, 60, 0), (73, -68, 49, -34, 82, 37)])
+def test_solutions_say_what_they_collide_with_before_they_are_chosen(panel, degrees):
+    robot, scene = load_robot("er3a_c60"), load_scene(ROOT / "data/scenes/table_and_post.yaml")
+    panel.move(*degrees)
+    here = "const here = document.querySelector('.solution[aria-pressed=true] .row-joints span');"
+    panel.until(lambda: panel.browser.execute_script(here + "return here?.textContent") == f"{degrees[0]:.1f}")
+    ask = """return [...document.querySelectorAll(".branch > .solution")].map((one) => [
+      [...one.querySelectorAll(".row-joints span")].map((angle) => Number(angle.textContent.replace("−", "-"))),
+      one.textContent.includes("Collision")])"""
+    shown = panel.browser.execute_script(ask)
+    found = clearance(robot, np.radians([angles for angles, _ in shown]), scene)
+    assert [told for _, told in shown] == (found.distance <= 0).tolist()
+    assert (", of these" in panel.text("#count")) == bool((found.distance <= 0).any())
+
+
+def test_what_would_hide_the_arm_lets_it_through(panel):
+    ask = """const [arm, places, done] = arguments;
+      const modules = ["scene", "solids", "algebra"].map((name) => import(`er3a/${name}`));
+      Promise.all(modules).then(([scene, solids, algebra]) => {
+        const picture = new scene.Picture(document.createElement("canvas"));
+        Object.assign(picture.canvas, { width: 800, height: 600 });
+        picture.begin(scene.eyeOf({ azimuth: 0, elevation: 0, distance: 5, target: [0, 0, 0] }));
+        const ball = { kind: "sphere", radius: 0.1, colour: "#888888" };
+        const balls = places.map((at, name) => ({ ...ball, name, T: algebra.translation(...at) }));
+        const groups = picture.around(solids.sceneSolids(balls), arm.map((at) => algebra.translation(...at)));
+        done(groups.map((group) => [group.ghost, group.solids.map((solid) => solid.name)]));
+      });"""
+    arm, places = [[0, 0, 0], [0, 0, 1]], [[2, 0, 0.3], [2, 0.6, 0.3], [-2, 0, 0.5]]  # before it, beside it, behind it
+    assert panel.browser.execute_async_script(ask, arm, places) == [[False, [1, 2]], [True, [0]]]

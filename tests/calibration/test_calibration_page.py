@@ -55,7 +55,7 @@ def test_the_recording_holds_both_errors_of_each_pose(written):
     rows = er3a.load_measurements(written / "wam.csv", robot)
     found = er3a.calibrate(robot, rows)
     shown = RrdReader(written / "all.rrd").stream().collect().reader(index="t").to_pandas()
-    curves = np.stack(shown["/calibration/curves:Scalars:scalars"].dropna().to_list()[:ROWS])  # a gap ends them
+    curves = np.stack(shown["/calibration/curves/errors:Scalars:scalars"].dropna().to_list()[:ROWS])  # a gap ends them
     measured = np.array([row.xyz_mm for row in rows])
     q = np.radians([row.pose for row in rows])
     for table, curve in zip((robot, found.robot), curves.T):

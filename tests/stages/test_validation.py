@@ -56,7 +56,7 @@ from er3a.pipeline.stages.validation.model import (
 from er3a.pipeline.stages.validation.record import record
 from er3a.pipeline.stages.validation.report import report
 from er3a.pipeline.study import RobotEntry, Study, load_study
-from er3a.pipeline.viewing.recording import TIMELINE
+from er3a.pipeline.viewing.arm import TIMELINE
 from er3a.references.circle_points import circle_points, fit_circle
 from er3a.references.predict import predict
 from er3a.references.quantities import Limit

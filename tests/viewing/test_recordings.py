@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 import ctypes.util
 import os
 import re
@@ -10,13 +11,18 @@ import sys
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from er3a.collision.scene import Scene, Sphere
+from er3a.pipeline.player.motions import Mark, PlayedEvent
 from er3a.pipeline.results import check_checksum
 from er3a.pipeline.study import STAGES
 from er3a.pipeline.viewing import preview
-from er3a.pipeline.viewing.arm import LABEL
+from er3a.pipeline.viewing.arm import LABEL, TIMELINE
+from er3a.pipeline.viewing.palette import JOINTS, legible, rgb
+from er3a.pipeline.viewing.recording import Recorded, Run, write_recording
 from testing.small_study import stages_of
 from tests.conftest import ROBOT, ROBOTS, ROOT
 from tests.viewing.pictures import joints_seen
@@ -84,6 +90,29 @@ def test_recordings_of_a_robot_merge_without_being_mixed(small_study, tmp_path):
     assert sorted(recording.application_id for recording in kept) == sorted(f"{stage} er3_600" for stage in STAGES)
 
 
+def test_bodies_are_red_and_the_contact_marked_while_they_overlap(robot, tmp_path):
+    post = Sphere("post", np.eye(4), 0.1)
+    overlap = PlayedEvent(0.5, 0.8, "collision", "fail", ("link_2", "post"))
+    contact = Mark(0.5, 0.8, (0.1, 0.2, 0.3), (0.1, 0.2, 0.3), "first contact")
+    run = Run("into it", "It goes.", np.linspace(0, 1, 11), np.zeros((11, 6)), [overlap], [contact], outcome="collides")
+    shown = Recorded(robot, "arm", "trajectory", "Look.", [run], scene=Scene("a post", (post,)))
+    write_recording(shown, tmp_path / "out.rrd")
+    rows = RrdReader(tmp_path / "out.rrd").stream().collect().reader(index=TIMELINE).to_pandas()
+    times = rows[TIMELINE].dt.total_seconds().to_numpy()
+
+    def changes(entity: str) -> list[tuple[float, bool]]:
+        """When something is seen there from then on, and when nothing."""
+        column = next(column for column in rows.columns if re.match(rf"{entity}[:/].*:colors", column))
+        known = rows[column].notna()
+        return list(zip(times[known], (len(colours) > 0 for colours in rows[column][known]), strict=True))
+
+    for entity in ("/arm/link_2/touching", "/trajectory/scene/post/touching", "/trajectory/nearest"):
+        assert changes(entity) == [(0.5, True), (0.8, False)], entity
+    assert not [column for column in rows.columns if "link_3/touching" in column]
+    texts = [text[0] for text in rows["/trajectory/events:TextLog:text"].dropna()]
+    assert texts == ["0.000 s: into it: collides", "0.500 s: collision (0.500 s into it)"]
+
+
 @pytest.fixture(scope="session")
 def vulkan() -> None:
     """A Vulkan loader to draw with; skipped with its reason where there is none."""
@@ -124,6 +153,14 @@ def luminance(colour: tuple[int, int, int]) -> float:
 
 
 @pytest.mark.parametrize("ground", [(13, 16, 17), (255, 255, 255)])  # of the viewer's two themes
-def test_labels_are_legible_on_dark_and_light_ground(ground):
-    darker, lighter = sorted((luminance(LABEL), luminance(ground)))
+@pytest.mark.parametrize("label", [LABEL, *map(legible, JOINTS)])
+def test_labels_are_legible_on_dark_and_light_ground(label, ground):
+    darker, lighter = sorted((luminance(label), luminance(ground)))
     assert (lighter + 0.05) / (darker + 0.05) > 4.2  # no colour has more than 4.4 on both
+
+
+def test_labels_keep_the_hue_of_their_joint():
+    def hue(colour):
+        return 255 * colorsys.rgb_to_hsv(*(part / 255 for part in colour))[0]
+
+    assert [hue(legible(colour)) for colour in JOINTS] == pytest.approx([hue(rgb(each)) for each in JOINTS], abs=8)

@@ -37,7 +37,8 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import event_word
 from er3a.pipeline.messages.workspace import change_text
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, player
+from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
+from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Provenance, input_records, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathChecks

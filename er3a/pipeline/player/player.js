@@ -6,14 +6,13 @@
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
-import { add, column, scaled, translation } from "er3a/algebra";
+import { add, column, scaled } from "er3a/algebra";
 import { constantLinks } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
 import { eyeOf, Picture } from "er3a/scene";
 import { armSolids, recoloured, sceneSolids } from "er3a/solids";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
-const WORLD = translation(0, 0, 0);
 const place = document.getElementById("player");
 const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
@@ -101,7 +100,7 @@ function draw() {
   picture.begin(eyeOf(orbit));
   picture.floor(column(table.base, 3), data.size / 10, floor, page.grid);
   for (const { solids, poses } of shown) picture.shadow(solids, poses, floor, page.grid);
-  picture.solids([{ solids: seen(surroundings), poses: [WORLD], ghost: false }, ...shown]);
+  picture.solids([...picture.around(seen(surroundings), shown.flatMap(({ poses }) => poses)), ...shown]);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) picture.line(trail, page.ink, 1.5);
   for (const { t: from, until, status } of motion.events) {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Spher
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.teach.scripts import TEACH, import_map
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, rgb
 from er3a.robots.joint_limits import shown, size_of, theta_limits
@@ -59,53 +60,6 @@ WORDS = {
     ),
     "no_script": N_("The player needs JavaScript; the recording of this stage shows the same in the Rerun viewer."),
 }
-
-
-@dataclass(frozen=True)
-class PlayedEvent:
-    """Something to be seen from ``t`` to ``until`` (s); ``status`` (``plain``, ``caution``, ``fail``) colours it.
-
-    ``bodies`` (``base``, ``link_3``, names of solids) are red then.
-    """
-
-    t: float
-    until: float
-    text: str
-    status: str
-    bodies: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A line between two points (m), a dot where they are one, with a word, shown from ``t0`` to ``t1`` (s)."""
-
-    t0: float
-    t1: float
-    start: tuple[float, float, float]
-    end: tuple[float, float, float]
-    text: str
-
-
-@dataclass(frozen=True, eq=False)
-class PlayedMotion:
-    """A motion of the arm.
-
-    Attributes
-    ----------
-    name, text : what it is called, and what is said of it where no event is near
-    t : (N,), s, rising; q : (N, n), joint coordinates, finite
-    timed : false where no times are known: ``t`` counts points then, which are shown at an even pace
-    beside : (N, n) each, joint coordinates of the arms that stand beside the first
-    """
-
-    name: str
-    text: str
-    t: Reals
-    q: Reals
-    events: Sequence[PlayedEvent] = ()
-    marks: Sequence[Mark] = field(default=())
-    timed: bool = True
-    beside: Sequence[Reals] = ()
 
 
 def player(

@@ -42,7 +42,7 @@ const clearance = new Clearance(data);
 const list = new SolutionList(data, arm, goTo, (other) => {
   ghost = other;
   refresh();
-});
+}, (other) => clearance.overlap(frames(table, links, other)));
 
 /** The joint values (rad, m) that the arm stands at. */
 export const joints = () => [...q];

@@ -3,8 +3,9 @@
  * one lamp and painted from the farthest to the nearest.
  */
 
-import { add, cross, dot, moved, scaled, subtract, unit } from "er3a/algebra";
+import { add, column, cross, dot, moved, scaled, subtract, translation, unit } from "er3a/algebra";
 
+const WORLD = translation(0, 0, 0);
 const LAMP = unit([0.35, -0.55, 0.9]);
 const AMBIENT = 0.55;
 const MOST_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
@@ -86,6 +87,25 @@ export class Picture {
     this.context.fill();
   }
 
+  /**
+   * What stands around the arm as groups of `solids`: what would hide one of the arm's `poses`, or the middle between two,
+   * lets through what is behind.
+   */
+  around(solids, poses) {
+    const origins = poses.map((T) => column(T, 3));
+    const points = [...origins, ...origins.slice(1).map((origin, k) => scaled(add(origin, origins[k]), 0.5))].map((point) => this.seen(point));
+    const hides = ({ points: corners, faces }) => {
+      const flat = corners.map((point) => this.seen(point));
+      return faces.some((face) => {
+        const outline = face.corners.map((i) => flat[i]);
+        return points.some((point) => point[2] > outline[0][2] && inside(point, outline));
+      });
+    };
+    const hiding = new Set(solids.filter(hides));
+    const [pale, full] = [true, false].map((ghost) => solids.filter((solid) => hiding.has(solid) === ghost));
+    return [{ solids: full, poses: [WORLD], ghost: false }, { solids: pale, poses: [WORLD], ghost: true }];
+  }
+
   /** Solids at their poses; each group is `{solids, poses, ghost}`, a ghost is pale and lets through what is behind. */
   solids(groups) {
     const painted = [];
@@ -155,6 +175,15 @@ export class Picture {
   #join(flat) {
     flat.forEach(([x, y], i) => (i ? this.context.lineTo(x, y) : this.context.moveTo(x, y)));
   }
+}
+
+/** Whether a point of the canvas is inside a convex outline, seen from either side. */
+function inside([x, y], outline) {
+  const sides = outline.map(([a, b], i) => {
+    const [c, d] = outline[(i + 1) % outline.length];
+    return (c - a) * (y - b) - (d - b) * (x - a);
+  });
+  return sides.every((side) => side >= 0) || sides.every((side) => side <= 0);
 }
 
 /** A normal of a face, not of unit length, pointing outwards. */

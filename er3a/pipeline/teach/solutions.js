@@ -17,9 +17,9 @@ function element(tag, className, text = "", parts = []) {
 }
 
 export class SolutionList {
-  /** `choose(q)` moves the arm; `ghost(q)` shows a pale one, null takes it away. */
-  constructor(data, arm, choose, ghost) {
-    Object.assign(this, { data, arm, choose, ghost });
+  /** `choose(q)` moves the arm; `ghost(q)` shows a pale one, null takes it away; `overlap(q)` says what collides. */
+  constructor(data, arm, choose, ghost, overlap) {
+    Object.assign(this, { data, arm, choose, ghost, overlap });
     byId("previous").addEventListener("click", () => this.#step(-1));
     byId("next").addEventListener("click", () => this.#step(1));
   }
@@ -39,8 +39,9 @@ export class SolutionList {
       if (fault) items.push(this.#missing(fault));
     }
     byId("branches").replaceChildren(...items);
-    const within = rows.filter((row) => row.withinLimits).length;
-    write(byId("count"), fill(words.count, { within, total: rows.length }));
+    const within = rows.filter((row) => row.withinLimits);
+    const colliding = within.filter((row) => row.overlap).length;
+    write(byId("count"), fill(colliding ? words.count_colliding : words.count, { within: within.length, total: rows.length, colliding }));
     write(byId("free"), free.map((kind) => words.free[kind]).join(" "));
     this.ghost(null);
     this.mark(q);
@@ -71,9 +72,12 @@ export class SolutionList {
   #branch(turns) {
     const { words, joint_names: names } = this.data;
     const [first, ...further] = turns;
+    const overlap = this.overlap(first.q); // whole turns change nothing
+    for (const row of turns) row.overlap = overlap;
     const joints = element("span", "row-joints", "", first.q.map((value, k) => element("span", "", fixed(shown(this.data.table, k, value)))));
     const verdict = element("span", first.withinLimits ? "row-verdict pass" : "row-verdict fail", this.#verdict(first));
-    const button = this.#button(first, [element("b", "", this.#label(first)), joints, verdict]);
+    const collision = overlap ? [element("span", "row-verdict fail", overlap)] : [];
+    const button = this.#button(first, [element("b", "", this.#label(first)), joints, verdict, ...collision]);
     const item = element("li", "branch", "", [button]);
     if (further.length) {
       const chips = further.map((row) => {

@@ -1,12 +1,11 @@
 /** The picture of the arm: what is drawn at given joint angles. */
 
-import { add, column, moved, norm, scaled, subtract, translation, turned } from "er3a/algebra";
+import { add, column, moved, norm, scaled, subtract, turned } from "er3a/algebra";
 import { frames, tableFrames } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
 import { eyeOf, Picture } from "er3a/scene";
 import { armSolids, drums, recoloured, sceneSolids } from "er3a/solids";
 
-const WORLD = translation(0, 0, 0);
 const TOUCHING = "#d1242f";
 const FRAME_COLOURS = ["#d62728", "#2ca02c", "#1f77b4"]; // of x, y, z
 
@@ -47,7 +46,7 @@ export class ArmView extends Orbit {
     picture.shadow(solids, poses, floor, page.grid);
     const touching = new Set(nearest?.touching ?? []);
     const [around, shown] = [this.surroundings, solids].map((things) => recoloured(things, touching, TOUCHING));
-    const groups = [{ solids: around, poses: [WORLD], ghost: false }, { solids: shown, poses, ghost: false }];
+    const groups = [...picture.around(around, poses), { solids: shown, poses, ghost: false }];
     if (ghost) groups.push({ solids, poses: this.#poses(ghost), ghost: true });
     picture.solids(groups);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);

@@ -8,7 +8,7 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import AbsentResults, Stored
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import head_of, render, run_command
-from er3a.pipeline.viewing.recording import escaped, log_note, note_view, recording
+from er3a.pipeline.viewing.recording import escaped, write_reason
 
 
 def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
@@ -25,5 +25,4 @@ def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> 
 
 def record_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
     """Write a recording that holds the reason alone."""
-    with recording(output, stored.robot, stored.stage, note_view(stored.stage)) as stream:
-        log_note(stream, stored.stage, escaped(say(stored.results.summary.verdict.finding)))
+    write_reason(output, stored.robot, stored.stage, escaped(say(stored.results.summary.verdict.finding)))

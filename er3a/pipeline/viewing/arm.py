@@ -1,65 +1,70 @@
-"""An arm drawn from its table: solid links, joints as drums on their axes, the tool frame.
+"""An arm and what stands around it, drawn for recordings: solid links, joints as drums on their axes, the tool frame.
 
-Entities below ``entity`` (``arm`` unless told otherwise): ``base``, ``link_1`` .. ``link_6`` (each turns with its
-joint) and ``tool``.
+Entities below ``entity`` (``arm`` by default): ``base``, ``link_1`` .. ``link_6`` (each turns with its joint) and
+``tool``. Bodies that collisions are measured with and solids of scenes are shapes of their own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+import scipy
 
+from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Solid, Sphere
+from er3a.collision.shapes import Body
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
-from er3a.pipeline.viewing.palette import BODY, JOINT_NAMES, LINK, rgb
+from er3a.numerics.arrays import Integers, Reals
+from er3a.pipeline.viewing.palette import BODY, JOINT_NAMES, LINK, legible, rgb
 from er3a.pipeline.viewing.palette import JOINTS as JOINT_COLOURS
-from er3a.pipeline.viewing.recording import seconds
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
+TIMELINE = "t"
+ARM = "/arm/**"
 LABEL = (200, 90, 0)  # of labels: about as legible on the viewer's dark ground as on its light one
 LABEL_AT = 0.6  # of the axis arrow: off the drum, and short of the next joint
+FARTHEST = 2.5  # of the arm's size from the base: what a view shows at most when it opens
+AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
+"""Colours of a frame's x, y and z."""
 _TAPER = (1.0, 0.92, 0.8, 0.66, 0.55, 0.45)
+_PLANE_THICKNESS = 0.002  # m
+
+Shape = rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D | rr.Capsules3D | rr.Mesh3D
+
+
+def seconds(times: Reals) -> rr.TimeColumn:
+    """A time column (s) for ``send_columns``."""
+    return rr.TimeColumn(TIMELINE, duration=np.asarray(times, dtype=float))
 
 
 def arm_view(
-    robot: Robot, name: str, contents: list[str], reach: float | None = None, centre: np.ndarray | None = None
+    robot: Robot, name: str, contents: Sequence[str] = (ARM,), points: Sequence[Reals] = ()
 ) -> rrb.Spatial3DView:
-    """A 3-D view that opens with the whole arm in sight.
+    """A 3-D view that opens with the arm in sight, and with points.
 
     Parameters
     ----------
     contents : entity path expressions
-    reach : radius (m) of what must be in sight, the arm's own size unless told otherwise
-    centre : (3,), m, of what must be in sight, somewhat above the base unless told otherwise
+    points : several arrays (N, 3), m; of those too far away for the arm to be seen beside them, the direction
     """
-    radius = reach or size_of(robot)
-    if centre is None:
-        centre = robot.base[:3, 3] + robot.base[:3, 2] * 0.25 * radius
-    eye = rrb.EyeControls3D(
-        kind="Orbital",
-        position=centre + np.array([0.5, -1.15, 0.45]) * radius,
-        look_target=centre,
-        eye_up=[0, 0, 1],
-    )
-    return rrb.Spatial3DView(origin="/", contents=contents, name=name, eye_controls=eye)
-
-
-def view_of(robot: Robot, name: str, contents: list[str], points: Sequence[np.ndarray]) -> rrb.Spatial3DView:
-    """A 3-D view that opens with the arm and points, several arrays (N, 3), m, in sight."""
-    placed = np.concatenate(points)
+    size, base = size_of(robot), robot.base[:3, 3]
+    placed = np.concatenate([*points, skeleton(robot, np.clip(0.0, robot.lower, robot.upper))])
+    placed = np.clip(placed[np.isfinite(placed).all(axis=1)] - base, -FARTHEST * size, FARTHEST * size) + base
     centre = (placed.min(axis=0) + placed.max(axis=0)) / 2
-    distance = 0.85 * max(float(np.linalg.norm(np.ptp(placed, axis=0))), 2 * size_of(robot))
+    distance = 1.2 * max(float(np.ptp(placed, axis=0).max()), 1.1 * size)
     eye = rrb.EyeControls3D(
         kind="Orbital",
-        position=centre + distance * np.array([0.6, -0.7, 0.35]),
+        position=centre + distance * np.array([0.5, -0.8, 0.35]),
         look_target=centre,
         eye_up=[0, 0, 1],
     )
-    return rrb.Spatial3DView(origin="/", contents=contents, name=name, eye_controls=eye)
+    return rrb.Spatial3DView(origin="/", contents=list(contents), name=name, eye_controls=eye)
 
 
 def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str = "arm", ghost: bool = False) -> None:
@@ -93,7 +98,7 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
             tip = rr.Points3D(
                 [along / 2 + LABEL_AT * arrow],
                 radii=[size * 0.1],
-                colors=[LABEL],
+                colors=[legible(JOINT_COLOURS[k])],
                 labels=[JOINT_NAMES[k]],
                 show_labels=True,
             )
@@ -167,3 +172,64 @@ def capsules(
         colors=[colour] * len(lengths),
         fill_mode="solid" if solid else "transparentfillmajorwireframe",
     )
+
+
+def body_shape(body: Body, colour: tuple[int, ...], solid: bool = False) -> Shape:
+    """A body of an arm, as a child of its link; ``colour`` with alpha."""
+    if len(body.points) == 1:
+        return rr.Ellipsoids3D(centers=body.points, radii=[body.radius], colors=[colour])
+    if len(body.points) == 2:
+        return capsules(body.points[:1], np.diff(body.points, axis=0), body.radius, colour, solid)
+    return pieces_mesh([body.points], colour)
+
+
+def solid_shapes(
+    solids: Sequence[Solid], robot: Robot, colour: tuple[int, ...], solid: bool = False
+) -> Iterator[tuple[str, rr.Transform3D, Shape]]:
+    """Name, place and shape of solids; of planes a square near the base."""
+    fill: Any = "solid" if solid else "transparentfillmajorwireframe"
+    style: dict[str, Any] = {"colors": [colour], "fill_mode": fill}
+    size = 3 * size_of(robot)
+    for each in solids:
+        T = _below(each, robot.base[:3, 3]) if isinstance(each, Plane) else each.T
+        shape: Shape
+        match each:
+            case Box():
+                shape = rr.Boxes3D(sizes=[each.size], **style)
+            case Cylinder():
+                shape = rr.Cylinders3D(lengths=[each.length], radii=[each.radius], **style)
+            case Sphere():
+                shape = rr.Ellipsoids3D(radii=[each.radius], **style)
+            case Mesh():
+                shape = pieces_mesh(each.pieces, colour)
+            case Plane():
+                shape = rr.Boxes3D(sizes=[[size, size, _PLANE_THICKNESS]], **style)
+        yield each.name, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]), shape
+
+
+def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
+    """Convex pieces (k, 3) each, m, as one mesh."""
+    hulls = [scipy.spatial.ConvexHull(piece) for piece in pieces]
+    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
+    triangles = [start + _outward(hull) for start, hull in zip(starts, hulls)]
+    return rr.Mesh3D(
+        vertex_positions=np.concatenate(pieces), triangle_indices=np.concatenate(triangles), albedo_factor=colour
+    )
+
+
+def _outward(hull: scipy.spatial.ConvexHull) -> Integers:
+    """A hull's triangles with their corners in order around the outward normal."""
+    corners = hull.points[hull.simplices]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("ij,ij->i", normal, hull.equations[:, :3]) < 0
+    return np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+
+
+def _below(plane: Plane, base: Reals) -> Reals:
+    """Where a slab lies whose upper side is in the plane, its middle next to the base."""
+    normal = plane.normal
+    x = np.linalg.svd(normal[None])[2][1]
+    T = np.eye(4)
+    T[:3, :3] = np.stack([x, np.cross(normal, x), normal], axis=1)
+    T[:3, 3] = base - (normal @ base - plane.offset + _PLANE_THICKNESS / 2) * normal
+    return T

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 from matplotlib import colormaps
 
 from er3a.calibration.calibrate import Calibration, JointShare, TermEstimate, joint_shares
@@ -29,22 +28,11 @@ from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
-from er3a.pipeline.viewing.arm import log_arm, send_motion, view_of
 from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, ShownFigure
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINTS, MODEL, MUTED, REFERENCE
-from er3a.pipeline.viewing.recording import (
-    ARM,
-    curves_view,
-    escaped,
-    log_note,
-    recording,
-    seconds,
-    send_run,
-    words_view,
-)
-from er3a.pipeline.viewing.skeleton import skeleton
+from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, write_recording
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
@@ -319,48 +307,44 @@ def record_calibration(found: Calibration, errors: MeasuredErrors, output: Path)
     """Write the recording of a calibration: one pose after the other as in the file (400 of them at most), all points
     coloured by their errors, and the errors as curves."""
     robot, models = found.robot, list(errors.differences_mm)
-    points = errors.xyz_mm / 1000
-    seen = [points, skeleton(robot, meant(robot, errors.q[0]))]
-    layout = rrb.Horizontal(
-        view_of(robot, "Before", [ARM, "/calibration/before/**"], seen),
-        view_of(robot, "After", [ARM, "/calibration/after/**"], seen),
-        rrb.Vertical(curves_view("/calibration/curves", "Error (mm)", legend=True), words_view(STAGE, "This pose")),
-        column_shares=[2, 2, 1],
+    rows = np.unique(np.linspace(0, len(errors.q) - 1, min(len(errors.q), MOST_SHOWN)).round().astype(int))
+    times, texts = SECONDS_A_POSE * np.arange(len(rows), dtype=float), [_now(errors, int(k)) for k in rows]
+    distances = np.stack([errors.distances_mm(model)[rows] for model in models], axis=1)
+    run = Run(
+        name="measured poses",
+        text=texts[0],
+        t=times,
+        q=meant(robot, errors.q[rows]),
+        curves={"errors": distances},
+        texts=list(zip(times.tolist(), texts)),
     )
-    shown = np.unique(np.linspace(0, len(points) - 1, min(len(points), MOST_SHOWN)).round().astype(int))
-    times = SECONDS_A_POSE * np.arange(len(shown))
-    with recording(output, robot.name, STAGE, layout) as stream:
-        log_note(stream, STAGE, _note(found, errors))
-        joints = meant(robot, errors.q[shown])
-        log_arm(stream, robot, joints[0])
-        send_motion(stream, robot, times, joints)
-        for name, model in (("before", "before"), ("after", errors.after)):
-            _log_errors(stream, f"{STAGE}/{name}", points, errors, model, size_of(robot))
-        distances = np.stack([errors.distances_mm(model)[shown] for model in models], axis=1)
-        names = [NAMES[model] for model in models]
-        send_run(stream, f"{STAGE}/curves", times, distances, names, [COLOURS[model] for model in models])
-        texts = [_now(errors, int(k)) for k in shown]
-        stream.send_columns(
-            f"{STAGE}/now",
-            [seconds(times)],
-            rr.TextDocument.columns(text=texts, media_type=[rr.MediaType.MARKDOWN] * len(texts)),
-        )
+    names, colours = [NAMES[model] for model in models], [COLOURS[model] for model in models]
+    shown = Recorded(
+        robot=robot,
+        name=robot.name,
+        stage=STAGE,
+        note=_note(found, errors),
+        runs=[run],
+        curves=[Curves("errors", "Error (mm)", names, colours)],
+        views={"Before": ["before/**"], "After": ["after/**"]},
+        shapes=_error_arrows("before", errors, "before", size_of(robot))
+        | _error_arrows("after", errors, errors.after, size_of(robot)),
+        points=[errors.xyz_mm / 1000],
+        now="This pose",
+    )
+    write_recording(shown, output)
 
 
-def _log_errors(
-    stream: rr.RecordingStream, entity: str, points: Reals, errors: MeasuredErrors, model: str, size: float
-) -> None:
+def _error_arrows(entity: str, errors: MeasuredErrors, model: str, size: float) -> dict[str, Logged]:
     """Points coloured from none to the greatest error, and arrows from the measured to the modelled point."""
-    distance = errors.distances_mm(model)
+    distance, points = errors.distances_mm(model), errors.xyz_mm / 1000
     greatest = float(distance.max()) or 1.0
     colours = (255 * colormaps["viridis"](distance / greatest)[:, :3]).astype(np.uint8)
     arrows = np.nan_to_num(errors.differences_mm[model]) * ARROW * size / greatest
-    stream.log(f"{entity}/points", rr.Points3D(points, radii=0.004 * size, colors=colours), static=True)
-    stream.log(
-        f"{entity}/errors",
-        rr.Arrows3D(origins=points - arrows, vectors=arrows, radii=0.0012 * size, colors=colours),
-        static=True,
-    )
+    return {
+        f"{entity}/points": rr.Points3D(points, radii=0.004 * size, colors=colours),
+        f"{entity}/errors": rr.Arrows3D(origins=points - arrows, vectors=arrows, radii=0.0012 * size, colors=colours),
+    }
 
 
 def _note(found: Calibration, errors: MeasuredErrors) -> str:

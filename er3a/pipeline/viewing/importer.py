@@ -52,7 +52,7 @@ def main(words: Sequence[str] | None = None) -> int:
         q[joint, :, joint] = robot.lower[joint] + shares * (robot.upper - robot.lower)[joint]
     with rr.RecordingStream(asked.application_id or robot.name, recording_id=asked.recording_id) as stream:
         stream.stdout()
-        stream.send_blueprint(rr.blueprint.Blueprint(arm_view(robot, robot.name, ["/arm/**"])))
+        stream.send_blueprint(rr.blueprint.Blueprint(arm_view(robot, robot.name)))
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         log_arm(stream, robot, home)
         times = np.linspace(0, SECONDS * robot.joints, q.shape[0] * q.shape[1])

@@ -9,6 +9,7 @@ Safe for colour-blind readers and different from the joints' colours: P. Tol, "C
 
 from __future__ import annotations
 
+_BETWEEN_GROUNDS = 0.19  # luminance: (1.05 / (L + 0.05)) = (L + 0.05) / (0.005 + 0.05), nearly
 SIX_JOINTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
 JOINTS = (*SIX_JOINTS, "#7b4fa3", "#4d4d4d", "#a05a2c", "#80b918")
 JOINT_NAMES = tuple(f"J{k}" for k in range(1, len(JOINTS) + 1))
@@ -35,6 +36,18 @@ VERDICTS = {
 def rgb(colour: str) -> tuple[int, int, int]:
     """Red, green and blue (0..255) of a ``#rrggbb`` colour."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def legible(colour: str) -> tuple[int, int, int]:
+    """A colour of the same hue that can be read on the viewer's dark ground as well as on its light one.
+
+    Its relative luminance (WCAG 2) is scaled to where the contrast with both grounds is the same.
+    """
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (part / 255 for part in rgb(colour))]
+    luminance = sum(weight * c for weight, c in zip((0.2126, 0.7152, 0.0722), linear))
+    scaled = [min(1.0, c * _BETWEEN_GROUNDS / luminance) for c in linear]
+    red, green, blue = (round(255 * (12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055)) for c in scaled)
+    return red, green, blue
 
 
 SHAPE_COLOURS = ("#4477aa", "#ccbb44", "#228833", "#66ccee")

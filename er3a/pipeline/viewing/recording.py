@@ -1,37 +1,161 @@
-"""Rerun recordings: opened arranged, written whole or not at all."""
+"""Rerun recordings: an arm and what stands around it, what it does one run after the other, with curves and events.
+
+A stage hands over data; this module lays out the views, times the runs, and writes the file whole or not at all.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-import scipy
 
-from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
+from er3a.collision.scene import Scene
+from er3a.collision.shapes import arm_bodies
 from er3a.files.kept_files import write_atomically
-from er3a.files.scene_file import load_scene
-from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.palette import MUTED, rgb
+from er3a.numerics.arrays import Flags, Reals
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
+from er3a.pipeline.viewing.arm import ARM, TIMELINE, arm_view, body_shape, log_arm, seconds, send_motion, solid_shapes
+from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, LINK, MUTED, VERDICTS, legible, rgb
+from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import size_of
+from er3a.robots.robot import Robot
 
-TIMELINE = "t"
-ARM = "/arm/**"
+PAUSE_S = 1.0  # between two runs
 SHOWN_S = rr.TimeRange(
     start=rr.TimeRangeBoundary.cursor_relative(seconds=-4), end=rr.TimeRangeBoundary.cursor_relative(seconds=12)
 )
-AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
-"""Colours of a frame's x, y and z."""
+IN_SIGHT = 60  # poses that the view holds when it opens
+SCENE_ALPHA, TOUCHING_ALPHA = 120, 170
+BRIEFLY_S = 1e-3  # by which two events at one time stand apart
+LEVELS: dict[Weight, rr.TextLogLevel] = {
+    "plain": rr.TextLogLevel.INFO,
+    "caution": rr.TextLogLevel.WARN,
+    "fail": rr.TextLogLevel.ERROR,
+}
+GONE = rr.Clear(recursive=False)
+Logged = rr.AsComponents | Sequence[rr.AsComponents]
+
+
+@dataclass(frozen=True)
+class Curves:
+    """A panel of curves over time.
+
+    Attributes
+    ----------
+    entity : below ``<stage>/curves``
+    title : with the unit
+    names, colours : of each curve; the joints' by default
+    whole : show all of the time, not some seconds around the moment
+    """
+
+    entity: str
+    title: str
+    names: Sequence[str] = JOINT_NAMES
+    colours: Sequence[str] = JOINTS
+    whole: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Run(PlayedMotion):
+    """What the arm does in one go; its times begin at 0, and where ``q`` is NaN it stays as it is.
+
+    ``text`` is Markdown, shown from the start on. Entities stand below the stage, with a leading ``/``
+    below the root.
+
+    Attributes
+    ----------
+    outcome, status : how it ends, in words; logged as its first event, and listed in the note
+    curves : by the entity of a panel: (N, k), a row with NaN is a gap in all its curves
+    columns : by entity what Rerun's ``columns`` make of N values, one for each time
+    shapes : (s, entity, what is to be seen there from then on); gone when the next run starts
+    texts : (s, Markdown) that takes the place of ``text``
+    pause_s : until the next run
+    """
+
+    outcome: str = ""
+    status: Weight = "plain"
+    curves: Mapping[str, Reals] = field(default_factory=dict)
+    columns: Mapping[str, Any] = field(default_factory=dict)
+    shapes: Sequence[tuple[float, str, Logged]] = ()
+    texts: Sequence[tuple[float, str]] = ()
+    pause_s: float = PAUSE_S
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """What a recording holds.
+
+    Attributes
+    ----------
+    robot, name, stage : the arm, its name and the stage's, which name the recording: application ``<stage> <name>``
+    note : Markdown that says what to look at
+    home : (n,), where the arm stands if no run moves it
+    views : by title, the entities below the stage that a 3-D view shows beside the arm; all in one by default
+    shapes : by entity, what is to be seen all the time
+    points : arrays (N, 3), m, to be in sight when the views open, besides the arm
+    ghost : a further arm, see-through, that moves along; at ``<stage>/corrected``
+    now : title of the text on what is shown now
+    """
+
+    robot: Robot
+    name: str
+    stage: str
+    note: str
+    runs: Sequence[Run] = ()
+    curves: Sequence[Curves] = ()
+    scene: Scene | None = None
+    home: Reals | None = None
+    views: Mapping[str, Sequence[str]] = field(default_factory=lambda: {"Arm": ("**",)})
+    shapes: Mapping[str, Logged] = field(default_factory=dict)
+    points: Sequence[Reals] = ()
+    ghost: Robot | None = None
+    now: str = "Now"
+
+
+def write_recording(shown: Recorded, output: Path) -> None:
+    """Write a recording of a stage; it opens at the start of the first run."""
+    robot, stage = shown.robot, shown.stage
+    starts = np.cumsum([0.0, *(_end(run) + run.pause_s for run in shown.runs)]).tolist()
+    title = f"{robot.title}: {stage}"
+    first = (0.0, _end(shown.runs[0])) if shown.runs else None
+    with recording(output, shown.name, stage, _layout(shown), title, first) as stream:
+        _log_text(stream, f"{stage}/note", shown.note + _timetable(shown.runs, starts))
+        q = np.concatenate([run.q for run in shown.runs] or [np.empty((0, robot.joints))])
+        known = q[np.isfinite(q).all(axis=1)]
+        home = shown.home if shown.home is not None else np.zeros(robot.joints)
+        log_arm(stream, robot, known[0] if len(known) else home)
+        if shown.ghost is not None:
+            log_arm(stream, shown.ghost, home, f"{stage}/corrected", ghost=True)
+        _log_scene(stream, shown)
+        for entity, shape in shown.shapes.items():
+            _log(stream, stage, entity, shape, static=True)
+        for curves in _panels(shown):
+            count = max(
+                (run.curves[curves.entity].shape[1] for run in shown.runs if curves.entity in run.curves), default=0
+            )
+            lines = rr.SeriesLines(names=curves.names[:count], colors=[rgb(each) for each in curves.colours[:count]])
+            stream.log(f"{stage}/curves/{curves.entity}", lines, static=True)
+        before: set[str] = set()
+        for run, start in zip(shown.runs, starts):
+            before = _log_run(stream, shown, run, start, before)
 
 
 @contextmanager
-def recording(output: Path, robot: str, stage: str, layout: rrb.View | rrb.Container) -> Iterator[rr.RecordingStream]:
+def recording(
+    output: Path,
+    robot: str,
+    stage: str,
+    layout: rrb.View | rrb.Container,
+    title: str | None = None,
+    first_s: tuple[float, float] | None = None,
+) -> Iterator[rr.RecordingStream]:
     """Open a recording for logging; ``output`` appears when the block ends without an error.
 
     Viewers keep one blueprint for each application id, so every stage of every robot is an application of its own:
@@ -41,11 +165,19 @@ def recording(output: Path, robot: str, stage: str, layout: rrb.View | rrb.Conta
     ----------
     robot, stage : name the recording: application ``<stage> <robot>``, recording ``<robot>``
     layout : what the blueprint shows
+    title : what the viewer calls the recording in its list of sources
+    first_s : the stretch of time that is selected when it opens
     """
     rr.set_strict_mode(True)
+    nanoseconds = None if first_s is None else [round(1e9 * t) for t in first_s]
     blueprint = rrb.Blueprint(
         layout,
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="paused"),
+        rrb.TimePanel(
+            timeline=TIMELINE,
+            state="collapsed",
+            play_state="paused",
+            time_selection=None if nanoseconds is None else rrb.components.AbsoluteTimeRange(*nanoseconds),
+        ),
         rrb.SelectionPanel(state="hidden"),
         rrb.BlueprintPanel(state="expanded"),
         auto_views=False,
@@ -60,6 +192,8 @@ def recording(output: Path, robot: str, stage: str, layout: rrb.View | rrb.Conta
         # The viewer in a browser shows a blueprint only if it is active, not if it is merely the default.
         stream.send_blueprint(blueprint, make_active=True, make_default=True)
         stream.set_log_time_enabled(False)
+        if title:
+            stream.send_recording_name(title)
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         yield stream
         content = collected.read(flush=True)
@@ -67,53 +201,10 @@ def recording(output: Path, robot: str, stage: str, layout: rrb.View | rrb.Conta
     write_atomically(output, lambda file: file.write_bytes(content))
 
 
-def log_text(stream: rr.RecordingStream, entity: str, markdown: str, static: bool = False) -> None:
-    """Log a text."""
-    stream.log(entity, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN), static=static)
-
-
-def log_note(stream: rr.RecordingStream, stage: str, markdown: str) -> None:
-    """Log the text that says what to look at, ``/<stage>/note``."""
-    log_text(stream, f"{stage}/note", markdown, static=True)
-
-
-def log_now(stream: rr.RecordingStream, stage: str, t: float, markdown: str) -> None:
-    """Log what is to be seen from a time (s) on, ``/<stage>/now``."""
-    stream.set_time(TIMELINE, duration=t)
-    log_text(stream, f"{stage}/now", markdown)
-
-
-def log_event(stream: rr.RecordingStream, stage: str, t: float, text: str, level: rr.TextLogLevel) -> None:
-    """Log an event at a time (s), ``/<stage>/events``."""
-    stream.set_time(TIMELINE, duration=t)
-    stream.log(f"{stage}/events", rr.TextLog(text, level=level))
-
-
-def note_view(stage: str) -> rrb.View:
-    """The view of a stage's note."""
-    return rrb.TextDocumentView(origin=f"/{stage}/note", name="What to look at")
-
-
-def words_view(
-    stage: str, now: str, *more: rrb.View, row_shares: Sequence[float] | None = None, name: str = "Words"
-) -> rrb.Vertical:
-    """A stage's note, below it what is to be seen now, under that name, and more views."""
-    shown = rrb.TextDocumentView(origin=f"/{stage}/now", name=now)
-    return rrb.Vertical(note_view(stage), shown, *more, row_shares=row_shares, name=name)
-
-
-def curves_view(origin: str, name: str, legend: bool | None = None) -> rrb.View:
-    """A view of curves, some seconds around the time shown."""
-    shown = None if legend is None else rrb.PlotLegend(visible=legend)
-    return rrb.TimeSeriesView(origin=origin, name=name, axis_x=rrb.TimeAxis(view_range=SHOWN_S), plot_legend=shown)
-
-
-def events_view(stage: str, name: str) -> rrb.View:
-    """The view of what is logged at ``/<stage>/events``; texts tell the time themselves, in words."""
-    columns = rrb.TextLogColumns(
-        timeline_columns=rrb.encodings.TimelineColumn(TIMELINE, visible=False), text_log_columns=["loglevel", "body"]
-    )
-    return rrb.TextLogView(origin=f"/{stage}/events", name=name, columns=columns)
+def write_reason(output: Path, name: str, stage: str, markdown: str) -> None:
+    """Write the recording of a stage that was not computed: a text alone."""
+    with recording(output, name, stage, _note_view(stage)) as stream:
+        _log_text(stream, f"{stage}/note", markdown)
 
 
 def escaped(text: str) -> str:
@@ -121,96 +212,166 @@ def escaped(text: str) -> str:
     return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
 
 
-def seconds(times: np.ndarray) -> rr.TimeColumn:
-    """A time column (s) for ``send_columns``."""
-    return rr.TimeColumn(TIMELINE, duration=np.asarray(times, dtype=float))
+def _end(run: Run) -> float:
+    return float(run.t[-1]) if len(run.t) else 0.0
 
 
-def send_series(
-    stream: rr.RecordingStream, entity: str, times: np.ndarray, values: np.ndarray, names: list[str], colours: list[str]
-) -> None:
-    """Log curves as one entity.
-
-    Parameters
-    ----------
-    times : (N,), s
-    values : (N, k); a row with NaN is a gap in all curves (NaN itself would never compare equal between recordings)
-    names, colours : k of each
-    """
-    stream.log(entity, rr.SeriesLines(names=names, colors=[rgb(colour) for colour in colours]), static=True)
-    times, known = np.asarray(times, dtype=float), np.isfinite(values).all(axis=1)
-    stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=np.asarray(values)[known]))
-    gap_starts = times[~known & np.append(True, known[:-1])]
-    cleared = rr.Clear.columns(is_recursive=np.zeros(len(gap_starts), dtype=bool))  # type: ignore[arg-type]
-    stream.send_columns(entity, [seconds(gap_starts)], cleared)
+def _panels(shown: Recorded) -> list[Curves]:
+    """The panels that some run has curves for."""
+    return [each for each in shown.curves if any(each.entity in run.curves for run in shown.runs)]
 
 
-def send_run(
-    stream: rr.RecordingStream, entity: str, times: np.ndarray, values: np.ndarray, names: list[str], colours: list[str]
-) -> None:
-    """As :func:`send_series`, with a gap behind the last point, so that the next run's curves don't join these."""
-    gap = np.full((1, values.shape[1]), np.nan)
-    send_series(stream, entity, np.append(times, times[-1] + 1e-3), np.concatenate([values, gap]), names, colours)
-
-
-_PLANE_THICKNESS = 0.002  # m
-
-
-def log_scene(stream: rr.RecordingStream, study: Study, name: str, stage: str, below: str | None = None) -> None:
-    """Log the solids of a robot's scene in a stage, each an entity below it (or ``below``); of planes the near part."""
-    file = study.scene(name, stage)
-    if file is None:
-        return
-    robot = study.robot(name)
-    for solid, T, shape in _solids(load_scene(file), robot.base[:3, 3], 3 * size_of(robot)):
-        place = rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3])
-        stream.log(f"{below or stage}/scene/{solid}", place, shape, static=True)
-
-
-def _solids(
-    scene: Scene, base: Reals, plane_size: float
-) -> Iterator[tuple[str, Reals, rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D | rr.Mesh3D]]:
-    """Name, place (4, 4) and shape of each solid; planes are squares of ``plane_size`` (m) nearest to the base (3,)."""
-    style: dict[str, Any] = {"colors": [(*rgb(MUTED), 120)], "fill_mode": "transparentfillmajorwireframe"}
-    for solid in scene.solids:
-        match solid:
-            case Box():
-                yield solid.name, solid.T, rr.Boxes3D(sizes=[solid.size], **style)
-            case Cylinder():
-                shape = rr.Cylinders3D(lengths=[solid.length], radii=[solid.radius], **style)
-                yield solid.name, solid.T, shape
-            case Sphere():
-                yield solid.name, solid.T, rr.Ellipsoids3D(radii=[solid.radius], **style)
-            case Mesh():
-                yield solid.name, solid.T, pieces_mesh(solid.pieces, (*rgb(MUTED), 120))
-            case Plane():
-                slab = rr.Boxes3D(sizes=[[plane_size, plane_size, _PLANE_THICKNESS]], **style)
-                yield solid.name, _below(solid, base), slab
-
-
-def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
-    """Convex pieces (k, 3) each, m, as one mesh."""
-    hulls = [scipy.spatial.ConvexHull(piece) for piece in pieces]
-    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
-    triangles = [start + _outward(hull) for start, hull in zip(starts, hulls)]
-    return rr.Mesh3D(
-        vertex_positions=np.concatenate(pieces), triangle_indices=np.concatenate(triangles), albedo_factor=colour
+def _layout(shown: Recorded) -> rrb.Container:
+    """The views of space, the curves, and the words: the note, what is shown now, and the events."""
+    robot, stage, runs = shown.robot, shown.stage, shown.runs
+    q = np.concatenate([run.q for run in runs] or [np.empty((0, robot.joints))])
+    q = q[np.isfinite(q).all(axis=1)]
+    poses = q[np.unique(np.linspace(0, len(q) - 1, IN_SIGHT).astype(int))] if len(q) else q
+    points = [*shown.points, *(skeleton(robot, joints) for joints in poses)]
+    views = [
+        arm_view(robot, title, [ARM, *(f"/{stage}/{entity}" for entity in entities)], points)
+        for title, entities in shown.views.items()
+    ]
+    curves = [
+        rrb.TimeSeriesView(
+            origin=f"/{stage}/curves/{each.entity}",
+            name=each.title,
+            axis_x=None if each.whole else rrb.TimeAxis(view_range=SHOWN_S),
+            plot_legend=rrb.PlotLegend(visible=k == 0),
+        )
+        for k, each in enumerate(_panels(shown))
+    ]
+    words: list[rrb.View] = [_note_view(stage)]
+    if runs:
+        words.append(rrb.TextDocumentView(origin=f"/{stage}/now", name=shown.now))
+    if any(run.events or run.outcome for run in runs):
+        columns = rrb.TextLogColumns(
+            timeline_columns=rrb.encodings.TimelineColumn(TIMELINE, visible=False),
+            text_log_columns=["loglevel", "body"],
+        )
+        words.append(rrb.TextLogView(origin=f"/{stage}/events", name="Events", columns=columns))
+    texts = rrb.Vertical(*words, name="Words")
+    if len(views) > 2:
+        return rrb.Grid(*views, texts, grid_columns=2, name=stage)
+    left = views[0] if len(views) == 1 else rrb.Horizontal(*views)
+    if len(curves) > 1:
+        shares = [2.0 * len(views), 1.0, 1.3]
+        return rrb.Horizontal(left, rrb.Vertical(*curves, name="Curves"), texts, column_shares=shares, name=stage)
+    return rrb.Horizontal(
+        left, rrb.Vertical(*curves, *words, name="Words"), column_shares=[2.0 * len(views), 1.3], name=stage
     )
 
 
-def _outward(hull: scipy.spatial.ConvexHull) -> Integers:
-    """A hull's triangles with their corners in order around the outward normal."""
-    corners = hull.points[hull.simplices]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("ij,ij->i", normal, hull.equations[:, :3]) < 0
-    return np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+def _note_view(stage: str) -> rrb.View:
+    return rrb.TextDocumentView(origin=f"/{stage}/note", name="What to look at")
 
 
-def _below(plane: Plane, base: Reals) -> Reals:
-    """Where a slab lies whose upper side is in the plane, its middle next to the base."""
-    normal = plane.normal
-    x = np.linalg.svd(normal[None])[2][1]
-    T = np.eye(4)
-    T[:3, :3] = np.stack([x, np.cross(normal, x), normal], axis=1)
-    T[:3, 3] = base - (normal @ base - plane.offset + _PLANE_THICKNESS / 2) * normal
-    return T
+def _timetable(runs: Sequence[Run], starts: Sequence[float]) -> str:
+    """When each run starts and how it ends, of those that end somehow."""
+    rows = [f"| {start:.0f} s | {run.name} | {run.outcome} |" for run, start in zip(runs, starts) if run.outcome]
+    return "\n".join(["\n\n| from | run | outcome |", "|---|---|---|", *rows]) if rows else ""
+
+
+def _log_text(stream: rr.RecordingStream, entity: str, markdown: str) -> None:
+    stream.log(entity, rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def _log(stream: rr.RecordingStream, stage: str, entity: str, shape: Logged, static: bool = False) -> None:
+    shapes = shape if isinstance(shape, Sequence) else [shape]
+    stream.log(entity[1:] if entity.startswith("/") else f"{stage}/{entity}", *shapes, static=static)
+
+
+def _log_scene(stream: rr.RecordingStream, shown: Recorded) -> None:
+    """The solids, each an entity, and what the tool carries."""
+    if shown.scene is None:
+        return
+    groups = (shown.scene.solids, f"{shown.stage}/scene", MUTED), (shown.scene.carried, "arm/tool/carried", LINK)
+    for solids, below, colour in groups:
+        for name, place, shape in solid_shapes(solids, shown.robot, (*rgb(colour), SCENE_ALPHA)):
+            stream.log(f"{below}/{name}", place, shape, static=True)
+
+
+def _log_run(stream: rr.RecordingStream, shown: Recorded, run: Run, start: float, before: set[str]) -> set[str]:
+    """Log a run; returns the entities of its shapes, which go when the next one starts, as those ``before`` go now."""
+    stage, times, known = shown.stage, start + run.t, np.isfinite(run.q).all(axis=1)
+    if known.any():
+        for robot, entity in ((shown.robot, "arm"), (shown.ghost, f"{stage}/corrected")):
+            if robot is not None:
+                send_motion(stream, robot, times[known], run.q[known], entity)
+    for entity, columns in run.columns.items():
+        stream.send_columns(entity[1:] if entity.startswith("/") else f"{stage}/{entity}", [seconds(times)], columns)
+    for entity, values in run.curves.items():
+        _send_curves(stream, f"{stage}/curves/{entity}", times, values)
+    _send_texts(stream, f"{stage}/now", start, [(0.0, run.text), *run.texts])
+    _send_events(stream, f"{stage}/events", run, start)
+    marks = _marks(run.marks, size_of(shown.robot))
+    shapes = [*run.shapes, *marks, *_touching(shown, run.events)]
+    at_once = {entity for t, entity, _ in shapes if t == 0}
+    for t, entity, shape in [*((0.0, entity, GONE) for entity in sorted(before - at_once)), *shapes]:
+        stream.set_time(TIMELINE, duration=start + t)
+        _log(stream, stage, entity, shape)
+    return {entity for _, entity, _ in shapes}
+
+
+def _send_curves(stream: rr.RecordingStream, entity: str, times: Reals, values: Reals) -> None:
+    """Curves, with a gap behind the last point, so that the next run's don't join them."""
+    known: Flags = np.asarray(np.isfinite(values).all(axis=1))
+    stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=values[known]))
+    gaps = times[~known & np.append(True, known[:-1])]
+    if known[-1]:
+        gaps = np.append(gaps, times[-1] + BRIEFLY_S)
+    cleared = rr.Clear.columns(is_recursive=np.zeros(len(gaps), dtype=bool))  # type: ignore[arg-type]
+    stream.send_columns(entity, [seconds(gaps)], cleared)
+
+
+def _send_texts(stream: rr.RecordingStream, entity: str, start: float, texts: Sequence[tuple[float, str]]) -> None:
+    last = dict(texts)  # of several at one time
+    columns = rr.TextDocument.columns(text=list(last.values()), media_type=[rr.MediaType.MARKDOWN] * len(last))
+    stream.send_columns(entity, [seconds(start + np.array(list(last)))], columns)
+
+
+def _send_events(stream: rr.RecordingStream, entity: str, run: Run, start: float) -> None:
+    """The run's outcome, then its events, each with its time here and on the run's own clock."""
+    rows: list[tuple[float, str, Weight]] = (
+        [(0.0, f"{start:.3f} s: {run.name}: {run.outcome}", run.status)] if run.outcome else []
+    )
+    for each in sorted(run.events, key=lambda each: each.t):
+        rows.append((each.t, f"{start + each.t:.3f} s: {each.text} ({each.t:.3f} s into it)", each.status))
+    if rows:
+        columns = rr.TextLog.columns(
+            text=[text for _, text, _ in rows],
+            level=[str(LEVELS[status]) for _, _, status in rows],
+            color=[legible(VERDICTS["pass" if status == "plain" else status]) for _, _, status in rows],
+        )
+        stream.send_columns(entity, [seconds(start + np.array([t for t, _, _ in rows]))], columns)
+
+
+def _marks(marks: Sequence[Mark], size: float) -> Iterator[tuple[float, str, Logged]]:
+    """Each mark from its time until it goes or the next comes: a line with its word, or a ball where it is a point."""
+    colour = rgb(HIGHLIGHT)
+    for mark, then in zip(marks, [*(mark.t0 for mark in marks[1:]), np.inf]):
+        strip = rr.LineStrips3D([[mark.start, mark.end]], radii=0.006 * size, colors=colour, labels=[mark.text])
+        ball = rr.Points3D([mark.start], radii=0.015 * size, colors=colour, labels=[mark.text], show_labels=True)
+        yield mark.t0, "nearest", ball if mark.start == mark.end else strip
+        if mark.t1 < then:
+            yield max(mark.t1, mark.t0 + BRIEFLY_S), "nearest", GONE
+
+
+def _touching(shown: Recorded, events: Sequence[PlayedEvent]) -> Iterator[tuple[float, str, Logged]]:
+    """Red, from when they touch until they part: bodies of the arm and solids, as they were measured."""
+    red = (*rgb(VERDICTS["fail"]), TOUCHING_ALPHA)
+    shapes: dict[str, list[tuple[str, Logged]]] = {}
+    for number, body in enumerate(arm_bodies(shown.robot)):
+        entity = f"/arm/{body.name}/touching/{number}"
+        shapes.setdefault(body.name, []).append((entity, body_shape(body, red, solid=True)))
+    if shown.scene is not None:
+        for solids, below in ((shown.scene.solids, "scene"), (shown.scene.carried, "/arm/tool/carried")):
+            for name, _, shape in solid_shapes(solids, shown.robot, red, solid=True):
+                shapes.setdefault(name, []).append((f"{below}/{name}/touching", shape))
+    spans = [(each.t, max(each.until, each.t + BRIEFLY_S), set(each.bodies)) for each in events if each.bodies]
+    before: set[str] = set()
+    for t in sorted({t for t0, t1, _ in spans for t in (t0, t1)}):
+        now = set().union(*(bodies for t0, t1, bodies in spans if t0 <= t < t1))
+        for name in sorted(now ^ before):
+            yield from ((t, entity, shape if name in now else GONE) for entity, shape in shapes.get(name, ()))
+        before = now

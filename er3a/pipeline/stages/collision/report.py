@@ -15,7 +15,7 @@ from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, say
-from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, drawing_head, moment, player
+from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision.model import (
     STATES,
@@ -23,9 +23,9 @@ from er3a.pipeline.stages.collision.model import (
     CollisionResults,
     MatrixRows,
     PairShares,
-    PathClearances,
     TargetClearances,
 )
+from er3a.pipeline.stages.collision.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
@@ -216,60 +216,13 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         workspace=workspace(results),
         targets=_targets(results.targets),
         clearance=clearance_over_time(results),
-        player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
+        player=player(robot, motions(robot, results), load_scene(scene) if scene else None),
         drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MOST_ROWS]],
         rows_left_out=max(len(closest), len(set(results.targets.target))) - MOST_ROWS,
         nearest=closest_pair(robot, nearest) if nearest else None,
         mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
     )
-
-
-def _motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
-    """The paths, as far as the arm reaches them, with the line between the nearest points at each moment."""
-    closest = {found.name: found for found in results.summary.closest if found.kind == "path"}
-    motions = []
-    for name in dict.fromkeys(results.paths.path.tolist()):
-        rows = results.paths.take((results.paths.path == name) & np.isfinite(results.paths.q_deg).all(axis=1))
-        events = [_least(closest[name])] if name in closest else []
-        events += _overlaps(rows)
-        motions.append(PlayedMotion(name, "", rows.t_s, meant(robot, rows.q_deg), events, _distances(rows)))
-    return motions
-
-
-def _overlaps(rows: PathClearances) -> list[PlayedEvent]:
-    """Where the nearest bodies overlap, each stretch with one pair."""
-    label = np.where(rows.clearance_mm < 0, rows.between, "")
-    starts = np.flatnonzero(label != np.roll(label, 1))
-    starts = np.union1d(starts, [0])
-    ends = np.append(starts[1:], len(rows) - 1)
-    return [
-        PlayedEvent(rows.t_s[i], rows.t_s[j], tr("collision"), "fail", tuple(label[i].split("/")))
-        for i, j in zip(starts, ends)
-        if label[i]
-    ]
-
-
-def _least(found: Closest) -> PlayedEvent:
-    text = tr("least clearance {clearance} mm: {pair}", clearance=fixed(found.clearance_mm, 1), pair=say(found.between))
-    t = found.t_s or 0.0
-    return PlayedEvent(t, t, text, "fail" if found.clearance_mm < 0 else "plain")
-
-
-def _distances(rows: PathClearances) -> list[Mark]:
-    """The nearest points, each pair shown until the next was measured."""
-    until = np.append(rows.t_s[1:], rows.t_s[-1:])
-    return [
-        Mark(t0, t1, start, end, tr("{clearance} mm", clearance=fixed(clearance, 0)))
-        for t0, t1, start, end, clearance in zip(
-            rows.t_s.tolist(),
-            until.tolist(),
-            np.round(rows.from_mm / 1000, 5).tolist(),
-            np.round(rows.to_mm / 1000, 5).tolist(),
-            rows.clearance_mm.tolist(),
-        )
-        if np.isfinite(start).all() and np.isfinite(end).all()
-    ]
 
 
 def _matrix(robot: Robot, rows: MatrixRows, assumed: bool) -> list[list[str]]:

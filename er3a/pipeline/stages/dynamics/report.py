@@ -11,7 +11,7 @@ from er3a.pipeline.messages.dynamics import BINDING, FIGURES, quantity_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player
+from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.model import (
     BindingLimit,
@@ -19,7 +19,6 @@ from er3a.pipeline.stages.dynamics.model import (
     DynamicsResults,
     DynamicsSummary,
     HoldingTorque,
-    JointLoad,
     MotorNeed,
     PathLoad,
     TorqueRows,
@@ -27,13 +26,12 @@ from er3a.pipeline.stages.dynamics.model import (
     Use,
     hardest_held,
 )
+from er3a.pipeline.stages.dynamics.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
-from er3a.robots.joint_limits import meant
-from er3a.robots.robot import Robot
 
 DRAWN = 161
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
@@ -181,7 +179,7 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         nodes=_nodes(summary),
         margins=any(path.payload or path.speed_scale or path.torque_times for path in summary.paths),
         figures=figures,
-        player=player(robot, _motions(robot, results)),
+        player=player(robot, motions(robot, results)),
         drawing_head=drawing_head(),
         joints=[(path.name, _joints(path)) for path in summary.paths if path.complete],
         wrist=_wrist(summary),
@@ -191,22 +189,6 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         held=[_held(held) for held in summary.holding],
         diagram=diagram,
     )
-
-
-def _motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
-    """The paths that the arm can follow, with the moment at which each joint feels most."""
-    motions = []
-    for path in results.summary.paths:
-        if not path.complete:
-            continue
-        rows = results.torques.take(results.torques.path == path.name)
-        peaks = [PlayedEvent(load.peak_at_s, load.peak_at_s, _peak(load), "plain") for load in path.joints]
-        motions.append(PlayedMotion(path.name, "", rows.t_s, meant(robot, rows.q), peaks))
-    return motions
-
-
-def _peak(load: JointLoad) -> str:
-    return tr("J{joint} at its peak: {peak} {unit}", joint=load.joint, peak=number(load.peak, 3), unit=load.unit)
 
 
 def _links(summary: DynamicsSummary) -> list[list[str]]:

@@ -6,27 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
+from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.inverse import limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word, say
 from er3a.pipeline.messages.say import listed
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult, shown_targets
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import arm_view, capsules, log_arm, send_motion
+from er3a.pipeline.viewing.arm import AXES, capsules
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
-from er3a.pipeline.viewing.recording import (
-    ARM,
-    AXES,
-    TIMELINE,
-    escaped,
-    log_note,
-    log_scene,
-    log_text,
-    recording,
-    words_view,
-)
+from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, write_recording
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
 from er3a.robots.robot import Robot
@@ -52,47 +42,48 @@ def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     name, solutions = stored.robot, stored.results.solutions
     robot, targets = study.robot(name), shown_targets(stored.results.summary.targets)
-    view = arm_view(robot, "Solutions", [ARM, f"/{STAGE}/**"], reach=_sight(robot, targets))
-    layout = rrb.Horizontal(view, words_view(STAGE, "This target"), column_shares=[2, 1], name="Solutions")
-    with recording(output, name, STAGE, layout) as stream:
-        log_note(stream, STAGE, NOTE)
-        log_scene(stream, study, name, STAGE)
-        shown = meant(robot, np.array([target.chosen_deg or target.q_ref_deg for target in targets]))
-        log_arm(stream, robot, shown[0])
-        send_motion(stream, robot, np.arange(len(targets)), shown)
-        for second, target in enumerate(targets):
-            stream.set_time(TIMELINE, duration=float(second))
-            if second:
-                stream.log(f"{STAGE}/targets/{targets[second - 1].name}", rr.Clear(recursive=True))
-            branches = solutions.take((solutions.target == target.name) & solutions.first_of_branch)
-            _log_target(stream, robot, target, branches)
+    scene = study.scene(name, STAGE)
+    shown = Recorded(
+        robot=robot,
+        name=name,
+        stage=STAGE,
+        note=NOTE,
+        runs=[
+            _run(robot, target, solutions.take((solutions.target == target.name) & solutions.first_of_branch))
+            for target in targets
+        ],
+        scene=load_scene(scene) if scene else None,
+        views={"Solutions": ["**"]},
+        points=[np.array([target.xyz_mm for target in targets]) / 1000],
+        now="This target",
+    )
+    write_recording(shown, output)
 
 
-def _sight(robot: Robot, targets: list[TargetResult]) -> float:
-    """Radius (m) that shows the arm and the targets, unless they are so far that the arm would vanish."""
-    points = np.array([target.xyz_mm for target in targets]) / 1000
-    farthest = np.linalg.norm(points - robot.base[:3, 3], axis=1).max()
-    return float(np.clip(1.4 * farthest, size_of(robot), 2.5 * size_of(robot)))
-
-
-def _log_target(stream: rr.RecordingStream, robot: Robot, target: TargetResult, branches: SolutionRows) -> None:
-    root, size = f"{STAGE}/targets/{target.name}", size_of(robot)
-    position = np.array(target.xyz_mm) / 1000
+def _run(robot: Robot, target: TargetResult, branches: SolutionRows) -> Run:
+    root, size, position = f"targets/{target.name}", size_of(robot), np.array(target.xyz_mm) / 1000
     w, x, y, z = target.quaternion_wxyz
     frame = rr.Transform3D(translation=position, quaternion=rr.Quaternion(xyzw=[x, y, z, w]))
     axes = rr.Arrows3D(vectors=0.12 * size * np.eye(3), colors=AXES, radii=0.003 * size)
-    stream.log(f"{root}/frame", frame, axes)
     ball = rr.Points3D([position], radii=0.012 * size, colors=rgb(HIGHLIGHT), labels=target.name, show_labels=True)
-    stream.log(f"{root}/point", ball)
-    log_text(stream, f"{STAGE}/now", _about(target, branches))
+    shapes: dict[str, Logged] = {f"{root}/frame": [frame, axes], f"{root}/point": ball}
     for k, branch in enumerate(branches.branch):
         points = skeleton(robot, meant(robot, branches.q_deg[k]))
-        entity = f"{root}/branch_{branch}"
-        if not branches.rank[k]:
-            stream.log(entity, rr.LineStrips3D([points], radii=0.003 * size, colors=rgb(MUTED)))
-        else:
-            colour = (*rgb(colour_of(shape_of(int(branch), branches.label[k]))), 150)
-            stream.log(entity, capsules(points[:-1], np.diff(points, axis=0), 0.014 * size, colour, solid=False))
+        colour = (*rgb(colour_of(shape_of(int(branch), branches.label[k]))), 150)
+        shapes[f"{root}/branch_{branch}"] = (
+            capsules(points[:-1], np.diff(points, axis=0), 0.014 * size, colour, solid=False)
+            if branches.rank[k]
+            else rr.LineStrips3D([points], radii=0.003 * size, colors=rgb(MUTED))
+        )
+    return Run(
+        name=target.name,
+        text=_about(target, branches),
+        t=np.zeros(1),
+        q=meant(robot, np.array([target.chosen_deg or target.q_ref_deg])),
+        outcome="taken" if target.chosen_deg is not None else "none taken",
+        status="plain" if target.chosen_deg is not None else "caution",
+        shapes=[(0.0, entity, shape) for entity, shape in shapes.items()],
+    )
 
 
 def _about(target: TargetResult, branches: SolutionRows) -> str:

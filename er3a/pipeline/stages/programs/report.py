@@ -13,7 +13,7 @@ from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, remedies, remedy_at
 from er3a.pipeline.messages.say import bracketed, say
-from er3a.pipeline.player.player import PlayedEvent, PlayedMotion, drawing_head, moment, player, stretch
+from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import (
     FindingAt,
@@ -23,16 +23,15 @@ from er3a.pipeline.stages.programs.model import (
     ProgramsResults,
     ProgramSummary,
 )
+from er3a.pipeline.stages.programs.played import motions, stretches
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import head_of, render, run_command
 from er3a.program_check.program_check_findings import RANKS, Level, worst_of
 from er3a.programs.languages import LANGUAGES
-from er3a.robots.robot import Robot
 
 MOST_LINES = 400  # of a listing that the page shows
 AROUND = 3  # lines around those with motions or findings, in a longer listing
-PLAYED = {"pass": "plain", "caution": "caution", "fail": "fail"}
 STATUSES: dict[Level, str] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
 
 
@@ -82,7 +81,7 @@ def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
         robot=robot,
         robot_pages=study.pages(stored.robot),
         sections=sections,
-        player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
+        player=player(robot, motions(robot, results), load_scene(scene) if scene else None),
         drawing_head=drawing_head(),
     )
 
@@ -130,7 +129,7 @@ def _listing(
     name: str, text: Lines, rows: Instructions, motion: ProgramMotion, found: dict[int, list[FindingAt]]
 ) -> list[ListingLine]:
     moves: dict[int, list[int]] = defaultdict(list)
-    played = {line: (t0, t1) for line, _, t0, t1 in reversed(_stretches(motion))}  # the first time counts
+    played = {line: (t0, t1) for line, _, t0, t1 in reversed(stretches(motion))}  # the first time counts
     for i, line in enumerate(rows.line.tolist()):
         moves[line].append(i)
     kept = set(range(1, len(text) + 1))
@@ -169,34 +168,3 @@ def _facts(rows: Instructions, here: list[int]) -> str:
     if np.isfinite(clear).any():
         parts.append(tr("{far} mm clear", far=fixed(float(np.nanmin(clear)), 0)))
     return " · ".join(parts)
-
-
-def _motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
-    """The programs as far as they were followed, each line's motion with its text and its verdict."""
-    motions = []
-    for program in results.summary.programs:
-        rows = results.motion.take(results.motion.program == program.name)
-        text = results.lines.take(results.lines.program == program.name)
-        words = dict(zip(text.line.tolist(), text.text.tolist()))
-        events = [
-            PlayedEvent(
-                t0,
-                t1,
-                tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";")),
-                PLAYED[STATUSES[level]],
-            )
-            for line, level, t0, t1 in _stretches(rows)
-        ]
-        motions.append(PlayedMotion(program.name, program.title, rows.t_s, np.radians(rows.q_deg), events))
-    return motions
-
-
-def _stretches(rows: ProgramMotion) -> list[tuple[int, Level, float, float]]:
-    """Line, verdict and times (s) of what is carried out in one go."""
-    if not len(rows):
-        return []
-    starts = np.flatnonzero(np.diff(rows.line, prepend=-1))
-    ends = np.append(starts[1:], len(rows)) - 1
-    return list(
-        zip(rows.line[starts].tolist(), rows.level[ends].tolist(), rows.t_s[starts].tolist(), rows.t_s[ends].tolist())
-    )

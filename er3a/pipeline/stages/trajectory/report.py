@@ -26,12 +26,11 @@ from er3a.pipeline.messages.trajectory import (
     reasons,
     strategy_word,
 )
-from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, drawing_head, moment, player
+from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.model import (
     AvoidanceRows,
-    BodiesOverlap,
     LimitsUsed,
     NearThresholds,
     PathChecks,
@@ -39,38 +38,24 @@ from er3a.pipeline.stages.trajectory.model import (
     ProgramFiles,
     Singularity,
     StrategyMotion,
-    Stretch,
     TrajectoryResults,
     TrajectorySummary,
     TriedStrategy,
 )
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
+from er3a.pipeline.stages.trajectory.played import WEIGHTS, kinds, motions
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, packed_text, render, run_command
-from er3a.planning.path_verdicts import PathVerdict
 from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.programs.languages import titles_unwritten
-from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 DRAWN = 250  # points of a curve
 MOST_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: all of up to so many, or the worst
 AT_ANY_PACE = ("leaves limits", "collides", "unreachable", "none found")  # verdicts of paths that fail however slow
-STATUS: dict[PathVerdict, str] = {
-    "safe": "pass",
-    "near-singular": "caution",
-    "singular": "caution",
-    "too fast for the assumed limits": "caution",
-    "undecided": "caution",
-    "too fast": "fail",
-    "leaves limits": "fail",
-    "collides": "fail",
-    "unreachable": "fail",
-    "none found": "fail",
-}
 
 
 @dataclass(frozen=True)
@@ -119,13 +104,13 @@ class PathSection:
 def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
     """Write the trajectory page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
-    summary, checks, motions = results.summary, results.checks, results.avoidance
+    summary, checks, avoidance = results.summary, results.checks, results.avoidance
     scene = study.scene(stored.robot, stored.stage)
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
     paths = _worst_first(summary.paths) if count < len(summary.paths) else summary.paths
     for i, path in enumerate(paths):
-        rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
+        rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
         links = _programs(results.programs.take((results.programs.path == path.name) & (i < count)))
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
         sections.append(_section(path, rows, drawn, links, summary))
@@ -144,50 +129,15 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         assumed=assumed,
         drawn_paths=count,
         turning=in_space(robot, results, paths[:count]),
-        player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
+        player=player(robot, motions(robot, results), load_scene(scene) if scene else None),
         drawing_head=drawing_head(),
     )
 
 
 def _worst_first(paths: Sequence[PathSummary]) -> Sequence[PathSummary]:
     """Those that fail first, of them those that were not expected to."""
-    ranks = ("fail", "caution", "pass")
-    return sorted(paths, key=lambda path: (ranks.index(STATUS[path.verdict]), path.expect == path.verdict))
-
-
-def _motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
-    """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it."""
-    checks, avoidance, motions = results.checks, results.avoidance, []
-    for path in results.summary.paths:
-        rows = checks.take((checks.path == path.name) & checks.reachable)
-        motions.append(
-            PlayedMotion(path.name, path_text(path), rows.t_s, meant(robot, rows.q_deg), _events(path), _contact(path))
-        )
-        if path.chosen:
-            repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
-            name = tr("{path}, repaired", path=path.name)
-            motions.append(PlayedMotion(name, advice(path) or "", repair.t_s, meant(robot, repair.q_deg)))
-    return motions
-
-
-def _events(path: PathSummary) -> list[PlayedEvent]:
-    passes = [PlayedEvent(e.t_s, e.until_s, _singular(e), "caution") for e in path.singularities]
-    faults = [(word, stretch) for word, stretches in _kinds(path) for stretch in stretches]
-    return passes + [
-        PlayedEvent(s.t0_s, s.t1_s, f"{word}: {cause_text(path, s)}", "fail", _touching(s.cause)) for word, s in faults
-    ]
-
-
-def _contact(path: PathSummary) -> list[Mark]:
-    if path.clear_until is None:
-        return []
-    x, y, z = (value / 1000 for value in path.clear_until.contact_mm)
-    return [Mark(part.t0_s, part.t1_s, (x, y, z), (x, y, z), tr("first contact")) for part in path.collisions[:1]]
-
-
-def _touching(cause: object) -> tuple[str, ...]:
-    pairs = cause.pairs if isinstance(cause, BodiesOverlap) else ()
-    return tuple(dict.fromkeys(name for pair in pairs for name in pair.names))
+    ranks = ("fail", "caution", "plain")
+    return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), path.expect == path.verdict))
 
 
 def _programs(rows: ProgramFiles) -> list[ProgramLink]:
@@ -203,10 +153,10 @@ def _section(
     summary: TrajectorySummary,
 ) -> PathSection:
     near = _near_assumed(path, summary)
-    only_assumed = STATUS[path.verdict] == "pass" and near
+    only_assumed = WEIGHTS[path.verdict] == "plain" and near
     return PathSection(
         path=path,
-        status="caution" if only_assumed else STATUS[path.verdict],
+        status="caution" if only_assumed else WEIGHTS[path.verdict].replace("plain", "pass"),
         verdict=tr("clear of assumed shapes only") if only_assumed else outcome_word(path.verdict),
         kind=kind_word(path.kind),
         text=joined([path_text(path), near]),
@@ -258,21 +208,6 @@ def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
     return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def _singular(event: Singularity) -> str:
-    word = event_word(event)
-    return tr("singular: {type}", type=word) if event.crossing else tr("near-singular: {type}", type=word)
-
-
-def _kinds(path: PathSummary) -> tuple[tuple[str, tuple[Stretch[Any], ...]], ...]:
-    return (
-        (tr("not reachable"), path.unreachable),
-        (tr("outside limits"), path.out_of_limits),
-        (tr("too fast"), path.too_fast),
-        (tr("undecided"), path.undecided),
-        (tr("collision"), path.collisions),
-    )
-
-
 def _faults(path: PathSummary) -> list[list[str]]:
     return [
         [
@@ -284,7 +219,7 @@ def _faults(path: PathSummary) -> list[list[str]]:
             cause_text(path, part),
         ]
         for word, part in sorted(
-            ((word, part) for word, stretches in _kinds(path) for part in stretches), key=lambda each: each[1].t0_s
+            ((word, part) for word, stretches in kinds(path) for part in stretches), key=lambda each: each[1].t0_s
         )
     ]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 import scipy
 
+from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -17,9 +17,9 @@ from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, SampleRows, VisionResults, VisionSummary
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import arm_view, log_arm, send_motion
+from er3a.pipeline.viewing.arm import AXES
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import ARM, AXES, escaped, log_note, log_now, log_scene, recording, words_view
+from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, write_recording
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 from er3a.vision.calibration_set import posed
@@ -27,7 +27,7 @@ from er3a.vision.calibration_set import posed
 STAGE = "vision"
 MAGNIFIED = 50.0
 SIGHT = 0.35  # of the farthest distance, how far the drawn pyramid reaches
-STEP_S = 0.1
+STEP_S, SAMPLE_S = 0.1, 0.5
 NOTE = f"""# Camera, samples and grasps
 
 **Look first** at the arrows at the boards: they lead from where the arm puts the board to where the camera sees it,
@@ -45,30 +45,28 @@ Press play: the arm goes through the samples, then to each object that it can gr
 
 def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     """Write the recording from the stage's results."""
-    name, results, summary = stored.robot, stored.results, stored.results.summary
-    robot = study.robot(name)
-    task = load_vision(str(study.entry(name).vision))
-    view = arm_view(robot, "Camera and grasps", [ARM, f"/{STAGE}/**"], reach=_sight(robot, summary))
-    layout = rrb.Horizontal(view, words_view(STAGE, "Now"), column_shares=[2, 1], name="Vision")
-    with recording(output, name, STAGE, layout) as stream:
-        log_note(stream, STAGE, NOTE)
-        log_scene(stream, study, name, STAGE)
-        home = np.radians(task.home_deg)
-        log_arm(stream, robot, home)
-        _log_samples(stream, results.samples, size_of(robot))
-        if summary.calibration is not None:
-            _log_camera(stream, robot, task, summary)
-        for each in summary.objects:
-            _log_object(stream, each, size_of(robot))
-        _play(stream, robot, results, home)
-
-
-def _sight(robot: Robot, summary: VisionSummary) -> float:
-    """Radius (m) that shows the arm and a fixed camera."""
-    found = summary.calibration
+    results, summary, robot = stored.results, stored.results.summary, study.robot(stored.robot)
+    scene, size = study.scene(stored.robot, STAGE), size_of(robot)
+    task = load_vision(str(study.entry(stored.robot).vision))
+    found, home = summary.calibration, np.radians(task.home_deg)
+    shapes: dict[str, Logged] = _samples(results.samples, size)
+    if found is not None:
+        shapes |= _camera(robot, task, summary)
+    for each in summary.objects:
+        shapes |= _object(each, size)
     fixed = found is not None and found.setup == "eye_to_hand"
-    away = np.linalg.norm(found.hand_eye.xyz_mm) / 1000 if found is not None and fixed else 0.0
-    return float(np.clip(1.3 * away, 1.2 * size_of(robot), 3 * size_of(robot)))
+    shown = Recorded(
+        robot=robot,
+        name=stored.robot,
+        stage=STAGE,
+        note=NOTE,
+        runs=[_sampled(results.samples, home), *(_grasped(results, each, home) for each in summary.objects)],
+        scene=load_scene(scene) if scene else None,
+        views={"Camera and grasps": ["**"]},
+        shapes=shapes,
+        points=[np.array([found.hand_eye.xyz_mm]) / 1000] if found is not None and fixed else [],
+    )
+    write_recording(shown, output)
 
 
 def _placed(pose: PoseEstimate) -> Reals:
@@ -76,12 +74,11 @@ def _placed(pose: PoseEstimate) -> Reals:
     return posed(R, np.array(pose.xyz_mm) / 1000)
 
 
-def _log_camera(stream: rr.RecordingStream, robot: Robot, task: VisionFile, summary: VisionSummary) -> None:
+def _camera(robot: Robot, task: VisionFile, summary: VisionSummary) -> dict[str, Logged]:
     found = summary.calibration
     assert found is not None
     camera = _placed(found.hand_eye)
     fixed = found.setup == "eye_to_hand"
-    entity = f"{STAGE}/camera"
     if not fixed:
         camera = forward(robot.without_tool(), np.radians(task.picture_deg or task.home_deg)) @ camera
     half = np.tan(np.radians([task.view.horizontal_deg, task.view.vertical_deg]) / 2)
@@ -90,62 +87,62 @@ def _log_camera(stream: rr.RecordingStream, robot: Robot, task: VisionFile, summ
     strips = [[[0, 0, 0], corner] for corner in corners] + [[*corners, corners[0]]]
     place = rr.Transform3D(translation=camera[:3, 3], mat3x3=camera[:3, :3])
     lines = rr.LineStrips3D(strips, radii=0.002, colors=rgb(REFERENCE), labels=[pose_words(found.setup)[0]])
-    stream.log(entity, place, lines, static=True)
+    shapes: dict[str, Logged] = {"camera": [place, lines]}
     if not fixed:
         board = _placed(found.board)
-        stream.log(
-            f"{STAGE}/board",
-            rr.Transform3D(translation=board[:3, 3], mat3x3=board[:3, :3]),
-            rr.Arrows3D(vectors=0.08 * np.eye(3), colors=AXES, radii=0.002),
-            static=True,
-        )
+        place = rr.Transform3D(translation=board[:3, 3], mat3x3=board[:3, :3])
+        shapes["board"] = [place, rr.Arrows3D(vectors=0.08 * np.eye(3), colors=AXES, radii=0.002)]
+    return shapes
 
 
-def _log_samples(stream: rr.RecordingStream, rows: SampleRows, size: float) -> None:
+def _samples(rows: SampleRows, size: float) -> dict[str, Logged]:
+    shapes: dict[str, Logged] = {}
     for name, kept, colour in (("used", rows.used, MODEL), ("left_out", ~rows.used, HIGHLIGHT)):
-        if not kept.any():
-            continue
-        start, end = rows.predicted_mm[kept] / 1000, rows.seen_mm[kept] / 1000
-        entity = f"{STAGE}/samples/{name}"
-        points = rr.Points3D(start, radii=0.006 * size, colors=rgb(colour))
-        vectors = np.clip(MAGNIFIED * (end - start), -size, size)
-        arrows = rr.Arrows3D(origins=start, vectors=vectors, radii=0.002 * size, colors=rgb(colour))
-        stream.log(f"{entity}/boards", points, static=True)
-        stream.log(f"{entity}/residuals", arrows, static=True)
+        if kept.any():
+            start, end = rows.predicted_mm[kept] / 1000, rows.seen_mm[kept] / 1000
+            vectors = np.clip(MAGNIFIED * (end - start), -size, size)
+            arrows = rr.Arrows3D(origins=start, vectors=vectors, radii=0.002 * size, colors=rgb(colour))
+            shapes[f"samples/{name}/boards"] = rr.Points3D(start, radii=0.006 * size, colors=rgb(colour))
+            shapes[f"samples/{name}/residuals"] = arrows
+    return shapes
 
 
-def _log_object(stream: rr.RecordingStream, each: ObjectResult, size: float) -> None:
-    entity = f"{STAGE}/objects/{each.name}"
+def _object(each: ObjectResult, size: float) -> dict[str, Logged]:
     w, x, y, z = each.quaternion_wxyz
     place = rr.Transform3D(translation=np.array(each.xyz_mm) / 1000, quaternion=rr.Quaternion(xyzw=[x, y, z, w]))
-    colour = rgb(MODEL if each.grasp else MUTED)
+    colour, entity = rgb(MODEL if each.grasp else MUTED), f"objects/{each.name}"
     box = rr.Boxes3D(sizes=[[0.04, 0.04, 0.06]], colors=[colour], labels=[each.name], show_labels=True)
-    stream.log(entity, place, box, static=True)
-    stream.log(f"{entity}/axes", rr.Arrows3D(vectors=0.07 * size * np.eye(3), colors=AXES, radii=0.002), static=True)
+    axes = rr.Arrows3D(vectors=0.07 * size * np.eye(3), colors=AXES, radii=0.002)
+    shapes: dict[str, Logged] = {entity: [place, box], f"{entity}/axes": axes}
     if each.error_mm:
-        ball = rr.Ellipsoids3D(radii=[each.error_mm.together / 1000], colors=[rgb(HIGHLIGHT)])
-        stream.log(f"{entity}/error", ball, static=True)
+        shapes[f"{entity}/error"] = rr.Ellipsoids3D(radii=[each.error_mm.together / 1000], colors=[rgb(HIGHLIGHT)])
+    return shapes
 
 
-def _play(stream: rr.RecordingStream, robot: Robot, results: VisionResults, home: Reals) -> None:
-    """Samples half a second each, then the way to each object and back."""
-    times: list[float] = [0.0]
-    poses: list[Reals] = [home]
-    log_now(stream, STAGE, 0.0, "The arm waits.")
-    rows = results.samples
-    for k in np.flatnonzero(np.isfinite(rows.q_deg).all(axis=1)) if len(rows) else ():
-        times.append(times[-1] + 5 * STEP_S)
-        poses.append(np.radians(rows.q_deg[k]))
-        used = "used" if rows.used[k] else "**left out**"
-        residual = np.linalg.norm(rows.residual_mm[k])
-        log_now(stream, STAGE, times[-1], f"Sample {escaped(rows.sample[k])}, {used}: residual {residual:.3g} mm")
-    for each in results.summary.objects:
-        ways = results.ways.take(results.ways.target == each.name)
-        times.append(times[-1] + 5 * STEP_S)
-        poses.append(poses[-1] if not len(ways) else home)
-        told = f"{each.grasp.grasp}, success {100 * each.grasp.probability:.1f} %" if each.grasp else say(each.refusal)
-        log_now(stream, STAGE, times[-1], f"# {escaped(each.name)}\n\n{told}")
-        for q in ways.q_deg:
-            times.append(times[-1] + STEP_S)
-            poses.append(np.radians(q))
-    send_motion(stream, robot, np.array(times), np.array(poses))
+def _sampled(rows: SampleRows, home: Reals) -> Run:
+    """Samples half a second each."""
+    poses = np.flatnonzero(np.isfinite(rows.q_deg).all(axis=1)) if len(rows) else np.empty(0, dtype=int)
+    times = SAMPLE_S * np.arange(len(poses) + 1, dtype=float)
+
+    texts = []
+    for t, k in zip(times[1:].tolist(), poses):
+        used, residual = "used" if rows.used[k] else "**left out**", np.linalg.norm(rows.residual_mm[k])
+        texts.append((t, f"Sample {escaped(rows.sample[k])}, {used}: residual {residual:.3g} mm"))
+    q = np.concatenate([home[None], np.radians(rows.q_deg[poses])]) if len(poses) else home[None]
+    return Run("samples", "The arm waits.", times, q, texts=texts, pause_s=SAMPLE_S)
+
+
+def _grasped(results: VisionResults, each: ObjectResult, home: Reals) -> Run:
+    """The way to an object and back."""
+    ways = results.ways.take(results.ways.target == each.name)
+    told = f"{each.grasp.grasp}, success {100 * each.grasp.probability:.1f} %" if each.grasp else say(each.refusal)
+    q = np.concatenate([home[None], np.radians(ways.q_deg)]) if len(ways) else np.full((1, len(home)), np.nan)
+    return Run(
+        name=each.name,
+        text=f"# {escaped(each.name)}\n\n{told}",
+        t=STEP_S * np.arange(len(q), dtype=float),
+        q=q,
+        outcome=told,
+        status="plain" if each.grasp else "caution",
+        pause_s=SAMPLE_S,
+    )

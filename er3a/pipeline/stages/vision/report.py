@@ -23,7 +23,8 @@ from er3a.pipeline.messages.vision import (
     direction_word,
     pose_words,
 )
-from er3a.pipeline.player.player import Mark, PlayedEvent, PlayedMotion, drawing_head, player
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
+from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.vision.model import (

@@ -1,0 +1,58 @@
+"""Motions of an arm as a page's player and a recording show them: joint values over time, what happens meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from er3a.numerics.arrays import Reals
+
+Weight = Literal["plain", "caution", "fail"]
+
+
+@dataclass(frozen=True)
+class PlayedEvent:
+    """Something to be seen from ``t`` to ``until`` (s); ``status`` (``plain``, ``caution``, ``fail``) colours it.
+
+    ``bodies`` (``base``, ``link_3``, names of solids) are red then.
+    """
+
+    t: float
+    until: float
+    text: str
+    status: Weight
+    bodies: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A line between two points (m), a dot where they are one, with a word, shown from ``t0`` to ``t1`` (s)."""
+
+    t0: float
+    t1: float
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class PlayedMotion:
+    """A motion of the arm.
+
+    Attributes
+    ----------
+    name, text : what it is called, and what is said of it where no event is near
+    t : (N,), s, rising; q : (N, n), joint coordinates, finite
+    timed : false where no times are known: ``t`` counts points then, which are shown at an even pace
+    beside : (N, n) each, joint coordinates of the arms that stand beside the first
+    """
+
+    name: str
+    text: str
+    t: Reals
+    q: Reals
+    events: Sequence[PlayedEvent] = ()
+    marks: Sequence[Mark] = field(default=())
+    timed: bool = True
+    beside: Sequence[Reals] = ()
