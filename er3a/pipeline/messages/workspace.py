@@ -6,10 +6,12 @@ import er3a.pipeline.messages.collision
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
+from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace.model import (
     CapabilityMissing,
     NoVoid,
     OnSurface,
+    PlacementSummary,
     ToolPointsElsewhere,
     VoidAtShoulder,
     VoidUncertain,
@@ -32,7 +34,7 @@ FIGURES = {
     "volume_upper": N_("reached volume, at most"),
     "area_lower": N_("reached area, at least"),
     "area_upper": N_("reached area, at most"),
-    "hull_volume": N_("convex hull of the samples"),
+    "hull_volume": N_("convex hull of the samples: holds voids and dents, misses the rim"),
     "least_reach": N_("least distance from axis 1"),
     "samples": N_("samples"),
 }
@@ -131,6 +133,10 @@ TEXTS = texts(
             "Not computed: a pose takes milliseconds with this arm, and within seconds only points wider apart than "
             "the box could be asked. A larger box or a narrower cone may do."
         ),
+        "box.unknown": "Box of {box} mm: {why}",
+        "box.nowhere": "Box of {box} mm: no place was found that the tool serves throughout.",
+        "box.proven": "Box of {box} mm: with its centre at ({centre}) mm the tool is proven to serve it throughout.",
+        "box.sampled": "Box of {box} mm: with its centre at ({centre}) mm the tool serves it at all points sampled.",
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
             "cone."
@@ -276,3 +282,18 @@ def _(found: CapabilityMissing) -> str:
 def _(found: ToolPointsElsewhere) -> str:
     x, y, z = found.direction
     return say_as(found, x=x, y=y, z=z)
+
+
+def box_text(summary: Summary) -> str:
+    """Where the box of the study can stand, in short; empty where places were not looked for."""
+    placement = getattr(summary, "placement", None)
+    if placement is None:
+        return ""
+    box = " × ".join(as_text(value, "g") for value in placement.task.box_mm)
+    if not isinstance(placement, PlacementSummary):
+        return sentence("box.unknown", box=box, why=say(placement))
+    if not placement.places:
+        return sentence("box.nowhere", box=box)
+    place = placement.places[0]
+    centre = ", ".join(as_text(round(1000 * value) + 0, "d") for value in place.centre_m)
+    return sentence(f"box.{place.status}", box=box, centre=centre)

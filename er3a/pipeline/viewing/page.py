@@ -22,6 +22,7 @@ from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
@@ -148,6 +149,7 @@ class ShownFigure:
 
 NUMERICS = {  # key figures that answer no question of a verdict
     "characteristic_length",
+    "hull_volume",
     "power_balance",
     "round_trip_joint_error",
     "samples",
@@ -161,11 +163,10 @@ NUMERICS = {  # key figures that answer no question of a verdict
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
-    ``finding`` is what the sentence says; ``caveats`` by the stage that it rests on: what to know first;
-    ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to. ``not_examined``: what
-    the verdict leaves out, and of which. ``numerics``: figures that speak of the computation, not of the arm.
-    ``links``: addresses that words of the text lead to. ``banner`` says on what assumed shapes all rests; ``text`` ends
-    with it.
+    ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
+    to know first; ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to.
+    ``not_examined``: what the verdict leaves out, and of which. ``numerics``: figures of the computation, not of the
+    arm. ``links``: addresses that words of the text lead to.
     """
 
     robot: str
@@ -176,11 +177,26 @@ class Head:
     provenance: Provenance
     caveats: Mapping[str, Caveat]
     demonstrations: int
-    finding: Any
+    summary: Any
     not_examined: tuple[tuple[str, str], ...] = ()
     numerics: tuple[ShownFigure, ...] = ()
     links: Mapping[str, str] = field(default_factory=dict)
-    banner: str = ""
+
+    @property
+    def finding(self) -> Any:
+        """What the verdict says."""
+        return self.summary.verdict.finding
+
+    @property
+    def shapes(self) -> ShapesAssumed | None:
+        """On what assumed shapes of the arm the verdict rests."""
+        found: ShapesAssumed | None = self.summary.verdict.shapes
+        return found
+
+    @property
+    def banner(self) -> str:
+        """On what assumed shapes all rests, as the text ends; empty where no shapes are assumed."""
+        return say(self.shapes) if self.shapes else ""
 
     @property
     def own_text(self) -> str:
@@ -211,7 +227,6 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     meant = len(getattr(verdict.finding, "demonstrations", ()))
     text = say_all(verdict.findings)
     missed = tuple((left_out_text(each), left_out_names(each)) for each in stored.results.summary.not_examined)
-    banner = say(verdict.shapes) if verdict.shapes else ""
     return Head(
         stored.robot,
         stage,
@@ -221,10 +236,9 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
         stored.provenance,
         caveats,
         meant,
-        verdict.finding,
+        stored.results.summary,
         missed,
         tuple(figure for figure in shown if figure.name in NUMERICS),
-        banner=banner,
     )
 
 

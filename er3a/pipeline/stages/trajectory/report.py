@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from er3a.files.scene_file import load_scene
+from er3a.pipeline.messages.collision import near_shapes
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import (
     FIGURES,
     advice,
@@ -39,6 +41,7 @@ from er3a.pipeline.stages.trajectory.model import (
     StrategyMotion,
     Stretch,
     TrajectoryResults,
+    TrajectorySummary,
     TriedStrategy,
 )
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
@@ -117,6 +120,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     robot, results = study.robot(stored.robot), stored.results
     summary, checks, motions = results.summary, results.checks, results.avoidance
     scene = study.scene(stored.robot, stored.stage)
+    solids = load_scene(scene) if scene else None
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
     paths = _worst_first(summary.paths) if count < len(summary.paths) else summary.paths
@@ -124,7 +128,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         rows, own = checks.take(checks.path == path.name), motions.take(motions.path == path.name)
         links = _programs(results.programs.take((results.programs.path == path.name) & (i < count)))
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
-        sections.append(_section(path, rows, drawn, links, summary.joint_limits))
+        sections.append(_section(path, rows, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -139,8 +143,8 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         clearance=clearance_section(results, count),
         assumed=assumed,
         drawn_paths=count,
-        turning=in_space(robot, results, paths[:count]),
-        player=player(robot, _motions(robot, results), load_scene(scene) if scene else None),
+        turning=in_space(robot, results, paths[:count], solids),
+        player=player(robot, _motions(robot, results), solids),
         drawing_head=drawing_head(),
     )
 
@@ -192,17 +196,27 @@ def _programs(rows: ProgramFiles) -> list[ProgramLink]:
 
 
 def _section(
-    path: PathSummary, rows: PathChecks, figure: PathDrawing | None, programs: list[ProgramLink], limits: LimitsUsed
+    path: PathSummary,
+    rows: PathChecks,
+    figure: PathDrawing | None,
+    programs: list[ProgramLink],
+    summary: TrajectorySummary,
 ) -> PathSection:
+    shapes = summary.verdict.shapes
+    near = shapes is not None and path.name in shapes.near
     return PathSection(
         path=path,
-        status=STATUS[path.verdict],
-        verdict=outcome_word(path.verdict),
+        status="caution" if near else STATUS[path.verdict],
+        verdict=tr("{verdict}, not settled", verdict=outcome_word(path.verdict))
+        if near
+        else outcome_word(path.verdict),
         kind=kind_word(path.kind),
-        text=path_text(path),
+        text=joined(
+            [path_text(path), near_shapes(shapes.margin_mm, [path.name]).rstrip(".。") if near and shapes else ""]
+        ),
         advice=advice(path),
         branches=[branch_word(label) for label in path.branches],
-        speed=_speed(path, limits),
+        speed=_speed(path, summary.joint_limits),
         events=[_event_row(path.name, event) for event in path.singularities],
         faults=_faults(path),
         strategies=_strategies(path),

@@ -21,6 +21,7 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.workspace import STATUS
+from er3a.pipeline.player.turning import CIRCLE, solid_pieces
 from er3a.pipeline.stages.workspace.model import (
     BoxPlaces,
     CapabilityCells,
@@ -136,9 +137,6 @@ def numbers(joints: tuple[int, ...]) -> str:
     return ", ".join(str(joint) for joint in joints)
 
 
-_CORNERS = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
-_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
-_CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 _EDGE_ON = 1e-6  # by which a plane's normal may leave the drawing for the plane to be a line in it
 _STYLE: dict[str, Any] = {"edgecolor": MUTED, "linewidth": 1.1, "hatch": "////", "fill": False, "zorder": 1.5}
 
@@ -165,19 +163,8 @@ def draw_scene(axes: Axes, scene: Scene | None, shown: list[int]) -> None:
 def outlines(solid: Box | Cylinder | Sphere | Mesh, shown: list[int]) -> list[Reals]:
     """The outline of each convex piece of a solid, corners (k, 2) in m, seen along the axis that is not shown."""
     if isinstance(solid, Sphere):
-        return [np.asarray(solid.T)[:3, 3][shown] + solid.radius * _CIRCLE]
-    pieces = [points @ solid.T[:3, :3].T + solid.T[:3, 3] for points in _pieces(solid)]
-    return [piece[scipy.spatial.ConvexHull(piece).vertices] for piece in (own[:, shown] for own in pieces)]
-
-
-def _pieces(solid: Box | Cylinder | Mesh) -> list[Reals]:
-    """Points (k, 3), m, in the solid's frame, whose hulls are its pieces."""
-    if isinstance(solid, Box):
-        return [_CORNERS * solid.size]
-    if isinstance(solid, Mesh):
-        return list(solid.pieces)
-    circle, half = solid.radius * _CIRCLE, solid.length / 2
-    return [np.concatenate([np.column_stack([circle, np.full(len(circle), z)]) for z in (-half, half)])]
+        return [np.asarray(solid.T)[:3, 3][shown] + solid.radius * CIRCLE]
+    return [piece[scipy.spatial.ConvexHull(piece).vertices] for piece in (own[:, shown] for own in solid_pieces(solid))]
 
 
 SHADES = "viridis"
