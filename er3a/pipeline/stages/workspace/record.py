@@ -42,16 +42,16 @@ def log_capability(stream: rr.RecordingStream, results: WorkspaceResults) -> Non
         return
     if len(results.capability):
         _log_voxels(stream, capability, results.capability)
-    places = placement.places if isinstance(placement, PlacementSummary) else ()
-    for number, place in enumerate(places, start=1):
+    places = placement.named_places if isinstance(placement, PlacementSummary) else ()
+    for name, place in places:
         box = rr.Boxes3D(
             centers=[place.centre_m],
             sizes=[place.size_m],
             colors=[rgb(HIGHLIGHT if place.status == "proven" else MUTED)],
-            labels=[str(number)],
+            labels=[name],
             radii=rr.Radius.ui_points(1.5),
         )
-        stream.log(f"workspace/places/{number}", box, static=True)
+        stream.log(f"workspace/places/{name}", box, static=True)
 
 
 def _log_voxels(stream: rr.RecordingStream, capability: CapabilitySummary, cells: CapabilityCells) -> None:
