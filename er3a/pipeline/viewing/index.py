@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -467,6 +468,9 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
+PLACE_LETTERS = 160
+VOID_TAGS = ("br", "img", "input", "wbr", "hr")
+_NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
 FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass")  # what is open stands first
 
 
@@ -484,6 +488,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
+        places=list(_places(study, folder)),
         robots=robots,
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
@@ -498,6 +503,56 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     )
     write_compare(study, results, workspaces, folder / "compare.html")
     write_junit(read_verdicts(study, results), folder / "junit.xml")
+
+
+class _PlacesOfPage(HTMLParser):
+    """Texts by which a reader finds a place of a page: its verdict, headings, captions, and the first cells of rows."""
+
+    NAMED = ("h2", "h3", "caption", "figcaption")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.texts: dict[str, None] = {}
+        self._depth, self._cells, self._parts = 0, 0, list[str]()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "tr":
+            self._cells = 0
+        elif tag in ("td", "th"):
+            self._cells += 1
+        verdict = tag == "section" and "verdict" in (dict(attrs).get("class") or "")
+        if self._depth or verdict or tag in self.NAMED or (tag == "td" and self._cells == 1):
+            self._depth += tag not in VOID_TAGS
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self._depth or tag in VOID_TAGS:
+            return
+        self._depth -= 1
+        if self._depth == 0:
+            text = " ".join("".join(self._parts).split())
+            self._parts = []
+            self.texts[text if len(text) <= PLACE_LETTERS else text[: PLACE_LETTERS - 1] + "…"] = None
+        elif tag in ("p", "small", "a", "dt", "dd"):
+            self._parts.append(" ")
+
+    def handle_data(self, data: str) -> None:
+        if self._depth:
+            self._parts.append(data)
+
+
+def _places(study: Study, folder: Path) -> Iterator[tuple[str, str, list[str]]]:
+    """Of each page that is there its address, its title, and where a reader's words may stand on it."""
+    pages = [(name, stage) for name in study.names for stage in study.pages(name) if stage != "teach"]
+    named = {
+        f"{name}/{stage}.html": f"{own_title(study.robot(name).title)}: {tr(PAGES[stage])}" for name, stage in pages
+    }
+    if study.article:
+        named["article.html"] = tr("The article, sentence by sentence")
+    for address, title in named.items():
+        if (folder / address).is_file():
+            parser = _PlacesOfPage()
+            parser.feed(_NOT_READ.sub("", (folder / address).read_text(encoding="utf-8")))
+            yield address, title, [text for text in parser.texts if len(text) > 1]
 
 
 def _workspace(folder: Path) -> WorkspaceResults | AbsentResults | None:
