@@ -46,7 +46,7 @@ from er3a.robots.robot import Robot
 from er3a.workspace.capability import ClearPoses, map_capability, overall, rings, try_poses
 from er3a.workspace.cell_frame import cell_frame, is_quick
 from er3a.workspace.dexterous import dexterous_core
-from er3a.workspace.directions import RING, cone_directions
+from er3a.workspace.directions import RING, Roll, cone_directions
 from er3a.workspace.orientations import AskedOrientations, asked_of
 from er3a.workspace.placement import (
     MIXED,
@@ -303,7 +303,9 @@ def _placed(
             else:
                 why = "in_the_way" if _in_reach(within, part, plan) else "out_of_reach"
         if place is None:
-            (above,) = listed(task, _best_over(within, support, supports, task, plan, settings, placement)) or (None,)
+            most = settings.proof_poses
+            over = _best_over(within, support, supports, task, asked.roll, most_poses=most, placement=placement)
+            (above,) = listed(task, over) or (None,)
         stands.append(StandSummary(support.name, support.height, place, served_from, why, above))
     return (
         replace(placed, places=listed(task, placement), stands=tuple(stands)),
@@ -356,8 +358,9 @@ def _best_over(
     support: Support,
     supports: Sequence[Support],
     task: Task,
-    plan: CapabilityPlan,
-    settings: CapabilitySettings,
+    roll: Roll,
+    *,
+    most_poses: int,
     placement: BoxPlacement,
 ) -> BoxPlacement:
     """The best of all places of which all of the box is over a support, and nothing over a higher one below it."""
@@ -370,7 +373,7 @@ def _best_over(
         if other.height > support.height:
             over &= ~(other.holds(corners).any(axis=1) & (underside >= other.height))
     rows = np.flatnonzero(over)
-    chosen = choose_places(within, task, places.rows(over), plan.asked.roll, 1, settings.proof_poses)
+    chosen = choose_places(within, task, places.rows(over), roll, 1, most_poses)
     return replace(placement, chosen=replace(chosen, row=[int(rows[row]) for row in chosen.row]))
 
 
