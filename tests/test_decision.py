@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from er3a.pipeline.messages.pages import decision, next_step
+from er3a.pipeline.messages.pages import decision, next_step, what_it_can_do
 from er3a.pipeline.viewing.page import LED, led
 
 
@@ -25,11 +25,15 @@ def test_the_table_decides_first_then_what_fails(table, failed, start):
 
 
 def test_a_table_of_which_nothing_is_settled_is_told_from_one_that_is_nearly():
-    assert decision("caution", [], geometry=(0, 0, 17)).startswith("Not proven")
-    assert decision("caution", [], geometry=(16, 0, 17)).startswith("Use it with care")
-    assert "16 of 17" in decision("caution", [], geometry=(16, 0, 17))
-    assert "16 of 17 entries of its geometry are settled, 14 of them" in decision("caution", [], geometry=(2, 14, 17))
-    assert decision("pass", [], geometry=(0, 0, 17)).startswith("Use it: ")
+    assert decision("caution", [], unproven=True).startswith("Don't rely on it yet")
+    assert decision("caution", []).startswith("Use it with care")
+    assert decision("pass", [], unproven=True).startswith("Use it: ")
+
+
+def test_what_the_arm_can_do_names_each_stage_once_what_is_open_first():
+    said = what_it_can_do({"pass": ["b"], "fail": ["a"], "no_reference": ["c"], "not_computed": ["d"]})
+    assert said == "Fails: a. Nothing fails in b. Not known: c, d."
+    assert what_it_can_do({}) == ""
 
 
 @pytest.mark.parametrize(("end", "gap"), [(".", " "), (";", " "), ("。", ""), ("；", "")])

@@ -3,9 +3,12 @@
 A lattice of points is asked for all directions of a cone, branch by branch. A box fits where all lattice points in it
 are good, which sliding minima tell for all places at once. The lattice only proposes.
 
-Criterion: places where one branch serves the whole box come first, then those with the largest least manipulability
-over the box and the cone, which keeps away from singularities; equals by the distance from the joint limits. That
-distance is a demand of its own too: the task narrows the limits.
+Criterion: places where one branch serves the whole box come first, of these proven ones. Then the least manipulability
+over the box and the cone, which keeps away from singularities, and the least distance from the joint limits are
+weighed: each as a share of the best of all places, and the smaller share counts. That distance is a demand of its own
+too: the task narrows the limits.
+
+A box that stands on something has its underside on a :class:`Support`, over which all of it lies.
 
 For the proof the box times the cone is split into bricks with patches of directions until one branch and roll is good
 for each whole piece (:mod:`er3a.workspace.interval_inverse`), or the middle of a piece turns out to be out of reach.
@@ -19,8 +22,10 @@ from typing import Any, Literal
 
 import numpy as np
 import scipy
+import scipy.optimize
 from numpy.typing import NDArray
 
+from er3a.collision.scene import Box, Cylinder, Plane, Scene
 from er3a.kinematics.block_inverse import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.solutions import slot_labels
@@ -45,6 +50,8 @@ from er3a.workspace.section_arm import FULL_TURN
 from er3a.workspace.tool_inverse import all_solutions, proofs_hold, slot_count
 
 NO = -1.0
+NOTHING = 1e-12
+_LEVEL = 1e-9
 MIXED = -1
 """The branch of a box that no single branch serves."""
 _POSES = 50_000
@@ -53,6 +60,69 @@ Free = Callable[[Reals], Flags]
 """Which arms (N, n), rad, are free of collisions, (N,)."""
 InCone = Callable[[Reals, Reals, float, float], Reals]
 """What is asked at points; see :meth:`er3a.workspace.orientations.AskedOrientations.in_cone`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """A level surface of a scene that a box can stand on.
+
+    Attributes
+    ----------
+    name : of its solid; height : m
+    outline : (k, 2), m, corners of a convex polygon, counter-clockwise; none where it has no end
+    """
+
+    name: str
+    height: float
+    outline: Reals
+
+    def holds(self, points: Reals) -> Flags:
+        """Which points (..., 2), m, lie over it."""
+        inside = np.ones(points.shape[:-1], dtype=bool)
+        for start, end in zip(self.outline, np.roll(self.outline, -1, axis=0)):
+            along, away = end - start, points - start
+            inside &= along[0] * away[..., 1] - along[1] * away[..., 0] >= -1e-9 * np.hypot(*along)
+        return inside
+
+
+def fits_on(support: Support, box: Reals) -> bool:
+    """Whether a box (3,), m, has room on a support, as given or turned by 90 deg about z."""
+    if not len(support.outline):
+        return True
+    edges = np.roll(support.outline, -1, axis=0) - support.outline
+    outward = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / np.linalg.norm(edges, axis=1)[:, None]
+    bound = np.einsum("ij,ij->i", outward, support.outline)
+    for size in (box[:2], box[1::-1]):  # where the middle may be, so that no corner is beyond an edge
+        inside = bound - np.abs(outward) @ size / 2 + _LEVEL
+        if scipy.optimize.linprog(np.zeros(2), outward, inside, bounds=(None, None)).status == 0:
+            return True
+    return False
+
+
+def supports_of(scene: Scene) -> tuple[Support, ...]:
+    """The level upper sides of a scene's boxes and upright cylinders and its level floors, the highest first."""
+    found = []
+    for solid in scene.solids:
+        if isinstance(solid, Plane) and solid.normal[2] > 1 - _LEVEL:
+            found.append(Support(solid.name, float(solid.offset), np.empty((0, 2))))
+        elif isinstance(solid, Box | Cylinder):
+            upright = np.abs(solid.T[2, :3])
+            k = int(upright.argmax()) if isinstance(solid, Box) else 2
+            if upright[k] > 1 - _LEVEL:
+                half = solid.size[k] / 2 if isinstance(solid, Box) else solid.length / 2
+                found.append(Support(solid.name, float(solid.T[2, 3] + half), _outline(solid, k)))
+    return tuple(sorted(found, key=lambda support: -support.height))
+
+
+def _outline(solid: Box | Cylinder, upright: int) -> Reals:
+    """Corners (k, 2), m, of a solid seen from above, counter-clockwise; ``upright`` is which of its axes is."""
+    if isinstance(solid, Cylinder):
+        turn = np.linspace(0.0, 2.0 * np.pi, 73)[:-1]
+        corners: Reals = solid.T[:2, 3] + solid.radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        return corners
+    a, b = (solid.size[k] / 2 * solid.T[:2, k] for k in range(3) if k != upright)
+    corners = solid.T[:2, 3] + np.array([a + b, b - a, -a - b, a - b])
+    return corners if a[0] * b[1] - a[1] * b[0] > 0 else corners[::-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +137,7 @@ class Task:
     margin : rad, how far joints with less than a full turn keep within their limits, and sums of joints that turn
         within theirs; not those that slide
     step : rad, how far directions in the cone are apart
+    support : what the box stands on, at the height of ``lowest``; None where it may stand anywhere
     """
 
     box: Reals
@@ -76,6 +147,7 @@ class Task:
     clear: float
     margin: float = 0.0
     step: float = RING
+    support: Support | None = None
 
 
 def limited_joints(robot: Robot) -> Flags:
@@ -213,6 +285,9 @@ def _lattice(robot: Robot, task: Task, coarsest: float) -> tuple[Reals, Reals, t
     start = frame.middle - count * spacing
     # Heights count from the lowest place, so that the lowest box lies on lattice points.
     start[2] += (task.lowest - start[2]) % spacing[2]
+    if task.support is not None and len(task.support.outline):
+        corner = task.support.outline.min(axis=0)
+        start[:2] += (corner - start[:2]) % spacing[:2]
     shape = tuple((2 * count + 1).tolist())
     points = start + np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 3) * spacing
     asked = np.flatnonzero(
@@ -220,8 +295,15 @@ def _lattice(robot: Robot, task: Task, coarsest: float) -> tuple[Reals, Reals, t
         & (points[:, 2] >= task.lowest - 1e-9)
         & (np.linalg.norm(points - frame.middle, axis=1) <= frame.ball)
         & frame.holds(points)
+        & (np.True_ if task.support is None else _over(task, task.support, points))
     )
     return start, spacing, shape, points, asked
+
+
+def _over(task: Task, support: Support, points: Reals) -> Flags:
+    """Which points (n, 3), m, a box that stands on a support can hold."""
+    over: Flags = support.holds(points[:, :2]) & (points[:, 2] <= task.lowest + task.box[2] + 1e-9)
+    return over
 
 
 def serve(
@@ -341,13 +423,18 @@ def fitting_places(field: Field, bricks: Flags, box: Reals) -> Places:
     if abs(box[0] - box[1]) > 1e-9:
         found.append(_places(field, bricks, box[[1, 0, 2]], True))
     places = Places(*(np.concatenate([getattr(part, column.name) for part in found]) for column in fields(Places)))
-    merit = (
-        -np.round(np.nan_to_num(places.limit_margin, posinf=2 * np.pi), 6),
-        -np.round(places.least, 9),
-        places.slot == MIXED,
-    )
+    merit = (-np.round(_weighed(places), 6), ~places.proven, places.slot == MIXED)
     order = np.lexsort((*np.round(places.centre.T, 6), -np.round(places.centre[:, 0], 6), *merit))
     return places.rows(order)
+
+
+def _weighed(places: Places) -> Reals:
+    """The smaller of a place's shares (n,) in the best manipulability and the best distance from limits of all."""
+    least = places.least / max(places.least.max(initial=0.0), NOTHING)
+    margin = np.where(np.isinf(places.limit_margin), np.inf, np.nan_to_num(places.limit_margin))
+    best = max(margin[np.isfinite(margin)].max(initial=0.0), NOTHING)
+    weighed: Reals = np.minimum(least, np.where(places.slot == MIXED, 1.0, margin / best))
+    return weighed
 
 
 def _places(field: Field, bricks: Flags, box: Reals, turned: bool) -> Places:

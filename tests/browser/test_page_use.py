@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -160,6 +162,32 @@ def test_a_filter_stays_in_the_address(browser, small_study):
     assert browser.execute_script(shown, field) == kept
 
 
+def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
+    browser.get((small_study.folder / "reports/index.html").as_uri())
+    field = browser.find_element(By.CSS_SELECTOR, ".find input")
+    browser.find_element(By.TAG_NAME, "body").send_keys("/")
+    assert browser.switch_to.active_element == field
+    field.send_keys("line_collides er3a-c60")
+    links = browser.find_elements(By.CSS_SELECTOR, ".elsewhere a")
+    assert {link.get_attribute("href").rsplit("/", 1)[1].split("?")[0] for link in links} >= {"trajectory.html"}
+    assert not browser.find_elements(By.CSS_SELECTOR, ".robot:not(.unfound)")
+    link = next(link for link in links if "er3a_c60/trajectory.html" in link.get_attribute("href"))
+    browser.get(link.get_attribute("href"))
+    field = browser.find_element(By.CSS_SELECTOR, ".find input")
+    field.clear()
+    field.send_keys("line_collides")
+    rows = browser.find_elements(By.CSS_SELECTOR, "#table-paths tbody tr")
+    assert [row.find_element(By.TAG_NAME, "a").text for row in rows if row.is_displayed()] == ["line_collides"]
+    heading = browser.find_element(By.ID, "line_collides")
+    assert heading.is_displayed()
+    assert not browser.find_element(By.ID, "line_out").is_displayed()
+    assert browser.current_url.endswith("?find=line_collides")
+    field.clear()
+    field.send_keys("x" + Keys.BACKSPACE)
+    assert not browser.find_elements(By.CLASS_NAME, "unfound")
+    assert all(row.is_displayed() for row in rows)
+
+
 def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):
     reports = small_study.folder / "reports/er3a_c60"
     counts = {}
@@ -184,8 +212,11 @@ def test_every_table_sorts_by_every_column(browser, small_study, page):
     browser.get((small_study.folder / "reports" / page).as_uri())
     sorted_columns = browser.execute_script(SORT_ALL)
     assert bool(sorted_columns) == browser.execute_script(HAS_TABLES)
-    for written, rising, falling in sorted_columns:
+    for numeric, written, rising, falling in sorted_columns:
         assert sorted(rising) == sorted(falling) == sorted(written)
+        if numeric:
+            values = [float(plain(found[0])) for text in rising if (found := FIRST_NUMBER.search(text))]
+            assert values == sorted(values)
         numbers = [value for value in map(shown_number, rising) if value is not None]
         assert numbers == sorted(numbers)
         if len(numbers) == len(rising):
@@ -198,11 +229,15 @@ def test_cells_with_units_signs_and_marks_sort_by_value(browser, tmp_path, small
         "sign": ["+352", "+10", "", "+19", "+12"],
         "mark": ["✓ 12 deg", "✗ 100 deg", "≥ 3 deg", "< 0.5 deg", "✓ 1.5·10⁻³ deg"],
         "name": ["6R", "pick 2", "2-axis", "pick 10", "arm_3"],
+        "pair": ["30<br>20", "4<br>500", "0", "", "12 to 9"],
+        "time": ["t = 10.00 s", "t = 4.00 s", "one round: 5.1 to 6 s", "7 s", "–"],
     }
     rising = {
         "unit": ["−2 mm", "5.12 mm", "13.8 mm", "1\u202f200 ± 3 mm", "–"],
         "sign": ["+10", "+12", "+19", "+352", ""],
         "mark": ["✓ 1.5·10⁻³ deg", "< 0.5 deg", "≥ 3 deg", "✓ 12 deg", "✗ 100 deg"],
+        "pair": ["0", "4\n500", "12 to 9", "30\n20", ""],
+        "time": ["t = 4.00 s", "one round: 5.1 to 6 s", "7 s", "t = 10.00 s", "–"],
     }
     browser.get((small_study.folder / "reports/er3a_c60/inverse.html").as_uri())
     rows = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in zip(*shown.values()))
@@ -213,9 +248,10 @@ def test_cells_with_units_signs_and_marks_sort_by_value(browser, tmp_path, small
         "document.body.innerHTML = arguments[0]; makeSortable(document.querySelector('table'))",
         table.replace("< 0", "&lt; 0"),
     )
-    orders = dict(zip(shown, (column[1] for column in browser.execute_script(SORT_ALL))))
+    orders = dict(zip(shown, (column[2] for column in browser.execute_script(SORT_ALL))))
     assert orders | rising == orders
     assert sorted(orders["name"]) == sorted(shown["name"])
+    assert orders["name"].index("pick 2") < orders["name"].index("pick 10")
 
 
 SORT_ALL = """
@@ -224,7 +260,7 @@ const columns = [];
 for (const table of document.querySelectorAll("table")) {
   [...table.querySelectorAll(".sort")].forEach((control, column) => {
     const texts = () => [...table.tBodies[0].rows].map((row) => row.cells[column].innerText.trim());
-    const orders = [texts()];
+    const orders = [control.closest("th").classList.contains("n"), texts()];
     for (let press = 0; press < 2; press++) {
       control.click();
       orders.push(texts());
@@ -237,13 +273,21 @@ return columns;
 """
 
 
+FIRST_NUMBER = re.compile("[+−-]?\\d+(?:\u202f\\d{3})*(?:\\.\\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
+
+
 def shown_number(text: str) -> float | None:
     """The value of a number as the pages write it; None for other texts."""
-    plain = text.replace("\u202f", "").replace("−", "-").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
     try:
-        return float(plain.replace("·10", "e"))
+        return float(plain(text))
     except ValueError:
         return None
+
+
+def plain(text: str) -> str:
+    """A number of a page as Python writes it."""
+    superscripts = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    return text.replace("\u202f", "").replace("−", "-").translate(superscripts).replace("·10", "e")
 
 
 PAINTED = """const canvas = document.querySelector("#turning canvas");

@@ -58,6 +58,7 @@ def test_index_leads_to_every_page(browser, small_study):
 
 def test_index_cells_are_links_as_a_whole_and_what_is_open_stands_first(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
+    browser.execute_script("document.querySelectorAll('.robot > details').forEach((part) => (part.open = true))")
     for width in (390, 1440, 2560):
         with chromium.emulating(browser, width):
             assert browser.execute_script(CELLS_THAT_ARE_NO_LINK) == []

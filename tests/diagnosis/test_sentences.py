@@ -77,8 +77,8 @@ from er3a.pipeline.messages.say import is_known, say
         ),
         (
             NoFewFaultsExplain(7260, 1432.8, 444.2, "mm", 321.04),
-            "None of the 7260 hypotheses tried, of one fault or two, explains the data: the best still leaves 444 mm "
-            "of 1433 mm, and none leaves less than 321 mm. This is another arm, or more than two numbers are wrong, or "
+            "None of the 7260 hypotheses tried, of one fault or two, explains the data: of 1433 mm each leaves at "
+            "least 321 mm. This is another arm, or more than two numbers are wrong, or "
             "one is wrong in a way that was not tried, or a reference is wrong.",
         ),
         (

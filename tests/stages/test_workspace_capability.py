@@ -10,10 +10,12 @@ import pytest
 import yaml
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.scene import Box, Plane, Scene
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.yaml_file import load
+from er3a.geometry.transforms import transform
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import branch_labels
@@ -194,6 +196,43 @@ def test_no_place_is_no_error():
     context = context_of(load_robot("er3_600"), done)
     assert context["place_rows"] == []
     assert context["place_picture"] is None
+
+
+def test_a_box_stands_on_a_surface_where_the_arm_leaves_it_room_or_is_told_why_not():
+    def block(name: str, size: list[float], x: float, top: float) -> Box:
+        return Box(name, transform(np.array([x, 0.0, top - size[2] / 2]), np.zeros(3)), np.array(size))
+
+    robot, floor = load_robot("er3_600"), Plane("floor", np.array([0.0, 0.0, 1.0]), -0.3)
+    table, peg = block("table", [0.3, 0.3, 0.1], 0.4, 0.1), block("peg", [0.09, 0.09, 0.2], -0.4, 0.25)
+    scene = Scene("cell", (table, peg, block("far", [0.4, 0.4, 0.1], 2.0, 0.1), floor))
+    asked = settings(placement={"box_mm": [100.0, 100.0, 120.0], "cone_deg": 5})
+    done = tool_capability(robot, asked, 0.04, scene)
+    placed = done.placement
+    stands = {stand.name: stand for stand in placed.stands}
+    assert {name: stand.why_none for name, stand in stands.items()} == {
+        "table": None,
+        "peg": "too_small",
+        "far": "out_of_reach",
+        "floor": "too_low",
+    }
+    stand = placed.stand
+    assert stand == stands["table"]
+    assert placed.best == stand.place
+    # At the table itself the flange's round end would be in it.
+    assert 0 < stand.served_from_m < 0.12
+    centre, size = np.array(stand.place.centre_m), np.array(stand.place.size_m)
+    assert centre[2] - size[2] / 2 == pytest.approx(0.1)
+    assert (np.abs(centre[:2] - [0.4, 0.0]) + size[:2] / 2 <= 0.15 + 1e-9).all()
+    points = centre + (np.array(list(np.ndindex(3, 3, 3))) / 2 - 0.5) * size
+    points = points[points[:, 2] > 0.1 + stand.served_from_m - 1e-9]
+    down = tool_rotations(cone_directions(np.array([0.0, 0.0, -1.0]), 0.0), roll_of(robot, 1))[0, 0]
+    found = inverse_batch(narrowed(robot, np.radians(2)), poses(points, down))
+    free = Bodies(robot, scene).free(found.q.reshape(-1, 6)).reshape(found.within_limits.shape)
+    assert (free & found.within_limits).any(axis=1).all()
+    assert stands["floor"].above is not None
+    context = context_of(robot, done)
+    assert "put it on table" in context["best_text"]
+    assert len(context["stands"]) == 4
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from er3a.collision.scene import Box, Cylinder, Plane, Scene
 from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import jacobian
 from er3a.kinematics.inverse import inverse
@@ -22,12 +24,14 @@ from er3a.workspace.placement import (
     Task,
     choose_places,
     find_places,
+    fits_on,
     fitting_places,
     lattice_spacing,
     narrowed,
     prove_place,
     proven_bricks,
     serve,
+    supports_of,
     survey,
 )
 from testing.arms import placement
@@ -155,7 +159,12 @@ def test_the_criterion_is_the_least_over_box_and_cone(random):
     robot = narrowed(load_robot("er3_600"), TRAY.margin)
     places, roll = places_of(load_robot("er3_600"), TRAY), roll_of(robot, 1)
     assert places.slot[0] != MIXED
-    assert (np.diff(places.least[places.slot != MIXED]) < 1e-8).all()
+    one = places.rows(places.slot != MIXED)
+    shares = np.minimum(one.least / places.least.max(), one.limit_margin / np.nanmax(places.limit_margin))
+    assert (np.diff(one.proven.astype(int)) <= 0).all()
+    assert 0 < one.proven.sum() < len(one.proven)
+    for proven in (True, False):
+        assert (np.diff(shares[one.proven == proven]) < 2e-6).all()
     size = TRAY.box[[1, 0, 2]] if places.turned[0] else TRAY.box
     spacing = lattice_spacing(TRAY.box, 0.06)
     points = lattice_in(places.centre[0], np.ceil(size / spacing - 1e-6) * spacing, spacing)
@@ -273,3 +282,26 @@ def test_a_box_too_large_stands_nowhere():
     assert len(places.slot) == 0
     robot = load_robot("er3_600")
     assert choose_places(robot, task, places, roll_of(robot, 1), 5, 1000).row == []
+
+
+def test_what_is_level_is_a_support_and_a_box_fits_on_it_where_all_of_it_lies_over_it(random):
+    on_its_side = transform(np.array([0.5, 0.1, 0.3]), np.array([np.pi / 2, 0.0, 0.4]))
+    tilted = transform(np.array([0.0, 1.0, 0.0]), np.array([0.1, 0.0, 0.0]))
+    table, post = Box("table", on_its_side, np.array([0.5, 0.2, 0.3])), Cylinder("post", np.eye(4), 0.1, 0.4)
+    floor, wall = Plane("floor", np.array([0.0, 0.0, 1.0]), -0.1), Plane("wall", np.array([1.0, 0.0, 0.0]), -1.0)
+    rod, ramp = Cylinder("rod", on_its_side, 0.1, 0.4), Box("ramp", tilted, np.ones(3))
+    supports = supports_of(Scene("cell", (floor, wall, ramp, rod, post, table)))
+    assert [support.name for support in supports] == ["table", "post", "floor"]
+    assert [support.height for support in supports] == pytest.approx([0.4, 0.2, -0.1])
+    points = np.append(random.uniform(-1, 1, (4000, 2)), np.full((4000, 1), 0.3), axis=1)
+    local = (points - on_its_side[:3, 3]) @ on_its_side[:3, :3]
+    over = (np.abs(local[:, [0, 2]]) <= [0.25, 0.15]).all(axis=1)
+    assert 50 < over.sum() < 500
+    assert np.array_equal(supports[0].holds(points[:, :2]), over)
+    corners = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) / 2
+    for support, middle in ((supports[0], on_its_side[:2, 3]), (supports[1], np.zeros(2))):
+        for size in random.uniform(0.02, 0.4, (40, 2)):
+            # Both outlines are symmetric about their middle: what fits at all fits there.
+            fits = any(support.holds(middle + corners * edges).all() for edges in (size, size[::-1]))
+            assert fits_on(support, np.append(size, 0.1)) == fits
+    assert fits_on(supports[2], np.full(3, 100.0))

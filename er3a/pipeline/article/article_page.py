@@ -228,6 +228,7 @@ PAGES = {
     **dict.fromkeys(("jtraj", "animation", "ctraj", "line_singular", "condition", "avoidance"), "trajectory"),
 }
 """The page of the printed table that shows more of an item, by the item's code."""
+ROUNDING = 1e-6  # mm or deg
 EXAMPLE_DEG = "0,45,-30,0,60,0"
 ERRORS = (
     "circle_error_mm",
@@ -362,7 +363,7 @@ def _head(study: Study, results: Path, stage: str) -> page.Head | None:
 def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str, int]) -> dict[str, Any]:
     """The fields of the items' texts."""
     parts: dict[str, Any] = {key: value for key, value in asdict(numbers).items() if not isinstance(value, dict)}
-    parts |= {key: number(float(parts[key]), 2) for key in ERRORS}
+    parts |= {key: _error(float(parts[key])) for key in ERRORS}
     for letter, table in (("p", numbers.printed), ("c", numbers.corrected), ("r", numbers.real)):
         parts |= {f"{letter}_{key}": value for key, value in _flat(table).items()}
     gone, meeting = numbers.changes_gone, numbers.changes_meeting
@@ -379,6 +380,11 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
         head = _head(study, results, stage)
         parts[f"stage_{stage}"] = tr("This study does not examine it.") if head is None else head.text
     return parts
+
+
+def _error(value: float) -> str:
+    """A difference in mm or deg; what is rounding alone has one size."""
+    return number(value, 2) if abs(value) >= ROUNDING else tr("less than {bound}", bound="10⁻⁶")
 
 
 def _named(changes: tuple[SingleChange, ...]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import (
     BASE,
@@ -125,10 +127,12 @@ def _(found: PairsUnexamined) -> str:
 @say.register
 def _(found: ShapesAssumed) -> str:
     rests = say_as(found, "given" if found.given else "guessed")
-    if not found.near:
-        return rests
-    near = sentence("shapes_assumed.near", margin_mm=found.margin_mm, names=", ".join(found.near))
-    return joined([rests, near], " ")
+    return joined([rests, near_shapes(found.margin_mm, found.near)], " ")
+
+
+def near_shapes(margin_mm: float, names: Sequence[str]) -> str:
+    """What comes so near to assumed shapes that it is not settled; empty where nothing does."""
+    return sentence("shapes_assumed.near", margin_mm=margin_mm, names=", ".join(names)) if names else ""
 
 
 def _link(number: int) -> str:

@@ -153,9 +153,9 @@ TEXTS = texts(
         ),
         "mostly": "The best hypothesis tried: {hypothesis}, which still exceeds the references' uncertainty.",
         "unexplained": (
-            "None of the {tried} hypotheses tried, of one fault or two, explains the data: the best still leaves "
-            "{after} {unit} of {before} {unit}, and none leaves less than {least} {unit}. This is another arm, or "
-            "more than two numbers are wrong, or one is wrong in a way that was not tried, or a reference is wrong."
+            "None of the {tried} hypotheses tried, of one fault or two, explains the data: of {before} {unit} each "
+            "leaves at least {least} {unit}. This is another arm, or more than "
+            "two numbers are wrong, or one is wrong in a way that was not tried, or a reference is wrong."
         ),
         "residual_falls": "{faults}; residual falls from {before} {unit} to {after} {unit}",
         "one_of": "one of {count} that these references can't distinguish ({candidates})",
@@ -373,9 +373,7 @@ def _(found: MainFault) -> str:
 
 @say.register
 def _(found: NoFewFaultsExplain) -> str:
-    return say_as(
-        found, after=shown(found.residual_after), before=shown(found.residual_before), least=shown(found.least)
-    )
+    return say_as(found, before=shown(found.residual_before), least=shown(found.least))
 
 
 def _residual_falls(found: MostLikelyFault | MainFault) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import (
@@ -10,10 +12,12 @@ from er3a.dynamics.plausibility import (
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics.model import (
     AllWithin,
     Compared,
     DataOpen,
+    DynamicsSummary,
     Marginal,
     Need,
     NoData,
@@ -22,7 +26,7 @@ from er3a.pipeline.stages.dynamics.model import (
     Use,
 )
 from er3a.robots.masses import NoBody
-from er3a.robots.robot import Grade
+from er3a.robots.robot import Grade, Robot
 
 QUANTITIES: dict[Quantity, str] = {
     "peak": N_("peak torque"),
@@ -136,9 +140,40 @@ TEXTS = texts(
             "{given_kg_m2:.3g} kg m² given, {about_centre_kg_m2:.3g} if so, {shape_kg_m2:.3g} by the link's shape"
         ),
         "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
+        "payload.bounded": "Payload: at most {kg:.3g} kg on the paths that may be run, by torques on {path}.",
+        "payload.partly": "Not counted, because not known: {what}.",
+        "payload.unknown": "Payload: unknown without {what}.",
+        "payload.not_examined": "Payload: not examined.",
+        "payload.rated": "Its file gives a rated payload of {kg:.3g} kg.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why})",
     }
 )
+
+
+def payload_text(summary: Summary | None, robot: Robot) -> str:
+    """What the arm can carry: the least of what its paths allow, or why that is unknown; and what its maker rates it.
+
+    ``summary`` is the stage's; None where it was not computed.
+    """
+    paths = summary.paths if isinstance(summary, DynamicsSummary) else ()
+    bounds = [
+        (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
+    ]
+    wanted = ("peak", "rated") if getattr(summary, "masses", None) else ("masses",)
+    missing = [each.what for each in getattr(summary, "unknown", ()) if each.what in wanted]
+    if bounds:
+        value, path = min(bounds, key=lambda bound: bound[0])
+        known = sentence("payload.bounded", kg=value, path=path.name)
+        known = joined(
+            [known, sentence("payload.partly", what=joined(map(need_word, missing), ", ")) if missing else ""], " "
+        )
+    elif missing:
+        known = sentence("payload.unknown", what=joined(map(need_word, missing), ", "))
+    else:
+        known = sentence("payload.not_examined")
+    wrist = robot.masses.wrist
+    rated = sentence("payload.rated", kg=wrist.payload) if wrist and np.isfinite(wrist.payload) else ""
+    return joined([known, rated], " ")
 
 
 def need_word(need: Need) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import word
+from er3a.pipeline.messages.say import joined, word
 
 # Words of the lists in which a reader of the report chooses pages; the workflow's rules use them.
 PAGE, INDEX, ALL_ROBOTS = N_("page"), N_("index"), N_("All robots")
@@ -52,6 +52,9 @@ GLOSSARY = {
     N_("authoritative"): N_("of a source: official, CAD or exported; a verdict rests on such sources alone"),
     N_("settled"): N_(
         "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
+    ),
+    N_("up to signs"): N_(
+        "of a settled table entry: its size is, but its sign or half turn hangs on an entry that is open elsewhere"
     ),
     N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
     N_("margin"): N_("how far something is from a limit, in its unit"),
@@ -131,16 +134,14 @@ def decision(
     table: str,
     failed: Sequence[str],
     instead: str | None = None,
-    geometry: tuple[int, int, int] | None = None,
     *,
+    unproven: bool = False,
     same_arm: bool = False,
 ) -> str:
     """What to do with a robot's model, from validation's status and the titles of the stages that failed.
 
-    ``instead`` is a model of the same arm that evidence does not contradict; ``geometry``: how many lengths and
-    twists of a table that is not contradicted independent documents settle, how many more up to signs, and of how many;
-    ``same_arm``: the evidence is of this
-    arm, defined otherwise.
+    ``instead`` is a model of the same arm that evidence does not contradict; ``unproven``: independent documents settle
+    nothing of its geometry; ``same_arm``: the evidence is of this arm, defined otherwise.
     """
     if table == "not_examined":
         return tr("Its table has not been examined yet: run the stage validation before you use it.")
@@ -156,26 +157,28 @@ def decision(
         return tr(
             "Use it: every entry that moves the tool is settled by independent documents, and nothing here fails."
         )
-    if table == "caution" and geometry and not any(geometry[:2]):
-        return tr("Not proven: nothing contradicts its table, but no independent document settles any of its geometry.")
-    if table == "caution" and geometry and geometry[1]:
+    if table == "caution" and unproven:
         return tr(
-            "Use it with care: nothing contradicts its table, and {settled} of {entries} entries of its geometry are "
-            "settled, {signs} of them only up to signs, but not the whole table.",
-            settled=geometry[0] + geometry[1],
-            signs=geometry[1],
-            entries=geometry[2],
-        )
-    if table == "caution" and geometry:
-        return tr(
-            "Use it with care: nothing contradicts its table, and {settled} of {entries} entries of its geometry are "
-            "settled, but not the whole table.",
-            settled=geometry[0],
-            entries=geometry[2],
+            "Don't rely on it yet: nothing contradicts its table, but no independent document settles any of its "
+            "geometry."
         )
     if table == "caution":
         return tr("Use it with care: nothing contradicts its table, but part of it is not settled.")
     return tr("There is no evidence on its table: check it before you use it.")
+
+
+def what_it_can_do(stages: Mapping[str, Sequence[str]]) -> str:
+    """What the arm is good for, from the titles of its stages but validation by their status."""
+    said = {
+        "fail": N_("Fails: {stages}."),
+        "caution": N_("With care: {stages}."),
+        "pass": N_("Nothing fails in {stages}."),
+        "unknown": N_("Not known: {stages}."),
+    }
+    known = dict(stages) | {"unknown": [*stages.get("no_reference", ()), *stages.get("not_computed", ())]}
+    return joined(
+        [tr(text, stages=", ".join(known[status])) for status, text in said.items() if known.get(status)], " "
+    )
 
 
 @dataclass(frozen=True)
@@ -199,20 +202,18 @@ def next_step(
     ``measurement``: the one that validation proposes; the others as of :func:`decision`."""
     validation = f"{robot}/validation.html"
     if table == "fail" and same_arm:
-        return NextStep(tr("Next: take the corrected table from the validation page."), validation)
+        return NextStep(tr("Take the corrected table from the validation page."), validation)
     if table == "fail" and instead:
-        return NextStep(tr("Next: use {robot}, which the same evidence bears out.", robot=instead), f"#{instead}")
+        return NextStep(tr("Use {robot}, which the same evidence bears out.", robot=instead), f"#{instead}")
     if table == "fail":
-        return NextStep(tr("Next: see which entries the evidence contradicts, and what would mend them."), validation)
+        return NextStep(tr("See which entries the evidence contradicts, and what would mend them."), validation)
     if failed:
         stage, title = next(iter(failed.items()))
-        return NextStep(
-            tr("Next: see why {stage} fails, and what to do about it.", stage=title), f"{robot}/{stage}.html"
-        )
+        return NextStep(tr("See why {stage} fails, and what to do about it.", stage=title), f"{robot}/{stage}.html")
     if table == "no_reference":
-        text = tr("Next: gather the manufacturer's data, or compare the table with a URDF by er3a compare.")
+        text = tr("Gather the manufacturer's data, or compare the table with a URDF by er3a compare.")
         return NextStep(text, validation)
-    return NextStep(tr("Next: {what}.", what=measurement), validation) if measurement else None
+    return NextStep(measurement, validation) if measurement else None
 
 
 @dataclass(frozen=True)

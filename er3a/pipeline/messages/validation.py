@@ -210,13 +210,14 @@ def _(found: LeftOpen) -> str:
         sentences.append(
             say_as(found, "tolerance", mm=as_text(found.tolerance.mm, "g"), deg=as_text(found.tolerance.deg, "g"))
         )
-    sentences += _how_far_off(found)
+    sentences += how_far_off(found)
     if found.next_measurement:
         sentences.append(say_as(found, "measurement"))
     return joined([*sentences, *_contradiction(found.contradiction), *_of_claims(found)], " ")
 
 
-def _how_far_off(found: LeftOpen) -> list[str]:
+def how_far_off(found: LeftOpen) -> list[str]:
+    """How far what is open or weak could put the tool off, each a sentence."""
     sentences = []
     if found.off.moves:
         form = "at_least" if found.at_least else "up_to"
@@ -306,6 +307,11 @@ def _(found: Contradiction) -> str:
     if not found.more:
         return say_as(found, "one", stated=stated)
     return say_as(found, "more", stated=stated)
+
+
+def missed_text(found: Contradicted | AnotherArm) -> str:
+    """What a contradicted table gives, and what the documents say."""
+    return _missed(found, "contradicted" if isinstance(found, Contradicted) else "described")
 
 
 def _missed(found: Contradicted | AnotherArm, form: str) -> str:

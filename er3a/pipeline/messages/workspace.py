@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import er3a.pipeline.messages.collision
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
+from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace.model import (
     CapabilityMissing,
     NoVoid,
     OnSurface,
+    PlacementSummary,
+    StandSummary,
     ToolPointsElsewhere,
     VoidAtShoulder,
     VoidUncertain,
@@ -32,7 +37,7 @@ FIGURES = {
     "volume_upper": N_("reached volume, at most"),
     "area_lower": N_("reached area, at least"),
     "area_upper": N_("reached area, at most"),
-    "hull_volume": N_("convex hull of the samples"),
+    "hull_volume": N_("convex hull of the samples: holds voids and dents, misses the rim"),
     "least_reach": N_("least distance from axis 1"),
     "samples": N_("samples"),
 }
@@ -131,6 +136,29 @@ TEXTS = texts(
             "Not computed: a pose takes milliseconds with this arm, and within seconds only points wider apart than "
             "the box could be asked. A larger box or a narrower cone may do."
         ),
+        "stand.fits": "On {name}: centre at ({centre}) mm; {reached}.",
+        "stand.too_low": "Not on {name}: at {height} mm it is lower than the {lowest} mm that the task allows.",
+        "stand.too_small": "Not on {name}: there is no room for it.",
+        "stand.out_of_reach": "Not on {name}: nowhere on it does the tool reach all of the box.",
+        "stand.in_the_way": (
+            "Not on {name} itself: an arm that reaches all of the box comes within {margin} mm of the scene or of "
+            "itself."
+        ),
+        "stand.between": "On a stand of {gap} mm ({least} to {most} mm) on {name}: centre at ({centre}) mm.",
+        "box.unknown": "Box of {box} mm: {why}",
+        "box.nowhere": "Box of {box} mm: no place was found that the tool serves throughout.",
+        "box.put#on": "Box of {box} mm (x, y, z): put it on {name}, its centre at ({centre}) mm; {reached}.",
+        "box.put#over": (
+            "Box of {box} mm (x, y, z): put it on a stand of {gap} mm ({least} to {most} mm) on {name}, its centre at "
+            "({centre}) mm; {reached}. It fits on no surface itself ({none})."
+        ),
+        "box.put#free": (
+            "Box of {box} mm (x, y, z): put its centre at ({centre}) mm; {reached}. No surface is known there."
+        ),
+        "box.proven#all": "the tool is proven to reach all of it",
+        "box.proven#upper": "the tool is proven to reach all of it from {served_from} mm above its underside on",
+        "box.sampled#all": "the tool reaches all points sampled",
+        "box.sampled#upper": "the tool reaches all points sampled from {served_from} mm above its underside on",
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
             "cone."
@@ -158,6 +186,7 @@ def _(found: VoidUnexpected) -> str:
     return joined([where, _advice(found.cause), _changes(found)], " ")
 
 
+SERVED_ALL_M = 1e-6
 CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
 NAMED_CHANGES = 4
 
@@ -276,3 +305,52 @@ def _(found: CapabilityMissing) -> str:
 def _(found: ToolPointsElsewhere) -> str:
     x, y, z = found.direction
     return say_as(found, x=x, y=y, z=z)
+
+
+def box_text(summary: Summary) -> str:
+    """Where to put the box of the study; empty where places were not looked for."""
+    placement = getattr(summary, "placement", None)
+    if placement is None:
+        return ""
+    asked = " × ".join(as_text(value, "g") for value in placement.task.box_mm)
+    if not isinstance(placement, PlacementSummary):
+        return sentence("box.unknown", box=asked, why=say(placement))
+    if not placement.named_places:
+        return sentence("box.nowhere", box=asked)
+    stand, over = placement.stand, placement.over
+    place = placement.best
+    served_from = stand.served_from_m or 0.0 if stand else 0.0
+    form = "upper" if served_from > SERVED_ALL_M else "all"
+    parts = {
+        "box": " × ".join(as_text(round(1000 * edge), "d") for edge in place.size_m),
+        "centre": millimetres(place.centre_m),
+        "reached": sentence(f"box.{place.status}#{form}", served_from=millimetres([served_from])),
+    }
+    if stand:
+        return sentence("box.put#on", name=stand.name, **parts)
+    if over and over.gaps_m:
+        gap, least, most = (millimetres([value]) for value in over.gaps_m)
+        parts |= {"gap": gap, "least": least, "most": most, "none": ", ".join(each.name for each in placement.stands)}
+        return sentence("box.put#over", name=over.name, **parts)
+    return sentence("box.put#free", **parts)
+
+
+def millimetres(values: Sequence[float]) -> str:
+    """Lengths (m) in whole mm, one after the other."""
+    return ", ".join(as_text(round(1000 * value) + 0, "d") for value in values)
+
+
+def stand_text(stand: StandSummary, placement: PlacementSummary) -> str:
+    """Whether the box can stand on a surface; if not why, and how high what would have to stand between them is."""
+    named = {"name": stand.name, "height": millimetres([stand.height_m])}
+    if stand.place and stand.served_from_m is not None:
+        form = "upper" if stand.served_from_m > SERVED_ALL_M else "all"
+        reached = sentence(f"box.{stand.place.status}#{form}", served_from=millimetres([stand.served_from_m]))
+        return sentence("stand.fits", reached=reached, centre=millimetres(stand.place.centre_m), **named)
+    margin, lowest = as_text(placement.margin_mm, "g"), as_text(placement.task.lowest_mm, "g")
+    why = sentence(f"stand.{stand.why_none}", margin=margin, lowest=lowest, **named)
+    if stand.gaps_m is None or stand.above is None:
+        return why
+    gap, least, most = (millimetres([value]) for value in stand.gaps_m)
+    centre = millimetres(stand.above.centre_m)
+    return joined([why, sentence("stand.between", gap=gap, least=least, most=most, centre=centre, **named)], " ")

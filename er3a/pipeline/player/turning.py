@@ -16,9 +16,12 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
+from scipy.spatial import ConvexHull
 
+from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, own_title, tr
+from er3a.pipeline.viewing.palette import MUTED
 
 _HERE = Path(__file__).parent
 STEPS = 65_535  # that the box around everything is divided into
@@ -61,6 +64,55 @@ class ColourScale:
     colours: str
     title: str
     ticks: Sequence[tuple[float, str]]
+
+
+_CORNERS = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
+_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
+CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
+_SHARP = np.cos(np.radians(20.0))  # of the angle between two faces whose edge is drawn
+
+
+def solid_pieces(solid: Box | Cylinder | Mesh) -> list[Reals]:
+    """Points (k, 3), m, whose convex hulls are a solid's pieces."""
+    if isinstance(solid, Box):
+        pieces = [_CORNERS * solid.size]
+    elif isinstance(solid, Mesh):
+        pieces = list(solid.pieces)
+    else:
+        circle, half = solid.radius * CIRCLE, solid.length / 2
+        pieces = [np.concatenate([np.column_stack([circle, np.full(len(circle), z)]) for z in (-half, half)])]
+    return [piece @ solid.T[:3, :3].T + solid.T[:3, 3] for piece in pieces]
+
+
+def scene_layers(scene: Scene | None) -> list[Layer]:
+    """The edges of what stands in a scene, but for planes; none without a scene."""
+    lines: list[Reals] = []
+    for solid in scene.solids if scene else ():
+        if isinstance(solid, Sphere):
+            flat = np.column_stack([solid.radius * CIRCLE, np.zeros(len(CIRCLE))])
+            lines += [np.roll(flat, k, axis=1) + solid.T[:3, 3] for k in range(3)]
+        elif not isinstance(solid, Plane):
+            pieces = solid_pieces(solid)
+            lines += [edge for piece in pieces for edge in _edges(piece)]
+            if isinstance(solid, Cylinder):  # four lines along a wall that turns evenly
+                lines += list(pieces[0].reshape(2, -1, 3)[:, :-1:18].swapaxes(0, 1))
+    if not lines or scene is None:
+        return []
+    gap = np.full((1, 3), np.nan)
+    points = np.concatenate([part for line in lines for part in (line, gap)])
+    return [Layer(own_title(scene.title), "line", 1000 * points, MUTED, 1.5)]
+
+
+def _edges(points: Reals) -> list[Reals]:
+    """The edges (2, 3) of a convex hull at which its faces turn."""
+    hull = ConvexHull(points)
+    normals = hull.equations[:, :3]
+    return [
+        points[np.delete(hull.simplices[face], corner)]
+        for face, neighbours in enumerate(hull.neighbors)
+        for corner, other in enumerate(neighbours)
+        if face < other and normals[face] @ normals[other] < _SHARP
+    ]
 
 
 def turning_figure(

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +26,14 @@ from scipy.spatial import ConvexHull
 from er3a.files.kept_files import write_atomically
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages.collision import near_shapes
+from er3a.pipeline.messages.dynamics import payload_text
+from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.messages.pages import caveat, decision, next_step
-from er3a.pipeline.messages.say import bracketed, say
+from er3a.pipeline.messages.pages import caveat, decision, next_step, what_it_can_do
+from er3a.pipeline.messages.say import bracketed, joined, say
+from er3a.pipeline.messages.validation import how_far_off, missed_text
+from er3a.pipeline.messages.workspace import box_text
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
@@ -39,7 +45,7 @@ from er3a.pipeline.results import (
     result_records,
 )
 from er3a.pipeline.stages.registry import STAGES, all_messages
-from er3a.pipeline.stages.validation.model import DefinedOtherwise, LeftOpen
+from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
@@ -47,7 +53,7 @@ from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import number
-from er3a.pipeline.viewing.page import PAGES, Picture, alternative_table, stage_head, status_word
+from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import shown
@@ -461,6 +467,9 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
+PLACE_LETTERS = 160
+VOID_TAGS = ("br", "img", "input", "wbr", "hr")
+_NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
 FIRST = ("fail", "conflict", "caution", "no_reference", "not_computed", "pass")  # what is open stands first
 
 
@@ -478,6 +487,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
+        places=list(_places(study, folder)),
         robots=robots,
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
@@ -494,6 +504,56 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     write_junit(read_verdicts(study, results), folder / "junit.xml")
 
 
+class _PlacesOfPage(HTMLParser):
+    """Texts by which a reader finds a place of a page: its verdict, headings, captions, and the first cells of rows."""
+
+    NAMED = ("h2", "h3", "caption", "figcaption")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.texts: dict[str, None] = {}
+        self._depth, self._cells, self._parts = 0, 0, list[str]()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag == "tr":
+            self._cells = 0
+        elif tag in ("td", "th"):
+            self._cells += 1
+        verdict = tag == "section" and "verdict" in (dict(attrs).get("class") or "")
+        if self._depth or verdict or tag in self.NAMED or (tag == "td" and self._cells == 1):
+            self._depth += tag not in VOID_TAGS
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self._depth or tag in VOID_TAGS:
+            return
+        self._depth -= 1
+        if self._depth == 0:
+            text = " ".join("".join(self._parts).split())
+            self._parts = []
+            self.texts[text if len(text) <= PLACE_LETTERS else text[: PLACE_LETTERS - 1] + "…"] = None
+        elif tag in ("p", "small", "a", "dt", "dd"):
+            self._parts.append(" ")
+
+    def handle_data(self, data: str) -> None:
+        if self._depth:
+            self._parts.append(data)
+
+
+def _places(study: Study, folder: Path) -> Iterator[tuple[str, str, list[str]]]:
+    """Of each page that is there its address, its title, and where a reader's words may stand on it."""
+    pages = [(name, stage) for name in study.names for stage in study.pages(name) if stage != "teach"]
+    named = {
+        f"{name}/{stage}.html": f"{own_title(study.robot(name).title)}: {tr(PAGES[stage])}" for name, stage in pages
+    }
+    if study.article:
+        named["article.html"] = tr("The article, sentence by sentence")
+    for address, title in named.items():
+        if (folder / address).is_file():
+            parser = _PlacesOfPage()
+            parser.feed(_NOT_READ.sub("", (folder / address).read_text(encoding="utf-8")))
+            yield address, title, [text for text in parser.texts if len(text) > 1]
+
+
 def _workspace(folder: Path) -> WorkspaceResults | AbsentResults | None:
     """What the workspace stage found; None if it has not been computed yet."""
     return read_stage(folder, STAGES["workspace"]).results if is_computed(folder) else None
@@ -501,7 +561,7 @@ def _workspace(folder: Path) -> WorkspaceResults | AbsentResults | None:
 
 def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     """What the index shows of a robot."""
-    expected = study.entry(name).expect
+    robot, expected = study.robot(name), study.entry(name).expect
     stages = [stage for stage in study.stages(name) if stage in STAGES]
     heads = {stage: stage_head(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
     failed = {
@@ -510,42 +570,70 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         if head.status == "fail" and expected.get(stage) != "fail"  # one that is expected is a demonstration
     }
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
-    shown = sorted(heads.values(), key=lambda head: FIRST.index(head.status))
-    meant = [  # to fail, or to hold what fails: these are counted apart from what passes
-        head.stage
-        for head in shown
-        if (head.demonstrations and head.status == "pass")
-        or (head.status in ("caution", "fail") and head.status == expected.get(head.stage))
-    ]
+    by_status: dict[str, list[str]] = {}
+    for stage, head in heads.items():
+        if stage != "validation":
+            by_status.setdefault(head.status, []).append(tr(STAGES[stage].title))
+    by_status.setdefault("not_computed", []).extend(tr(STAGES[stage].title) for stage in stages if stage not in heads)
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
+    unproven, settled = _settled(finding)
     measurement = say(finding.next_measurement) if isinstance(finding, LeftOpen) and finding.next_measurement else ""
     return {
-        "robot": study.robot(name),
+        "robot": robot,
         "table": table,
-        "next": next_step(name, table, failed, instead=instead, same_arm=same_arm, measurement=measurement),
-        "heads": [(head, *page.led(head.text)) for head in shown],
-        "counts": [
-            (status, sum(head.status == status and head.stage not in meant for head in shown)) for status in FIRST
+        "contradicted": table == "fail" and not same_arm,
+        "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
+        "settled": settled,
+        "instead": {instead: f"#{instead}"} if instead else {},
+        "can": [
+            (what_it_can_do(by_status), ""),
+            (
+                payload_text(heads["dynamics"].summary if "dynamics" in heads else None, robot),
+                "dynamics" in heads and "dynamics.html",
+            ),
+            (box_text(heads["workspace"].summary) if "workspace" in heads else "", "workspace.html#placement"),
         ],
-        "demonstrations": len(meant),
+        "shapes": next(
+            (say(replace(shapes, near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""
+        ),
+        "next": next_step(
+            name,
+            table,
+            failed,
+            instead=instead,
+            same_arm=same_arm,
+            measurement=measurement and page.whole_sentence(measurement),
+        ),
+        "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
+        "demonstrations": [head for head in heads.values() if head.demonstrations],
         "expected": expected,
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
-        "decision": decision(
-            table,
-            [*failed.values()],
-            instead,
-            _geometry(finding),
-            same_arm=same_arm,
-        ),
     }
 
 
-def _geometry(finding: object) -> tuple[int, int, int] | None:
-    """How many entries of a table's geometry are settled, how many more up to signs, and of how many, where only
-    part of it is."""
+def _settled(finding: object) -> tuple[bool, str]:
+    """Whether nothing of a table's geometry is settled; and of one that is contradicted by what, of one that is settled
+    in part how much, and how far off the tool could be."""
+    if isinstance(finding, Contradicted | AnotherArm):
+        return False, missed_text(finding)
     if not isinstance(finding, LeftOpen):
-        return None
-    return next(
-        ((part.settled, part.up_to_signs, part.entries) for part in finding.parts if part.part == "geometry"), None
-    )
+        return False, ""
+    part = next((part for part in finding.parts if part.part == "geometry"), None)
+    settled = page.whole_sentence(say(part)) if part else ""
+    return part is not None and not (part.settled or part.up_to_signs), joined([settled, *how_far_off(finding)], " ")
+
+
+def _cell(head: Head) -> dict[str, Any]:
+    """What the index says of a stage: its answer and the rest of its text, without what fails as it is meant to and
+    what all stages of a robot share."""
+    finding = head.finding
+    if head.demonstrations:
+        finding = replace(finding, demonstrations=())
+    verdict = head.summary.verdict
+    unexamined = [say(found) for found in verdict.findings[1:] if found is not verdict.shapes]
+    near = near_shapes(verdict.shapes.margin_mm, verdict.shapes.near) if verdict.shapes else ""
+    text = joined([say(finding).removeprefix("."), *unexamined, near], " ")
+    meant = demonstrated(head.finding.demonstrations) if head.demonstrations else ""
+    lead, rest = page.led(text or tr("All of it is meant to be faulty."))
+    return {"head": head, "lead": lead, "rest": joined([rest, page.whole_sentence(meant) if meant else ""], " ")}

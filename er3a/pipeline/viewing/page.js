@@ -8,7 +8,7 @@ const WORDS = JSON.parse(document.getElementById("script-words").textContent);
 function plain(text) {
   const superscripts = "⁰¹²³⁴⁵⁶⁷⁸⁹";
   const exponent = (shown) => "e" + shown.slice(3).replace("⁻", "-").replace(/[⁰-⁹¹²³]/g, (digit) => superscripts.indexOf(digit));
-  const candidate = text.replace(/[\s\u202f]/g, "").replace("−", "-").replace(/·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+$/, exponent);
+  const candidate = text.trim().replaceAll("\u202f", "").replace("−", "-").replace(/·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+$/, exponent);
   return candidate !== "" && Number.isFinite(Number(candidate)) ? candidate : text;
 }
 
@@ -21,9 +21,10 @@ function textOf(cell) {
 }
 
 const NUMBER = /[+−-]?\d+(?:\u202f\d{3})*(?:\.\d+)?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|e[+−-]?\d+)?/u;
-const LEADING = new RegExp(`^[^\\p{L}\\d+−-]*(${NUMBER.source})(?![\\p{L}\\d_.-])`, "u");
+const LEADING = new RegExp(`^(?:[^\\d:：=]*[:：=])?[^\\p{L}\\d+−-]*(${NUMBER.source})(?![\\p{L}\\d_.-])`, "u");
 
-// The number that a cell begins with, after a mark and before a unit, a spread or words; NaN if it begins otherwise.
+// The number that a cell begins with, after a mark or its name ("t = 4 s") and before a unit, a spread or words; NaN if
+// it begins otherwise.
 function valueOf(text) {
   const exact = numberIn(text);
   const found = Number.isNaN(exact) && LEADING.exec(text);
@@ -37,12 +38,12 @@ function sortedBy(texts) {
   return texts.map((text) => [text, (numeric ? valueOf : numberIn)(text)]);
 }
 
-// Numbers by value, then words by letter; empty cells and dashes come last either way.
+// Numbers by value, then words by letter, with the numbers in them by value; empty cells and dashes come last either way.
 function compare([a, x], [b, y], sign) {
   const rank = (text, number) => (Number.isNaN(number) ? (text === "" || text === "–" ? 2 : 1) : 0);
   const ranks = rank(a, x) - rank(b, y);
   if (ranks !== 0) return ranks;
-  return sign * (rank(a, x) === 0 ? x - y : a.localeCompare(b));
+  return sign * (rank(a, x) === 0 ? x - y : a.localeCompare(b, undefined, { numeric: true }));
 }
 
 // A header's button turns the order: rising, falling, as written.
@@ -318,6 +319,128 @@ function filterFor(table) {
   return field;
 }
 
+const HEADINGS = ["H2", "H3", "SUMMARY", "CAPTION"];
+const CONTAINERS = "h2, h3, p, ul, ol, dl, tr, figure, section, details";
+const WHOLE = "tr, li, dl, figure, .verdict, #turning, .player"; // found or not as one
+const BESIDE = "script, style, thead, .contents, .tools, .pickers"; // goes with what it belongs to
+
+// What a reader sees of an element, folded or not, in small letters.
+function allText(element) {
+  if (element.nodeType === Node.TEXT_NODE) return element.data;
+  if (["SCRIPT", "STYLE", "CANVAS"].includes(element.tagName)) return "";
+  return `${element.alt ?? ""} ${[...element.childNodes].map(allText).join("")} `;
+}
+
+// Leaves of an element what holds all words, counting those of the headings above it; how many places stay.
+function keepFound(element, words, above) {
+  let count = 0;
+  const heads = []; // headings above a child: rank, element, text
+  if (element.matches(BESIDE)) return 0;
+  if (element.matches(WHOLE) || !element.querySelector(CONTAINERS)) {
+    const text = above + allText(element).toLowerCase();
+    count = Number(words.every((word) => text.includes(word)));
+  } else {
+    for (const child of element.children) {
+      const rank = HEADINGS.indexOf(child.tagName);
+      if (rank >= 0) {
+        while (heads.length && heads.at(-1).rank >= rank && rank < 2) heads.pop();
+        heads.push({ rank, child, text: allText(child).toLowerCase() });
+        child.classList.add("unfound");
+        continue;
+      }
+      const found = keepFound(child, words, above + heads.map(({ text }) => text).join(" "));
+      if (found) heads.forEach((head) => head.child.classList.remove("unfound"));
+      count += found;
+    }
+  }
+  element.classList.toggle("unfound", count === 0);
+  if (count && element.tagName === "DETAILS") element.open = true;
+  return count;
+}
+
+// One field over the whole page; the address keeps its words, as "?find=words". The index looks on all pages with it.
+function addFinder() {
+  const main = document.querySelector("main");
+  if (document.body.classList.contains("teach")) return;
+  const box = document.createElement("p");
+  const field = document.createElement("input");
+  const told = document.createElement("span");
+  const elsewhere = document.createElement("ul");
+  box.className = "find";
+  box.role = "search";
+  field.type = "search";
+  field.placeholder = field.ariaLabel = document.getElementById("places") ? WORDS.findAnywhere : WORDS.find;
+  field.value = new URLSearchParams(location.search).get("find") ?? "";
+  told.role = "status";
+  elsewhere.className = "elsewhere";
+  box.append(field, " ", told);
+  document.querySelector("header").append(box, elsewhere);
+  let open = null; // what was unfolded before
+  const find = () => {
+    const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+    main.classList.toggle("finding", words.length > 0);
+    open ??= new Map([...main.querySelectorAll("details")].map((part) => [part, part.open]));
+    if (!words.length) {
+      for (const part of main.querySelectorAll(".unfound")) part.classList.remove("unfound");
+      main.classList.remove("unfound");
+      open.forEach((was, part) => (part.open = was));
+      open = null;
+      told.textContent = "";
+    }
+    const others = words.length ? placesElsewhere(words) : [];
+    elsewhere.replaceChildren(...others.map((each) => linkTo(each, words)));
+    const here = words.length ? keepFound(main, words, "") : 0;
+    const count = others.reduce((sum, { texts }) => sum + texts.length, here);
+    if (words.length) told.textContent = WORDS.found.replace("{count}", count);
+    dispatchEvent(new Event("resize")); // for what takes its size from what was not there
+  };
+  field.addEventListener("input", () => {
+    find();
+    const address = new URL(location.href);
+    if (field.value) address.searchParams.set("find", field.value);
+    else address.searchParams.delete("find");
+    history.replaceState(null, "", address);
+  });
+  addEventListener("keydown", (event) => {
+    const busy = event.target.closest?.("input, select, textarea, canvas, [contenteditable]");
+    if (event.key !== "/" || busy || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    field.focus();
+  });
+  addEventListener("hashchange", () => {
+    if (!document.getElementById(decodeURIComponent(location.hash.slice(1)))?.closest(".unfound")) return;
+    field.value = "";
+    field.dispatchEvent(new Event("input"));
+    document.getElementById(decodeURIComponent(location.hash.slice(1))).scrollIntoView();
+  });
+  if (field.value) find();
+}
+
+const SHOWN_PLACES = 4;
+let places = null; // of all pages, by page: its address, its title, texts
+
+// What other pages have that holds all words, by page.
+function placesElsewhere(words) {
+  const listed = document.getElementById("places");
+  places ??= listed ? JSON.parse(listed.textContent) : [];
+  const holds = (text) => words.every((word) => text.toLowerCase().includes(word));
+  const found = places.map(([address, title, texts]) => ({
+    address, title, texts: texts.filter((text) => holds(`${title} ${text}`)),
+  }));
+  return found.filter(({ texts }) => texts.length);
+}
+
+// A link to a page, which looks for the words there.
+function linkTo({ address, title, texts }, words) {
+  const item = document.createElement("li");
+  const link = document.createElement("a");
+  link.href = `${address}?find=${encodeURIComponent(words.join(" "))}`;
+  link.textContent = title;
+  const more = texts.length > SHOWN_PLACES ? ` … (${texts.length})` : "";
+  item.append(link, `${WORDS.colon}${texts.slice(0, SHOWN_PLACES).join(" · ")}${more}`);
+  return item;
+}
+
 // A table that goes on beyond its right edge fades there.
 function fade(box) {
   const tell = () => box.classList.toggle("more", box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
@@ -562,3 +685,5 @@ for (const link of document.querySelectorAll("[data-packed]")) {
     save(link);
   });
 }
+
+addFinder();

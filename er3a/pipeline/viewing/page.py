@@ -23,6 +23,7 @@ from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.kept_files import write_atomically
 from er3a.files.shipped import INSTALLED, ROOT, view_command
@@ -61,6 +62,9 @@ SCRIPT_WORDS = {
     "close": N_("close"),
     "contents": N_("Contents"),
     "filter": N_("Filter rows by"),
+    "find": N_("Find on this page"),
+    "findAnywhere": N_("Find on all pages"),
+    "found": N_("{count} places"),
     "link": N_("link to this section"),
     "previous": N_("Previous"),
     "next": N_("Next"),
@@ -150,6 +154,7 @@ class ShownFigure:
 
 NUMERICS = {  # key figures that answer no question of a verdict
     "characteristic_length",
+    "hull_volume",
     "power_balance",
     "round_trip_joint_error",
     "samples",
@@ -163,11 +168,10 @@ NUMERICS = {  # key figures that answer no question of a verdict
 class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
-    ``finding`` is what the sentence says; ``caveats`` by the stage that it rests on: what to know first;
-    ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to. ``not_examined``: what
-    the verdict leaves out, and of which. ``numerics``: figures that speak of the computation, not of the arm.
-    ``links``: addresses that words of the text lead to. ``banner`` says on what assumed shapes all rests; ``text`` ends
-    with it.
+    ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
+    to know first; ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to.
+    ``not_examined``: what the verdict leaves out, and of which. ``numerics``: figures of the computation, not of the
+    arm. ``links``: addresses that words of the text lead to.
     """
 
     robot: str
@@ -178,11 +182,26 @@ class Head:
     provenance: Provenance
     caveats: Mapping[str, Caveat]
     demonstrations: int
-    finding: Any
+    summary: Any
     not_examined: tuple[tuple[str, str], ...] = ()
     numerics: tuple[ShownFigure, ...] = ()
     links: Mapping[str, str] = field(default_factory=dict)
-    banner: str = ""
+
+    @property
+    def finding(self) -> Any:
+        """What the verdict says."""
+        return self.summary.verdict.finding
+
+    @property
+    def shapes(self) -> ShapesAssumed | None:
+        """On what assumed shapes of the arm the verdict rests."""
+        found: ShapesAssumed | None = self.summary.verdict.shapes
+        return found
+
+    @property
+    def banner(self) -> str:
+        """On what assumed shapes all rests, as the text ends; empty where no shapes are assumed."""
+        return say(self.shapes) if self.shapes else ""
 
     @property
     def own_text(self) -> str:
@@ -213,7 +232,6 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
     meant = len(getattr(verdict.finding, "demonstrations", ()))
     text = say_all(verdict.findings)
     missed = tuple((left_out_text(each), left_out_names(each)) for each in stored.results.summary.not_examined)
-    banner = say(verdict.shapes) if verdict.shapes else ""
     return Head(
         stored.robot,
         stage,
@@ -223,10 +241,9 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
         stored.provenance,
         caveats,
         meant,
-        verdict.finding,
+        stored.results.summary,
         missed,
         tuple(figure for figure in shown if figure.name in NUMERICS),
-        banner=banner,
     )
 
 

@@ -19,12 +19,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
+from er3a.collision.scene import Scene
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import event_word, type_word
-from er3a.pipeline.player.turning import ColourScale, Layer, turning_figure
+from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
 from er3a.pipeline.stages.trajectory.model import (
     FASTEST,
     AvoidanceRows,
@@ -411,12 +412,15 @@ LOG_RANGE = np.log10(3), np.log10(300)  # of the condition number
 MOST_ARMS = 3
 
 
-def in_space(robot: Robot, results: TrajectoryResults, paths: Sequence[PathSummary]) -> Markup:
-    """Paths with the arm at their ends and at singular poses in a figure that turns; a list chooses the path."""
+def in_space(
+    robot: Robot, results: TrajectoryResults, paths: Sequence[PathSummary], scene: Scene | None = None
+) -> Markup:
+    """Paths in their scene, the arm at their ends and at singular poses, in a figure that turns; a list has all."""
     checks, motions, groups = results.checks, results.avoidance, {}
     for path in paths:
         repaired = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
-        groups[path.name] = list(_layers(robot, path, checks.take(checks.path == path.name), repaired))
+        own = _layers(robot, path, checks.take(checks.path == path.name), repaired)
+        groups[path.name] = [*own, *scene_layers(scene)]
     first = next((path.name for path in paths if path.singularities and path.kind != "joint"), None)
     values = [(3, "3"), (10, "10"), (30, "30"), (300, tr("300 or more"))]
     ticks = [((np.log10(value) - LOG_RANGE[0]) / (LOG_RANGE[1] - LOG_RANGE[0]), text) for value, text in values]

@@ -106,6 +106,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     robot, results = study.robot(stored.robot), stored.results
     summary, checks, avoidance = results.summary, results.checks, results.avoidance
     scene = study.scene(stored.robot, stored.stage)
+    solids = load_scene(scene) if scene else None
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
     paths = _worst_first(summary.paths) if count < len(summary.paths) else summary.paths
@@ -128,8 +129,8 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         clearance=clearance_section(results, count),
         assumed=assumed,
         drawn_paths=count,
-        turning=in_space(robot, results, paths[:count]),
-        player=player(robot, motions(robot, results), load_scene(scene) if scene else None),
+        turning=in_space(robot, results, paths[:count], solids),
+        player=player(robot, motions(robot, results), solids),
         drawing_head=drawing_head(),
     )
 

@@ -20,7 +20,8 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, word
-from er3a.pipeline.messages.workspace import STATUS
+from er3a.pipeline.messages.workspace import STATUS, box_text, millimetres, stand_text
+from er3a.pipeline.player.turning import CIRCLE, solid_pieces
 from er3a.pipeline.stages.workspace.model import (
     BoxPlaces,
     CapabilityCells,
@@ -35,6 +36,7 @@ from er3a.pipeline.stages.workspace.model import (
     Singles,
     TaskSummary,
     WorkspaceResults,
+    WorkspaceSummary,
 )
 from er3a.pipeline.stages.workspace.workspace_figures import slide_names
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
@@ -47,27 +49,14 @@ from er3a.robots.robot import Robot
 ROUNDING = 1e-6  # mm
 
 
-def best_text(placement: PlacementSummary) -> str:
-    """Where to put the box: the first place that is proven, else the first; what there is none of."""
-    if not placement.places:
-        return tr(
-            "No position for a box of {box} mm was found.",
-            box=" × ".join(fixed(value, 0) for value in placement.task.box_mm),
-        )
-    ranked = list(enumerate(placement.places, start=1))
-    row, place = next((each for each in ranked if each[1].status == "proven"), ranked[0])
+def best_text(summary: WorkspaceSummary, placement: PlacementSummary) -> str:
+    """Where to put the box, and what room that place has."""
+    if not placement.named_places:
+        return box_text(summary)
+    place = placement.best
     told = [
-        tr(
-            "Put the box, {along_x} mm along x and {along_y} mm along y, with its centre at ({centre}) mm: number "
-            "{row} of the best positions.",
-            along_x=fixed(1000 * place.size_m[0], 0),
-            along_y=fixed(1000 * place.size_m[1], 0),
-            centre=", ".join(fixed(1000 * value, 0) for value in place.centre_m),
-            row=row,
-        ),
-        tr("The whole task is proven to be reached there; collisions are judged at samples.")
-        if place.status == "proven"
-        else tr("The whole task is reached there, judged at samples."),
+        box_text(summary),
+        tr("Collisions are judged at samples.") if place.status == "proven" else "",
         tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
         _nearest_limit(place),
         _nearest_bodies(place),
@@ -110,7 +99,7 @@ def _room(place: PlaceSummary) -> str:
     return ", ".join(parts)
 
 
-def place_row(row: int, place: PlaceSummary, capability: CapabilitySummary) -> list[str]:
+def place_row(name: str, place: PlaceSummary, capability: CapabilitySummary) -> list[str]:
     if place.branch is None and capability.arm_angles > 1:
         branch = tr("with joints {joints} at several values", joints=numbers(capability.held_joints))
         branch = branch if capability.held_joints else tr("at several arm angles")
@@ -121,8 +110,8 @@ def place_row(row: int, place: PlaceSummary, capability: CapabilitySummary) -> l
     else:
         branch = tr("{branch} (by samples)", branch=branch_word(place.branch))
     return [
-        str(row),
-        ", ".join(fixed(1000 * value, 0) for value in place.centre_m),
+        name,
+        millimetres(place.centre_m),
         " × ".join(fixed(1000 * value, 0) for value in place.size_m),
         word("workspace.status", STATUS, place.status),
         branch,
@@ -137,9 +126,6 @@ def numbers(joints: tuple[int, ...]) -> str:
     return ", ".join(str(joint) for joint in joints)
 
 
-_CORNERS = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
-_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
-_CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 _EDGE_ON = 1e-6  # by which a plane's normal may leave the drawing for the plane to be a line in it
 _STYLE: dict[str, Any] = {"edgecolor": MUTED, "linewidth": 1.1, "hatch": "////", "fill": False, "zorder": 1.5}
 
@@ -166,19 +152,8 @@ def draw_scene(axes: Axes, scene: Scene | None, shown: list[int]) -> None:
 def outlines(solid: Box | Cylinder | Sphere | Mesh, shown: list[int]) -> list[Reals]:
     """The outline of each convex piece of a solid, corners (k, 2) in m, seen along the axis that is not shown."""
     if isinstance(solid, Sphere):
-        return [np.asarray(solid.T)[:3, 3][shown] + solid.radius * _CIRCLE]
-    pieces = [points @ solid.T[:3, :3].T + solid.T[:3, 3] for points in _pieces(solid)]
-    return [piece[scipy.spatial.ConvexHull(piece).vertices] for piece in (own[:, shown] for own in pieces)]
-
-
-def _pieces(solid: Box | Cylinder | Mesh) -> list[Reals]:
-    """Points (k, 3), m, in the solid's frame, whose hulls are its pieces."""
-    if isinstance(solid, Box):
-        return [_CORNERS * solid.size]
-    if isinstance(solid, Mesh):
-        return list(solid.pieces)
-    circle, half = solid.radius * _CIRCLE, solid.length / 2
-    return [np.concatenate([np.column_stack([circle, np.full(len(circle), z)]) for z in (-half, half)])]
+        return [np.asarray(solid.T)[:3, 3][shown] + solid.radius * CIRCLE]
+    return [piece[scipy.spatial.ConvexHull(piece).vertices] for piece in (own[:, shown] for own in solid_pieces(solid))]
 
 
 SHADES = "viridis"
@@ -311,7 +286,7 @@ def placement_views(
         sure = np.ma.masked_where(~proven, value)
         mesh = panel.pcolormesh(*extent, sure.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
         draw_scene(panel, scene, shown)
-        _draw_boxes(panel, placement.places, shown)
+        _draw_boxes(panel, placement.named_places, shown)
         panel.plot(
             *skeleton(robot, np.zeros(robot.joints)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3
         )
@@ -360,14 +335,14 @@ def _raster(points: Reals, steps: list[float], percent: Singles, proven: Flags) 
     return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value, sure
 
 
-def _draw_boxes(axes: Axes, listed: Sequence[PlaceSummary], shown: list[int]) -> None:
-    """Outlines with their numbers; boxes that fall on each other share a label."""
+def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, PlaceSummary]], shown: list[int]) -> None:
+    """Outlines with their names; boxes that fall on each other share a label."""
     labels: dict[tuple[float, float], list[str]] = {}
-    for position, place in enumerate(listed, start=1):
+    for name, place in listed:
         centre, size = (1000 * np.array(part)[shown] for part in (place.centre_m, place.size_m))
         low = centre - size / 2
         axes.add_patch(Rectangle((low[0], low[1]), *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
-        labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(str(position))
+        labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(name)
     shade = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
     near = _LABEL * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
     taken: list[tuple[float, float]] = []
@@ -402,13 +377,14 @@ def _placement_context(
 ) -> dict[str, Any]:
     if not isinstance(placement, PlacementSummary):
         return {"nowhere": say(placement), "best_text": ""}
-    rows = [place_row(n, place, capability) for n, place in enumerate(placement.places, start=1)]
+    rows = [place_row(name, place, capability) for name, place in placement.named_places]
     return {
         "nowhere": "",
         "placing_scene": placement.scene,
         "placing_margin": fixed(placement.margin_mm, 0),
         "try_text": _try_text(robot, placement.task) if capability.asked == "directions" else "",
-        "best_text": best_text(placement),
+        "best_text": best_text(results.summary, placement),
+        "stands": [stand_text(stand, placement) for stand in placement.stands],
         "points_serving": placement.points_serving,
         "place_rows": rows,
         "place_picture": Picture(

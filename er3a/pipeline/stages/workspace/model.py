@@ -511,12 +511,45 @@ class PlaceSummary:
     limit_joint: int | None = None
 
 
+WhyNoStand = Literal["too_low", "too_small", "out_of_reach", "in_the_way"]
+
+
+@dataclass(frozen=True)
+class StandSummary:
+    """A level surface of the scene as a stand for the box.
+
+    Attributes
+    ----------
+    name : of its solid; height_m : in the base frame
+    place : the best on it, None where none fits
+    served_from_m : how far above the box's underside the tool begins to reach all of it; None without a place
+    why_none : why no place fits: it lies lower than the task allows, has no room for the box, is out of the tool's
+        reach, or an arm that reaches all of the box comes too near to the scene or to itself
+    above : where nothing fits on it, the best place over it, on something else between them; None where there is none
+    """
+
+    name: str
+    height_m: float
+    place: PlaceSummary | None
+    served_from_m: float | None
+    why_none: WhyNoStand | None
+    above: PlaceSummary | None
+
+    @property
+    def gaps_m(self) -> tuple[float, float, float] | None:
+        """How high what stands between them would be for the place above, and from what to what it may be."""
+        if self.above is None:
+            return None
+        gap = self.above.centre_m[2] - self.above.size_m[2] / 2 - self.height_m
+        return gap, max(0.0, gap - self.above.room_down_m[2]), gap + self.above.room_up_m[2]
+
+
 @dataclass(frozen=True)
 class PlacementSummary:
     """Where the box can stand: numbers of lattice points and positions, and the best places.
 
     ``scene`` is the title of what the arm may not touch there; None in open space. Nor may it touch itself.
-    ``margin_mm`` is what it keeps from both.
+    ``margin_mm`` is what it keeps from both. ``stands`` are the level surfaces of the scene, the highest first.
     """
 
     scene: str | None
@@ -531,6 +564,36 @@ class PlacementSummary:
     refuted: int
     poses: int
     places: tuple[PlaceSummary, ...]
+    stands: tuple[StandSummary, ...] = ()
+
+    @property
+    def named_places(self) -> list[tuple[str, PlaceSummary]]:
+        """Places on surfaces by their names, then the best of all by their numbers from 1."""
+        standing = [(stand.name, stand.place) for stand in self.stands if stand.place]
+        return [*standing, *((str(number), place) for number, place in enumerate(self.places, start=1))]
+
+    @property
+    def best(self) -> PlaceSummary:
+        """Where to put the box: on a surface, else over one, else anywhere; there must be some place."""
+        stand, over = self.stand, self.over
+        return (stand and stand.place) or (over and over.above) or self.places[0]
+
+    @property
+    def over(self) -> StandSummary | None:
+        """Where nothing fits on a surface, the one over which the best place is, or some place."""
+        over = [stand for stand in self.stands if stand.above]
+        best = self.places[0].centre_m if self.places else None
+        return min(over, key=lambda stand: stand.above is None or stand.above.centre_m != best, default=None)
+
+    @property
+    def stand(self) -> StandSummary | None:
+        """The surface to put the box on: one on which more of it is reached before others, then a proven one."""
+        fitting = [stand for stand in self.stands if stand.place and stand.served_from_m is not None]
+        return min(
+            fitting,
+            key=lambda stand: (stand.served_from_m, stand.place is None or stand.place.status != "proven"),
+            default=None,
+        )
 
 
 Placement = PlacementSummary | ToolPointsElsewhere | PlacementTooLong

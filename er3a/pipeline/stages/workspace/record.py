@@ -98,15 +98,15 @@ def _capability(results: WorkspaceResults) -> Iterator[tuple[str, Logged]]:
         return
     if len(results.capability):
         yield from _voxels(capability, results.capability)
-    places = placement.places if isinstance(placement, PlacementSummary) else ()
-    for number, place in enumerate(places, start=1):
+    places = placement.named_places if isinstance(placement, PlacementSummary) else ()
+    for name, place in places:
         yield (
-            f"places/{number}",
+            f"places/{name}",
             rr.Boxes3D(
                 centers=[place.centre_m],
                 sizes=[place.size_m],
                 colors=[rgb(HIGHLIGHT if place.status == "proven" else MUTED)],
-                labels=[str(number)],
+                labels=[name],
                 radii=rr.Radius.ui_points(1.5),
             ),
         )

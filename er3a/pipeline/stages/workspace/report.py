@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from er3a.collision.scene import Scene
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
@@ -42,7 +43,8 @@ LISTED = 12
 def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None:
     """Render the workspace page of a robot from its results."""
     robot, results = study.robot(stored.robot), stored.results
-    summary = results.summary
+    summary, file = results.summary, study.scene(stored.robot, "capability")
+    scene = load_scene(file) if file else None
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
@@ -56,7 +58,7 @@ def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         method=say(summary.proof.method),
         rule=_rule(summary.enclosed_voids),
         pocket_mm=3000 * summary.pocket_block_m,
-        turning=in_space(robot, results),
+        turning=in_space(robot, results, scene),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
         voids_more=max(0, len(summary.voids) - LISTED),
@@ -64,13 +66,13 @@ def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         unexpected=isinstance(summary.verdict.finding, VoidUnexpected),
         wide=100 * summary.proof.width,
         has_drawing=len(results.drawing) > 0,
-        **_context(robot, results, study.scene(stored.robot, "capability")),
+        **_context(robot, results, scene),
     )
 
 
-def _context(robot: Robot, results: WorkspaceResults, scene: Path | None) -> dict[str, Any]:
+def _context(robot: Robot, results: WorkspaceResults, scene: Scene | None) -> dict[str, Any]:
     summary = results.summary
-    return capability_context(robot, results, load_scene(scene) if scene else None) | {
+    return capability_context(robot, results, scene) | {
         "section": Picture(
             sections(robot, results),
             tr("Sections across the slide of joint 1: density of the samples, and proven cells")

@@ -8,6 +8,7 @@ directions are fewer and cells are coarser.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -34,29 +35,38 @@ from er3a.pipeline.stages.workspace.model import (
     PlaceSummary,
     RollSummary,
     SectionFrame,
+    StandSummary,
     TaskSummary,
     ToolPointsElsewhere,
     Triple,
+    WhyNoStand,
     triple,
 )
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import ClearPoses, map_capability, overall, rings, try_poses
 from er3a.workspace.cell_frame import cell_frame, is_quick
 from er3a.workspace.dexterous import dexterous_core
-from er3a.workspace.directions import RING, cone_directions
+from er3a.workspace.directions import RING, Roll, cone_directions
 from er3a.workspace.orientations import AskedOrientations, asked_of
 from er3a.workspace.placement import (
     MIXED,
     NO,
     BoxPlacement,
     Free,
+    Support,
     Task,
     box_points,
+    choose_places,
     find_places,
+    fits_on,
+    fitting_places,
     lattice_size,
+    lattice_spacing,
     limited_joints,
     narrowed,
     serving_arms,
+    supports_of,
+    survey,
 )
 from er3a.workspace.proven import Proven
 from er3a.workspace.section_proof import ring_volumes
@@ -277,9 +287,96 @@ def _placed(
         robot, task, asked.roll, plan.lattice, LISTED, settings.proof_poses, free=free, in_cone=asked.in_cone
     )
     placed = _placement_summary(robot, settings.placement, task, placement, best, scene=scene, margin=margin)
-    arms = _arms_at(within, free, task, asked, placement)
-    listed = tuple(_with_nearest(place, bodies, q) for place, q in zip(placed.places, arms))
-    return replace(placed, places=listed), model.places(placement.best_turns)
+
+    def listed(own: Task, found: BoxPlacement) -> tuple[PlaceSummary, ...]:
+        arms = _arms_at(within, free, own, asked, found)
+        return tuple(_with_nearest(place, bodies, q) for place, q in zip(_listed(robot, own, found, best), arms))
+
+    stands = []
+    supports = supports_of(scene) if scene else ()
+    for support in supports:
+        place, above, served_from, why = None, None, None, _why_not(support, task)
+        if why is None:
+            part, found = _on_support(robot, support, task, plan, settings, free)
+            if found.chosen.row:
+                (served,) = listed(part, found)
+                served_from = float(part.lowest - support.height)
+                place = _whole_box(served, task)
+            else:
+                why = "in_the_way" if _in_reach(within, part, plan) else "out_of_reach"
+        if place is None:
+            most = settings.proof_poses
+            over = _best_over(within, support, supports, task, asked.roll, most_poses=most, placement=placement)
+            (above,) = listed(task, over) or (None,)
+        stands.append(StandSummary(support.name, support.height, place, served_from, why, above))
+    return (
+        replace(placed, places=listed(task, placement), stands=tuple(stands)),
+        model.places(placement.best_turns),
+    )
+
+
+def _why_not(support: Support, task: Task) -> WhyNoStand | None:
+    """What of a support alone keeps the box from standing on it."""
+    if support.height < task.lowest - 1e-9:
+        return "too_low"
+    return None if fits_on(support, task.box) else "too_small"
+
+
+def _on_support(
+    robot: Robot, support: Support, task: Task, plan: CapabilityPlan, settings: CapabilitySettings, free: Free
+) -> tuple[Task, BoxPlacement]:
+    """The best place on a support: for all of the box, or without as little of its lowest part as can't be reached.
+
+    Returns the task for the part that is asked last, and what was found for it.
+    """
+    assert plan.lattice is not None
+    layer = lattice_spacing(task.box, plan.lattice)[2]
+    for k in range(round(task.box[2] / layer)):
+        left_out = np.array([0.0, 0.0, k * layer])
+        part = replace(task, box=task.box - left_out, lowest=support.height + k * layer, support=support)
+        found = find_places(
+            robot, part, plan.asked.roll, plan.lattice, 1, settings.proof_poses, free=free, in_cone=plan.asked.in_cone
+        )
+        if found.chosen.row:
+            break
+    return part, found
+
+
+def _whole_box(served: PlaceSummary, task: Task) -> PlaceSummary:
+    """The place of the box of whose upper part this is the place."""
+    (x, y, z), below = served.centre_m, float(task.box[2]) - served.size_m[2]
+    return replace(served, centre_m=(x, y, z - below / 2), size_m=(*served.size_m[:2], float(task.box[2])))
+
+
+def _in_reach(within: Robot, part: Task, plan: CapabilityPlan) -> bool:
+    """Whether the box fits somewhere where only reach counts."""
+    assert plan.lattice is not None
+    field = survey(within, part, plan.asked.roll, plan.lattice, in_cone=plan.asked.in_cone)
+    return bool(len(fitting_places(field, np.zeros(np.array(field.least_any.shape) - 1, bool), part.box).slot))
+
+
+def _best_over(
+    within: Robot,
+    support: Support,
+    supports: Sequence[Support],
+    task: Task,
+    roll: Roll,
+    *,
+    most_poses: int,
+    placement: BoxPlacement,
+) -> BoxPlacement:
+    """The best of all places of which all of the box is over a support, and nothing over a higher one below it."""
+    places = placement.places
+    half = np.where(places.turned[:, None], task.box[[1, 0]], task.box[:2]) / 2
+    corners = places.centre[:, None, :2] + half[:, None] * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 0]])
+    underside = places.centre[:, 2] - task.box[2] / 2
+    over = support.holds(corners).all(axis=1) & (underside > support.height)
+    for other in supports:
+        if other.height > support.height:
+            over &= ~(other.holds(corners).any(axis=1) & (underside >= other.height))
+    rows = np.flatnonzero(over)
+    chosen = choose_places(within, task, places.rows(over), roll, 1, most_poses)
+    return replace(placement, chosen=replace(chosen, row=[int(rows[row]) for row in chosen.row]))
 
 
 def _tried(
@@ -353,7 +450,7 @@ def _placement_summary(
         fitting_proven=int(places.proven.sum()),
         refuted=placement.chosen.refuted,
         poses=placement.chosen.poses,
-        places=tuple(_listed(robot, task, placement, best)),
+        places=(),
     )
 
 

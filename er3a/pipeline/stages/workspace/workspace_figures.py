@@ -16,12 +16,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
+from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import POINTS, SWEEPS
-from er3a.pipeline.player.turning import ColourScale, Layer, turning_figure
+from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
 from er3a.pipeline.stages.workspace.model import (
     AxisSummary,
     Bars,
@@ -442,8 +443,8 @@ _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 _NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
 
 
-def in_space(robot: Robot, results: WorkspaceResults) -> Markup:
-    """The cloud's far half, the voids and the arm at zero in a figure that turns."""
+def in_space(robot: Robot, results: WorkspaceResults, scene: Scene | None) -> Markup:
+    """The cloud's far half, the voids, the scene and the arm at zero in a figure that turns."""
     cloud, vertices, triangles = results.cloud, results.void_vertices, results.void_triangles
     far = np.flatnonzero(cloud.point_m[:, 1] >= results.summary.axis.point_m[1])[:CLOUD_POINTS]
     value = cloud.manipulability_m3[far]
@@ -455,5 +456,6 @@ def in_space(robot: Robot, results: WorkspaceResults) -> Markup:
             name, corners = tr(_NAMES[void.kind], number=i), 1000 * vertices.point_m[vertices.void == i]
             layers.append(Layer(name, "surface", corners, _COLOURS[void.kind], faces=faces))
     layers.append(Layer(tr("arm at 0"), "line", 1000 * skeleton(robot, np.zeros(robot.joints)), width=5.0))
+    layers += scene_layers(scene)
     scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
     return turning_figure({"": layers}, scale)
