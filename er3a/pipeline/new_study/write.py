@@ -240,8 +240,8 @@ def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
         return []
     pairs = ", ".join(pair.label for pair in search.bodies.unexamined)
     return [
-        f"Collisions of {pairs} were not examined: these shapes overlap in every joint vector tried, which no arm can "
-        f"do. {_remedy(arm)}"
+        f"Collisions of {pairs} were not examined: these shapes overlap where no arm's can. "
+        f"{_remedy(arm)}"
     ]
 
 
