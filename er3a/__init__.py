@@ -32,12 +32,17 @@ if TYPE_CHECKING:
     from er3a.kinematics.inverse import inverse as inverse
     from er3a.kinematics.numerical import solve as solve
     from er3a.kinematics.singularity import conditioning as conditioning
+    from er3a.kinematics.symbolic import arm_transform as arm_transform
+    from er3a.kinematics.symbolic import link_transforms as link_transforms
     from er3a.pipeline.viewing.plot import plot as plot
     from er3a.planning.follow import follow as follow
     from er3a.planning.moves import line as line
     from er3a.planning.toolbox import ctraj as ctraj
     from er3a.planning.toolbox import jtraj as jtraj
+    from er3a.planning.toolbox import pose as pose
+    from er3a.planning.toolbox import quaternion as quaternion
     from er3a.planning.toolbox import rpy as rpy
+    from er3a.planning.toolbox import zyz as zyz
     from er3a.program_check.check_program import CheckOptions as CheckOptions
     from er3a.program_check.check_program import check_program as check_program
     from er3a.programs.languages import read_program as read_program
@@ -64,7 +69,12 @@ _PUBLIC = {
     "inverse_batch": "er3a.kinematics.batch",
     "solve": "er3a.kinematics.numerical",
     "conditioning": "er3a.kinematics.singularity",
+    "link_transforms": "er3a.kinematics.symbolic",
+    "arm_transform": "er3a.kinematics.symbolic",
+    "pose": "er3a.planning.toolbox",
     "rpy": "er3a.planning.toolbox",
+    "zyz": "er3a.planning.toolbox",
+    "quaternion": "er3a.planning.toolbox",
     "jtraj": "er3a.planning.toolbox",
     "ctraj": "er3a.planning.toolbox",
     "line": "er3a.planning.moves",

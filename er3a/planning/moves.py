@@ -234,9 +234,13 @@ def line(
 
     Raises
     ------
+    Er3aError
+        if the duration is no number, but times, which :func:`er3a.ctraj` takes
     PoseError
         if a pose is no rigid transform, or ``half_turn_axis`` can't choose
     """
+    if np.ndim(duration):
+        raise Er3aError(f"duration has shape {np.shape(duration)}; expected s, such as 5.0. Poses at times: er3a.ctraj")
     T_start, T_end = check_poses(T_start, "T_start"), check_poses(T_end, "T_end")
     rotation, half_turn = rotation_between(T_start, T_end, half_turn_axis)
     return Line(T_start, rotation, duration, half_turn, ramp, T_end[:3, 3] - T_start[:3, 3])

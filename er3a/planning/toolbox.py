@@ -1,4 +1,6 @@
-"""What users of the Robotics Toolbox know by these names: ``jtraj``, ``ctraj``, ``rpy``. Times are in seconds.
+"""What users of the Robotics Toolbox know by these or other names; times are in seconds, angles in radians.
+
+``pose`` (``transl(...) * rpy2tr(...)``), ``rpy`` (``tr2rpy``), ``zyz`` (``tr2eul``), ``quaternion``, ``jtraj``, ``ctraj``.
 
 References
 ----------
@@ -8,12 +10,53 @@ References
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from er3a.errors import Er3aError, ShapeError
-from er3a.geometry.transforms import as_floats, check_poses, rpy_of
+from er3a.geometry.transforms import as_floats, check_poses, rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.planning.moves import JointMove, line
 from er3a.robots.usable import warn_of_degrees
+
+
+RAMP = 1 / 3  # of the time, of ctraj's trapezoid
+LOCKED = 1e-9  # sine of a tilt below which only the sum or difference of ZYZ's outer angles counts
+
+
+def pose(
+    position: Reals, rpy: Reals | None = None, *, zyz: Reals | None = None, quaternion: Reals | None = None
+) -> Reals:
+    """The pose at a position, as ``transl(position) * rpy2tr(rpy, 'zyx')`` gives it [1]_.
+
+    Parameters
+    ----------
+    position : (3,), m
+    rpy : (3,), rad, roll, pitch, yaw: ``R = Rz(yaw) @ Ry(pitch) @ Rx(roll)``
+    zyz : (3,), rad, Euler angles instead: ``R = Rz(phi) @ Ry(theta) @ Rz(psi)``
+    quaternion : (4,), w, x, y, z instead, of any length but 0. Without any of the three the axes are the base's
+
+    Returns
+    -------
+    T : (4, 4), m
+
+    Raises
+    ------
+    Er3aError, PoseError, ShapeError
+        naming the argument
+    """
+    place = _numbers(position, "position", 3)
+    given = {"rpy": (rpy, 3), "zyz": (zyz, 3), "quaternion": (quaternion, 4)}
+    turned = {name: _numbers(values, name, size) for name, (values, size) in given.items() if values is not None}
+    if len(turned) > 1:
+        raise Er3aError(f"{' and '.join(turned)} each give an orientation; expected one of rpy, zyz and quaternion")
+    T = transform(place, turned.get("rpy", np.zeros(3)))
+    if "zyz" in turned:
+        T[:3, :3] = Rotation.from_euler("ZYZ", turned["zyz"]).as_matrix()
+    if "quaternion" in turned:
+        if not turned["quaternion"].any():
+            raise Er3aError("quaternion is 0; expected w, x, y, z, such as [1, 0, 0, 0]")
+        T[:3, :3] = Rotation.from_quat(turned["quaternion"], scalar_first=True).as_matrix()
+    return T
 
 
 def rpy(T: Reals) -> Reals:
@@ -32,8 +75,45 @@ def rpy(T: Reals) -> Reals:
     PoseError, ShapeError
         if T is no rigid transform
     """
+    return rpy_of(check_poses(T))
+
+
+def zyz(T: Reals) -> Reals:
+    """Euler angles phi, theta, psi of poses: ``R = Rz(phi) @ Ry(theta) @ Rz(psi)``, as ``tr2eul(T)`` gives them [1]_.
+
+    Parameters
+    ----------
+    T : (..., 4, 4)
+
+    Returns
+    -------
+    angles : (..., 3), rad; theta from 0 to pi, and psi 0 where theta is at an end, as only their sum or difference
+        counts there
+
+    Raises
+    ------
+    PoseError, ShapeError
+        if T is no rigid transform
+    """
+    R = check_poses(T)[..., :3, :3]
+    tilt = np.hypot(R[..., 0, 2], R[..., 1, 2])
+    locked = tilt < LOCKED
+    phi = np.where(locked, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 2], R[..., 0, 2]))
+    psi = np.where(locked, 0.0, np.arctan2(R[..., 2, 1], -R[..., 2, 0]))
+    return np.stack([phi, np.arctan2(tilt, R[..., 2, 2]), psi], axis=-1)
+
+
+def quaternion(T: Reals) -> Reals:
+    """Unit quaternions (..., 4), w, x, y, z with w at least 0, of poses (..., 4, 4).
+
+    Raises
+    ------
+    PoseError, ShapeError
+        if T is no rigid transform
+    """
     T = check_poses(T)
-    return np.array([rpy_of(each) for each in T.reshape(-1, 4, 4)]).reshape(*T.shape[:-2], 3)
+    found = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    return np.asarray(found, float).reshape(*T.shape[:-2], 4)
 
 
 def jtraj(
@@ -66,7 +146,9 @@ def jtraj(
 
 
 def ctraj(T_start: Reals, T_end: Reals, t: Reals) -> Reals:
-    """Poses on the straight line between two, on a quintic from rest to rest; the turn is about one axis.
+    """Poses on the straight line between two, from rest to rest; the turn is about one axis.
+
+    The time law is the Toolbox's: a trapezoid of speed with ramps of a third of the time (``lspb``) [1]_.
 
     Parameters
     ----------
@@ -75,7 +157,8 @@ def ctraj(T_start: Reals, T_end: Reals, t: Reals) -> Reals:
 
     Returns
     -------
-    T : (N, 4, 4), for :func:`er3a.solve` or :func:`er3a.inverse_batch`; :func:`er3a.follow` takes an ``er3a.line``
+    T : (N, 4, 4), for :func:`er3a.solve` or :func:`er3a.inverse_batch`; :func:`er3a.follow` takes an ``er3a.line``,
+        which has this time law with ``ramp=1/3``
 
     Raises
     ------
@@ -83,7 +166,18 @@ def ctraj(T_start: Reals, T_end: Reals, t: Reals) -> Reals:
         naming the argument
     """
     t = _times(t)
-    return line(T_start, T_end, float(t[-1] - t[0])).at(t - t[0])
+    return line(T_start, T_end, float(t[-1] - t[0]), ramp=RAMP).at(t - t[0])
+
+
+def _numbers(values: Reals, argument: str, size: int) -> Reals:
+    found = as_floats(values, argument)
+    if found.shape != (size,):
+        raise ShapeError(argument, found.shape, f"({size},)")
+    if not np.isfinite(found).all():
+        raise Er3aError(f"{argument} holds NaN or infinity")
+    if argument in ("rpy", "zyz"):
+        warn_of_degrees(found, argument, stacklevel=4)
+    return found
 
 
 def _times(t: Reals) -> Reals:
