@@ -57,7 +57,7 @@ WORDS = {
         "Drag to turn, wheel or + and − to zoom. A click into a plot or on a time leads to that moment; coloured marks "
         "on the time bar are events."
     ),
-    "no_script": N_("The player needs JavaScript; the recording of this stage shows the same in the Rerun viewer."),
+    "no_script": N_("The player needs JavaScript; recordings show the same in the Rerun viewer."),
 }
 
 
@@ -92,7 +92,7 @@ class PlayedMotion:
 
     Attributes
     ----------
-    name, text : what it is called, and what is said of it where no event is near
+    name, text : what it is called, and what is said of it where no event is near; label : for people, if not the name
     t : (N,), s, rising; q : (N, n), joint coordinates, finite
     timed : false where no times are known: ``t`` counts points then, which are shown at an even pace
     beside : (N, n) each, joint coordinates of the arms that stand beside the first
@@ -106,6 +106,7 @@ class PlayedMotion:
     marks: Sequence[Mark] = field(default=())
     timed: bool = True
     beside: Sequence[Reals] = ()
+    label: str = ""
 
 
 def player(
