@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from er3a.collision.along import clearance as clearance
     from er3a.comparison.compare import Comparison as Comparison
     from er3a.comparison.compare import compare as compare
     from er3a.dynamics.torques import gravity as gravity
@@ -80,6 +81,7 @@ _PUBLIC = {
     "line": "er3a.planning.moves",
     "follow": "er3a.planning.follow",
     "plot": "er3a.pipeline.viewing.plot",
+    "clearance": "er3a.collision.along",
     "select": "er3a.selection.select",
     "select_sequence": "er3a.selection.sequence",
     "torques": "er3a.dynamics.torques",

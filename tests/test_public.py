@@ -60,6 +60,7 @@ CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "arm_transform": lambda robot, T: er3a.arm_transform(robot),
     "follow": lambda robot, T: er3a.follow(robot, er3a.line(T, T, 1.0), np.array([0.0, 1.0])),
     "plot": lambda robot, T: er3a.plot(robot, Q),
+    "clearance": lambda robot, T: er3a.clearance(robot, Q, None),
     "select": lambda robot, T: er3a.select(robot, er3a.inverse(er3a.load_robot("er3_600"), T), "nearest", Q),
     "select_sequence": lambda robot, T: er3a.select_sequence(robot, [er3a.inverse(er3a.load_robot("er3_600"), T)], Q),
     "load_targets": lambda robot, T: er3a.load_targets("data/targets/er3_600.yaml", robot),

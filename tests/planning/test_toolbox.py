@@ -113,6 +113,7 @@ def test_another_unit_in_a_table_is_warned_of():
         (lambda arm, line: er3a.jtraj(np.zeros(6), GOAL, T[::-1]), "does not rise"),
         (lambda arm, line: er3a.jtraj(np.zeros(5), GOAL, T), "q_end has shape"),
         (lambda arm, line: er3a.plot(arm, np.zeros(5)), "q has shape"),
+        (lambda arm, line: er3a.plot(arm, np.zeros(6), window=(0, 1)), "window has shape"),
     ],
 )
 def test_nothing_goes_beyond_the_ends_in_silence(arm, call, message):
@@ -140,5 +141,7 @@ def test_plot_draws_the_arm_where_it_is(arm):
     figure = er3a.plot(arm, GOAL)
     corners = np.array(figure.axes[0].lines[0].get_data_3d()).T
     assert np.allclose(corners[-1], er3a.forward(arm, GOAL)[:3, 3], atol=1e-12)
+    assert figure.axes[0].get_zlim()[0] < 0
+    assert er3a.plot(arm, GOAL, window=(-1.5, 1.5, -1.5, 1.5, 0, 1.5)).axes[0].get_zlim() == (0, 1.5)
     moving = er3a.plot(arm, er3a.jtraj(np.zeros(6), GOAL, T[:2])[0])
     assert moving.to_jshtml().count("data:image") == 2

@@ -384,8 +384,8 @@ ITEMS = (
             "most {p_line_speed_deg_s:.0f}°/s, of joint {peak_joint} at t = {peak_s:.1f} s (figure {figure_line})."
         ),
         N_(
-            "The article's own line is singular at its start and once more, which it does not mention. No harm is done "
-            "there: this line passes the singularity in the one direction that the tool keeps."
+            "The article's own line is singular at its start and once more, which it does not mention. This does no harm "
+            "here: the line asks for no motion in the direction that the tool loses."
         ),
     ),
     Item(
@@ -479,7 +479,7 @@ ITEMS = (
     Item(
         "collision",
         "6.3",
-        'er3a.clearance(robot, q_t, er3a.load_scene("data/scenes/wall_and_low_floor.yaml"))',
+        'er3a.clearance(robot, q_t, er3a.load_scene("data/scenes/wall_and_low_floor.yaml")).distance',
         N_("Collisions"),
         N_("Links as cylinders and boxes, checked along the path."),
         N_(
@@ -501,7 +501,7 @@ ITEMS = (
     Item(
         "vision",
         "6.3",
-        'er3a.calibrate_hand_eye(er3a.load_hand_eye("data/vision/fixed_camera.yaml"), er3a.load_robot("er3a_c60"))',
+        'er3a.calibrate_hand_eye(er3a.load_hand_eye("data/vision/fixed_camera.yaml", robot))',
         N_("Camera"),
         N_("A calibrated camera gives a part's pose in the base frame, and inverse kinematics the joints to grasp it."),
         "{stage_vision}",

@@ -11,7 +11,7 @@ from er3a.comparison.compare import (
     RangeDifference,
     RangeLayer,
 )
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.say import joined, say, word
 
 LAYERS = {
@@ -75,9 +75,11 @@ def _detail(name: str, found: Comparison) -> str:
         return say(layer)
     if name == "zero" and not layer.same:
         moved = [(k, value) for k, value in enumerate(layer.offsets_deg, 1) if abs(value) > 1e-3]
-        return ", ".join(f"J{k} {value:+.6g}" for k, value in moved)
+        return ", ".join(f"J{k} {with_unit(f'{value:+.6g}', 'deg')}" for k, value in moved)
     if name == "directions" and not layer.same:
         return tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
+    if name == "limits" and layer.same is False:
+        return tr("{limits} (the second's limits by the first's zeros and directions)", limits=say(layer))
     if name == "coupling":
         return tr("rows {rows}", rows=", ".join(map(str, layer.rows)))
     return "" if layer.same is not False else say(layer)
