@@ -121,7 +121,7 @@ def _write(
         agreement_words=AGREEMENT,
         sections=[(code, title, [rows[k] for k in _of_section(code)]) for code, title in SECTIONS.items()],
         compared=_compared(numbers),
-        mark=mark,
+        pages_in=mark,
         roles=[tr(word) for word in ROLES.values()],
         robots=[(name, study.robot(name), study.pages(name)) for name in tables.names],
         table_columns=["i>", "a (mm)>", "α (°)>", "d (mm)>", tr("offset (°)>"), tr("limits (°)>")],
