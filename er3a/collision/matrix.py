@@ -19,9 +19,9 @@ harmless:
 - *overlaps*: they overlap in all joint vectors drawn, none in which they don't was found in the boxes, and no joint
   explains it. No arm is built like that, so the shapes are wrong: what overlaps is left out, and has to be named
   wherever it is not examined;
-- *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`) that would be joined, but the table gives the link
-  between them no length, so that the guess leaves its housing no room, and what is left of the two overlaps in many of
-  the joint vectors drawn (``POOR_GUESS``). The pair is left out, and has to be named too;
+- *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`) that would be joined, but the table gives the
+  link between them no length, so that the guess leaves its housing no room, and what is left of the two overlaps in
+  many of the joint vectors drawn (``POOR_GUESS``). The pair is left out, and has to be named too;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: watched;
 - *undecided*: none of this within the number of boxes: watched.
 

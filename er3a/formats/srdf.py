@@ -38,4 +38,6 @@ def export_srdf(robot: Robot) -> str:
 
 def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
     """Pairs of links that the SRDF disables because their shapes can't be right."""
-    return tuple(f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if REASONS.get(row.state) == "Default")
+    return tuple(
+        f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if REASONS.get(row.state) == "Default"
+    )

@@ -1,6 +1,7 @@
 """What users of the Robotics Toolbox know by these or other names; times are in seconds, angles in radians.
 
-``pose`` (``transl(...) * rpy2tr(...)``), ``rpy`` (``tr2rpy``), ``zyz`` (``tr2eul``), ``quaternion``, ``jtraj``, ``ctraj``.
+``pose`` (``transl(...) * rpy2tr(...)``), ``rpy`` (``tr2rpy``), ``zyz`` (``tr2eul``), ``quaternion``, ``jtraj`` and
+``ctraj``.
 
 References
 ----------
@@ -17,7 +18,6 @@ from er3a.geometry.transforms import as_floats, check_poses, rpy_of, transform
 from er3a.numerics.arrays import Reals
 from er3a.planning.moves import JointMove, line
 from er3a.robots.usable import warn_of_degrees
-
 
 RAMP = 1 / 3  # of the time, of ctraj's trapezoid
 LOCKED = 1e-9  # sine of a tilt below which only the sum or difference of ZYZ's outer angles counts

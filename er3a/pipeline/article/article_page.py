@@ -44,7 +44,9 @@ PAGES = {
     **dict.fromkeys(("zero_pose", "offset", "key_poses", "boundary", "round_trip", "units"), "validation"),
     **dict.fromkeys(("target", "ikine", "ikcon", "unreachable", "eight", "choice", "poor_solver"), "inverse"),
     **dict.fromkeys(("cloud", "void", "hole"), "workspace"),
-    **dict.fromkeys(("jtraj", "animation", "ctraj", "line_singular", "condition", "avoidance", "programs"), "trajectory"),
+    **dict.fromkeys(
+        ("jtraj", "animation", "ctraj", "line_singular", "condition", "avoidance", "programs"), "trajectory"
+    ),
 }
 """The page of the printed table that shows more of an item, by the item's code."""
 REAL_PAGES = {"payload": "dynamics", **{stage: stage for stage in ("collision", "vision", "dynamics")}}
@@ -203,8 +205,8 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
     listed |= {"zyz": numbers.printed.example_zyz_deg, "quaternion": numbers.printed.example_quaternion}
     parts |= {f"{name}_{k}": value for name, values in listed.items() for k, value in enumerate(values)}
     parts["quintic_crossings"] = _times(numbers.quintic_crossings_s)
-    parts["ways_usable"] = joined(map(strategy_word, numbers.strategies_usable), ", ") or "–"
-    parts["ways_unusable"] = joined(map(strategy_word, numbers.strategies_unusable), ", ") or "–"
+    parts["ways_usable"] = joined(map(strategy_word, numbers.strategies_usable)) or "–"
+    parts["ways_unusable"] = joined(map(strategy_word, numbers.strategies_unusable)) or "–"
     parts |= {f"figure_{name}": place for name, place in places.items()}
     for stage in STATUS_OF_STAGES:
         head = _head(study, results, stage)
@@ -276,7 +278,10 @@ def _compared(numbers: ArticleNumbers) -> list[list[str]]:
             tr("The article's straight line"),
             *(outcome_word(t.line) if t.line else tr("not examined") for t in tables),  # type: ignore[arg-type]
         ),
-        row(tr("It is singular at t (s)"), *(_times(t.line_crossings_s) if t.line else tr("not examined") for t in tables)),
+        row(
+            tr("It is singular at t (s)"),
+            *(_times(t.line_crossings_s) if t.line else tr("not examined") for t in tables),
+        ),
     ]
 
 

@@ -81,8 +81,8 @@ ITEMS = (
         N_("Standard or modified"),
         N_("Manuals use either convention; find out which."),
         N_(
-            "Every robot file names its convention, `er3a new DIR --dh table.csv --convention modified` reads the other one, and the "
-            "diagnosis tries it as a fault."
+            "Every robot file names its convention, `er3a new DIR --dh table.csv --convention modified` reads the "
+            "other one, and the diagnosis tries it as a fault."
         ),
     ),
     Item(
@@ -210,8 +210,8 @@ ITEMS = (
         N_("Orientation is read as roll-pitch-yaw (ZYX), as ZYZ Euler angles or as a quaternion."),
         N_(
             "The example as printed: roll, pitch, yaw {p_example_roll:.2f}°, {p_example_pitch:.2f}°, "
-            "{p_example_yaw:.2f}°; ZYZ {zyz_0:.2f}°, {zyz_1:.2f}°, {zyz_2:.2f}°; quaternion w, x, y, z {quaternion_0:.4f}, "
-            "{quaternion_1:.4f}, {quaternion_2:.4f}, {quaternion_3:.4f}."
+            "{p_example_yaw:.2f}°; ZYZ {zyz_0:.2f}°, {zyz_1:.2f}°, {zyz_2:.2f}°; quaternion w, x, y, z "
+            "{quaternion_0:.4f}, {quaternion_1:.4f}, {quaternion_2:.4f}, {quaternion_3:.4f}."
         ),
     ),
     Item(
@@ -367,8 +367,8 @@ ITEMS = (
         N_("Straight line"),
         N_("50 poses on a straight line are solved one after the other with ikcon, each from the last."),
         N_(
-            "er3a follows the whole line of both tables, in ctraj's own time law: a trapezoid of speed, each ramp a third "
-            "of the time. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°."
+            "er3a follows the whole line of both tables, in ctraj's own time law: a trapezoid of speed, each ramp a "
+            "third of the time. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°."
         ),
     ),
     Item(
@@ -380,12 +380,12 @@ ITEMS = (
         N_(
             "As printed the line is singular at t = {p_crossings} s: it starts with axes 4 and 6 in line and "
             "crosses again (on a quintic in place of ctraj's trapezoid: {quintic_crossings} s). With offset 2 = −90°: "
-            "t = {c_crossings} s. No joint speed jumps: it is {crossing_speed_deg_s:.0f}°/s at the last crossing, and at "
-            "most {p_line_speed_deg_s:.0f}°/s, of joint {peak_joint} at t = {peak_s:.1f} s (figure {figure_line})."
+            "t = {c_crossings} s. No joint speed jumps: it is {crossing_speed_deg_s:.0f}°/s at the last crossing, and "
+            "at most {p_line_speed_deg_s:.0f}°/s, of joint {peak_joint} at t = {peak_s:.1f} s (figure {figure_line})."
         ),
         N_(
-            "The article's own line is singular at its start and once more, which it does not mention. This does no harm "
-            "here: the line asks for no motion in the direction that the tool loses."
+            "The article's own line is singular at its start and once more, which it does not mention. This does no "
+            "harm here: the line asks for no motion in the direction that the tool loses."
         ),
     ),
     Item(
@@ -490,12 +490,13 @@ ITEMS = (
     Item(
         "programs",
         "6.3",
-        "er3a program write data/paths/er3a_c60_article.yaml --robot er3a_c60_article --language krl --only article_joint",
+        "er3a program write data/paths/er3a_c60_article.yaml --robot er3a_c60_article "
+        "--language krl --only article_joint",
         N_("CSV and robot programs"),
         N_("Trajectories are written as CSV or as controller programs (.src, .script)."),
         N_(
-            "The trajectory page has the article's joint move as CSV, KRL and URScript to save. The programs page checks "
-            "other programs, of the real arm: {stage_programs}"
+            "The trajectory page has the article's joint move as CSV, KRL and URScript to save. The programs page "
+            "checks other programs, of the real arm: {stage_programs}"
         ),
     ),
     Item(

@@ -154,8 +154,8 @@ WORDS: dict[str, Any] = {
     "measures": N_("How near to a singularity?"),
     "measures_help": N_(
         "At a singularity the tool loses a direction, and near it slow tool motions need fast joints. The measures are "
-        "of the Jacobian with its linear rows divided by {length} mm, {length_is}. At a singularity the first two are 0 and "
-        "the condition number is infinite."
+        "of the Jacobian with its linear rows divided by {length} mm, {length_is}. At a singularity the first two are "
+        "0 and the condition number is infinite."
     ),
     "length_is": {"wrist": N_("the reach of the wrist centre"), "links": N_("half the length along all links")},
     "manipulability": N_("Manipulability"),

@@ -25,9 +25,7 @@ MOST_FRAMES = 200
 AXES_LENGTH = 0.12  # of the tool's axes, in parts of the arm's size
 
 
-def plot(
-    robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] | None = None
-) -> Figure | FuncAnimation:
+def plot(robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] | None = None) -> Figure | FuncAnimation:
     """Draw an arm: its links, its joints, and its tool's axes (x red, y green, z blue).
 
     Parameters
