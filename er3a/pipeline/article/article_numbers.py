@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.stats import kendalltau
@@ -20,7 +20,7 @@ from er3a.kinematics.forward import forward, frames, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.singularity import characteristic_length, conditioning
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectorySummary
@@ -220,7 +220,6 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     cloud = 1000 * _points(robot, random)
     void = np.array(printed.void_mm if printed.void_mm else (np.nan,) * 3)
     move, line = (_path(trajectory, name) for name in (MOVE, LINE))
-    speeds = _speeds(results, tables.printed, LINE)
     repair = next((tried.motion for tried in line.avoidance if tried.name == line.strategy), None)
     finding = workspace.verdict.finding
     changes = finding.single_changes if isinstance(finding, VoidUnexpected) else ()
@@ -264,12 +263,7 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
         move_speed_deg_s=max(move.max_joint_speed_deg_s or (np.nan,)),
         move_acceleration_deg_s2=_greatest_acceleration(results, tables.printed),
         line_speed_deg_s=max(line.max_joint_speed_deg_s or (np.nan,)),
-        quintic_crossings_s=tuple(map(_on_a_quintic, printed.line_crossings_s)),
-        crossing_speed_deg_s=float(np.interp(max(printed.line_crossings_s, default=np.nan), *speeds[:2])),
-        peak_joint=int(speeds[2][speeds[1].argmax()]) + 1,
-        peak_s=float(speeds[0][speeds[1].argmax()]),
-        strategies_usable=tuple(tried.name for tried in line.avoidance if tried.usable),
-        strategies_unusable=tuple(tried.name for tried in line.avoidance if not tried.usable),
+        **_of_the_line(results, tables.printed, printed, line),
         repair_mm=repair.max_deviation_mm if repair else None,
         repair_deg=repair.max_deviation_deg if repair else None,
         repair_longer_s=repair.duration_s - line.duration_s if repair else None,
@@ -459,12 +453,21 @@ def _path(trajectory: TrajectorySummary, name: str) -> PathSummary:
     return next(path for path in trajectory.paths if path.name == name)
 
 
-def _speeds(results: Path, robot: str, name: str) -> tuple[Reals, Reals, Integers]:
-    """Of a path the times (N,) in s, the fastest joint's speed (N,) in deg/s there, and which joint (from 0) it is."""
+def _of_the_line(results: Path, robot: str, table: TableNumbers, line: PathSummary) -> dict[str, Any]:
+    """When a quintic would cross, how fast joints are at the last crossing and at most, and what can be done."""
     rows = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.checks
-    rows = rows.take((rows.path == name) & rows.reachable)
+    rows = rows.take((rows.path == LINE) & rows.reachable)
     speeds = np.abs(rows.q_deg_s)
-    return rows.t_s, speeds.max(axis=1), speeds.argmax(axis=1)
+    peak, joint = np.unravel_index(speeds.argmax(), speeds.shape)
+    crossings = table.line_crossings_s
+    return {
+        "quintic_crossings_s": tuple(map(_on_a_quintic, crossings)),
+        "crossing_speed_deg_s": float(np.interp(max(crossings, default=np.nan), rows.t_s, speeds.max(axis=1))),
+        "peak_joint": int(joint) + 1,
+        "peak_s": float(rows.t_s[peak]),
+        "strategies_usable": tuple(tried.name for tried in line.avoidance if tried.usable),
+        "strategies_unusable": tuple(tried.name for tried in line.avoidance if not tried.usable),
+    }
 
 
 def _greatest_acceleration(results: Path, robot: str) -> float:
