@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from er3a.collision.along import clearance as clearance
     from er3a.comparison.compare import Comparison as Comparison
     from er3a.comparison.compare import compare as compare
     from er3a.dynamics.torques import gravity as gravity
@@ -32,12 +33,17 @@ if TYPE_CHECKING:
     from er3a.kinematics.inverse import inverse as inverse
     from er3a.kinematics.numerical import solve as solve
     from er3a.kinematics.singularity import conditioning as conditioning
+    from er3a.kinematics.symbolic import arm_transform as arm_transform
+    from er3a.kinematics.symbolic import link_transforms as link_transforms
     from er3a.pipeline.viewing.plot import plot as plot
     from er3a.planning.follow import follow as follow
-    from er3a.planning.moves import ctraj as ctraj
-    from er3a.planning.moves import jtraj as jtraj
     from er3a.planning.moves import line as line
-    from er3a.planning.moves import rpy as rpy
+    from er3a.planning.toolbox import ctraj as ctraj
+    from er3a.planning.toolbox import jtraj as jtraj
+    from er3a.planning.toolbox import pose as pose
+    from er3a.planning.toolbox import quaternion as quaternion
+    from er3a.planning.toolbox import rpy as rpy
+    from er3a.planning.toolbox import zyz as zyz
     from er3a.program_check.check_program import CheckOptions as CheckOptions
     from er3a.program_check.check_program import check_program as check_program
     from er3a.programs.languages import read_program as read_program
@@ -64,12 +70,18 @@ _PUBLIC = {
     "inverse_batch": "er3a.kinematics.batch",
     "solve": "er3a.kinematics.numerical",
     "conditioning": "er3a.kinematics.singularity",
-    "rpy": "er3a.planning.moves",
-    "jtraj": "er3a.planning.moves",
-    "ctraj": "er3a.planning.moves",
+    "link_transforms": "er3a.kinematics.symbolic",
+    "arm_transform": "er3a.kinematics.symbolic",
+    "pose": "er3a.planning.toolbox",
+    "rpy": "er3a.planning.toolbox",
+    "zyz": "er3a.planning.toolbox",
+    "quaternion": "er3a.planning.toolbox",
+    "jtraj": "er3a.planning.toolbox",
+    "ctraj": "er3a.planning.toolbox",
     "line": "er3a.planning.moves",
     "follow": "er3a.planning.follow",
     "plot": "er3a.pipeline.viewing.plot",
+    "clearance": "er3a.collision.along",
     "select": "er3a.selection.select",
     "select_sequence": "er3a.selection.select",
     "torques": "er3a.dynamics.torques",

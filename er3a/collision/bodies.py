@@ -41,7 +41,8 @@ class Bodies:
     second : (P,) int, number of the other link's body, -1 for a solid
     pairs : P, what meets what
     matrix : what was found of each pair of links
-    unexamined : pairs whose shapes overlap in all joint vectors tried for no reason, so that what overlaps is left out
+    unexamined : pairs whose shapes overlap where no arm's can (:mod:`er3a.collision.matrix`), so that they are left
+        out; in_error : of these, those whose shapes are given, or overlap in all joint vectors tried
     joined : (P,), whether a joint joins the two, so that only overlap of what is left of them means anything
     layout : the same as arrays, solids among the bodies
     """
@@ -67,13 +68,17 @@ class Bodies:
         kept = [frozenset((a.name, b.name)) not in allowed for a, b in watched]
         watched, joined = list(compress(watched, kept)), list(compress(joined, kept)) + [False] * len(around)
         numbers = {link_label(k): k for k in range(robot.rows + 1)}
-        self.unexamined: tuple[Pair, ...] = tuple(
-            LinkPair(numbers[row.first], numbers[row.second])
-            if row.second in numbers
-            else CarriedAndLink(row.second, numbers[row.first])
-            for row in self.matrix
-            if row.state == "overlaps" and frozenset((row.first, row.second)) not in allowed
+        self.in_error, guessed = (
+            tuple[Pair, ...](
+                LinkPair(numbers[row.first], numbers[row.second])
+                if row.second in numbers
+                else CarriedAndLink(row.second, numbers[row.first])
+                for row in self.matrix
+                if row.state == state and frozenset((row.first, row.second)) not in allowed
+            )
+            for state in ("overlaps", "guessed")
         )
+        self.unexamined = self.in_error + guessed
         number: dict[int, int] = {}
         bodies: list[Body] = []
         for body in (*(body for pair in watched for body in pair), *moving, *solids):

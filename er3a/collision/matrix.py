@@ -19,6 +19,9 @@ harmless:
 - *overlaps*: they overlap in all joint vectors drawn, none in which they don't was found in the boxes, and no joint
   explains it. No arm is built like that, so the shapes are wrong: what overlaps is left out, and has to be named
   wherever it is not examined;
+- *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`) that would be joined, but the table gives the
+  link between them no length, so that the guess leaves its housing no room, and what is left of the two overlaps in
+  many of the joint vectors drawn (``POOR_GUESS``). The pair is left out, and has to be named too;
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: watched;
 - *undecided*: none of this within the number of boxes: watched.
 
@@ -146,7 +149,7 @@ def _split(body: Body, centre: Reals, radius: float) -> tuple[Reals, Reals]:
     return np.concatenate([cut, crossings]), np.concatenate([kept, crossings])
 
 
-PairState = Literal["never", "joined", "overlaps", "meets", "undecided", "allowed", "watched"]
+PairState = Literal["never", "joined", "overlaps", "guessed", "meets", "undecided", "allowed", "watched"]
 
 BOXES = 50_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
@@ -156,6 +159,7 @@ TOUCH = 2e-3  # m
 MEETING = 0.05  # of the arm's length: axes that pass a point within that meet there
 HUBS = 9  # points looked at on an axis
 AROUND_GUIDE = 1.05  # of the radii of a guide and of what slides in it
+POOR_GUESS = 0.1  # of the joint vectors drawn
 SETTLED = 0.99  # of the girth before
 GROWTH, GROWTHS = 1.25, 12  # of the region around a joint, until the rest comes apart
 
@@ -221,7 +225,21 @@ class CollisionMatrix:
 @derived
 def collision_matrix(robot: Robot) -> CollisionMatrix:
     """The matrix of an arm without anything carried."""
-    return matrix_of(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
+    matrix = matrix_of(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
+    return matrix if arm_shapes(robot).given else _without_poor_guesses(robot, matrix)
+
+
+def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMatrix:
+    """The matrix of guessed shapes, without joined pairs of which what is left overlaps in many joint vectors, because
+    the link between them has no length in the table."""
+    left: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
+    for pair, joined in zip(matrix.watched, matrix.joined):
+        if joined and pair[1].link > pair[0].link + 1:
+            left.setdefault((pair[0].name, pair[1].name), []).append(pair)
+    poor = {names for names, pairs in left.items() if _overlap(robot, pairs).any(axis=1).mean() >= POOR_GUESS}
+    rows = (replace(row, state="guessed") if (row.first, row.second) in poor else row for row in matrix.rows)
+    kept = [(p, joined) for p, joined in zip(matrix.watched, matrix.joined) if (p[0].name, p[1].name) not in poor]
+    return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in kept), tuple(joined for _, joined in kept))
 
 
 def matrix_of(
@@ -356,9 +374,13 @@ def _together(robot: Robot, found: list[JudgedPair], boxes: int) -> list[JudgedP
 
 def _always_meet(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> bool:
     """Whether in each joint vector drawn some pair overlaps."""
+    return bool(_overlap(robot, pairs).any(axis=1).all())
+
+
+def _overlap(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> Flags:
+    """Who overlaps, (TRIED, K), in the joint vectors drawn."""
     flat = [body for pair in pairs for body in pair]
-    layout = layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))])
-    return bool(_sampled(robot, layout)[2].any(axis=1).all())
+    return _sampled(robot, layout_of(robot, flat, [(2 * k, 2 * k + 1) for k in range(len(pairs))]))[2]
 
 
 def _neighbours(robot: Robot, pair: tuple[Body, Body]) -> bool:
@@ -460,11 +482,7 @@ def _without_joining(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: in
     """Judgements of trimmed pairs; None if one of them still overlaps in every pose."""
     if not pairs:
         return []
-    layout = layout_of(
-        robot, [body for pair in pairs for body in pair], [(2 * k, 2 * k + 1) for k in range(len(pairs))]
-    )
-    _, _, overlap = _sampled(robot, layout)
-    return None if overlap.all(axis=0).any() else judged_pairs(robot, pairs, boxes)
+    return None if _overlap(robot, pairs).all(axis=0).any() else judged_pairs(robot, pairs, boxes)
 
 
 def _sampled(robot: Robot, layout: Layout) -> tuple[Reals, Reals, Flags]:

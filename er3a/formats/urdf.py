@@ -678,7 +678,7 @@ def _words(values: Reals) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-REASONS = {"never": "Never", "joined": "Adjacent", "allowed": "User", "overlaps": "Default"}
+REASONS = {"never": "Never", "joined": "Adjacent", "allowed": "User", "overlaps": "Default", "guessed": "Default"}
 
 
 def export_srdf(robot: Robot) -> str:
@@ -695,8 +695,8 @@ def export_srdf(robot: Robot) -> str:
     for row in collision_matrix(robot).rows:
         if row.state not in REASONS:
             continue
-        if row.state == "overlaps":
-            root.append(ElementTree.Comment(f" {row.first} and {row.second} overlap always: the shapes are in error "))
+        if REASONS[row.state] == "Default":
+            root.append(ElementTree.Comment(f" {row.first} and {row.second} are not checked: the shapes are in error "))
         ElementTree.SubElement(root, "disable_collisions", link1=row.first, link2=row.second, reason=REASONS[row.state])
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -704,4 +704,6 @@ def export_srdf(robot: Robot) -> str:
 
 def pairs_not_checked(robot: Robot) -> tuple[str, ...]:
     """Pairs of links that the SRDF disables because their shapes can't be right."""
-    return tuple(f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if row.state == "overlaps")
+    return tuple(
+        f"{row.first} and {row.second}" for row in collision_matrix(robot).rows if REASONS.get(row.state) == "Default"
+    )

@@ -22,13 +22,14 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
 import scipy
 
+from er3a.by_value import Displayed, Sheet, first_rows
 from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import arm_length, axes_at_zero_theta, constant_links, row_values
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
@@ -48,8 +49,8 @@ TYPES: tuple[SingularityType, ...] = ("wrist", "elbow", "shoulder")
 ROUNDING = 6 * np.finfo(float).eps
 
 
-@dataclass(frozen=True, eq=False)
-class Conditioning:
+@dataclass(frozen=True, eq=False, repr=False)
+class Conditioning(Displayed):
     """Measures of the Jacobian with its linear rows divided by a characteristic length.
 
     Attributes
@@ -62,6 +63,13 @@ class Conditioning:
     manipulability: Reals
     condition_number: Reals
     smallest_singular_value: Reals
+
+    def sheet(self) -> Sheet:
+        """One row for each arm."""
+        measures = [np.ravel(getattr(self, each.name)) for each in fields(self)]
+        rows, left_out = first_rows(zip(*measures), len(measures[0]))
+        columns = tuple(each.name.replace("_", " ") for each in fields(self))
+        return Sheet(f"Conditioning at {len(measures[0])} joint vector(s)", columns, rows, left_out)
 
 
 @dataclass(frozen=True, eq=False)

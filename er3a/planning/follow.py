@@ -34,7 +34,7 @@ from itertools import product
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Displayed, Sheet, first_rows
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import arm_length
@@ -254,9 +254,11 @@ class BranchJump(ByValue):
     angle: float
 
 
-@dataclass(frozen=True, eq=False)
-class Followed(ByValue):
-    """Joint angles along a line.
+@dataclass(frozen=True, eq=False, repr=False)
+class Followed(ByValue, Displayed):
+    """Joint angles along a line, at more times than asked for where its branches come near to each other.
+
+    :meth:`joints` solves the line at any times: ``er3a.follow(robot, line, t).joints(t)`` has a row for each of ``t``.
 
     Attributes
     ----------
@@ -275,6 +277,13 @@ class Followed(ByValue):
     slot: Integers
     start_turn: Reals
     jumps: tuple[BranchJump, ...]
+
+    def sheet(self) -> Sheet:
+        """Times, and joints in degrees."""
+        rows, left_out = first_rows(np.column_stack([self.t, np.degrees(self.q)]), len(self.t))
+        found = f"Joints along a line: {len(self.t)} rows over {self.line.duration:g} s, {len(self.jumps)} jump(s)"
+        columns = ("t (s)", *(f"J{joint + 1} (deg)" for joint in range(self.q.shape[1])))
+        return Sheet(found, columns, rows, left_out, ("a row for each time of yours: .joints(t), in rad",))
 
     def joints(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable."""
@@ -410,7 +419,8 @@ def follow(
 
     Parameters
     ----------
-    t : (N,), s, rising from 0 to the line's duration: where to solve at least
+    t : (N,), s, rising from 0 to the line's duration: where to solve at least; the result has more times where
+        branches come near to each other
     q_start : (6,), rad, joints at the start, whose tool pose is the line's first
     start_slot : closed-form branch (0..7) to begin on; None for the best
 

@@ -18,6 +18,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile
+from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot
 from testing.arms import OTHERS_LONG, made_of, make_arm
 
@@ -145,8 +146,10 @@ class TestFaultsOfOthers:
 
     def test_pair_that_always_overlaps_is_proven_so(self):
         """moveit2#2915: "always" missed. Each joint's own two links, whatever the poses drawn."""
-        for name in ("er3_600", "er3a_c60", "er3a_c60_article"):
-            rows = rows_of(load_robot(name).replace(pair_rules=()))
+        article = load_robot("er3a_c60_article")
+        stated = article.replace(envelopes=arm_shapes(article).capsules)
+        for robot in (load_robot("er3_600"), load_robot("er3a_c60"), stated):
+            rows = rows_of(robot.replace(pair_rules=()))
             assert rows["base", "link_2"].state == rows["link_2", "link_4"].state == "joined"
 
     def test_matrix_survives_writing_and_reading_of_the_robot(self, tmp_path):
@@ -232,6 +235,20 @@ def test_a_default_shape_that_slides_in_its_guide_is_joined_to_it():
     stated = scara.replace(envelopes=arm_shapes(scara).capsules)
     assert rows_of(stated)["link_2", "link_4"].state == "meets"
     assert not Bodies(stated, None).free(raised[:2]).any()
+
+
+def test_a_guess_that_overlaps_at_many_poses_refuses_none_of_them_and_is_named():
+    """A bare table answers as its robot file does, which allows these pairs; stated shapes are taken at their word."""
+    arm = load_robot("er3a_c60_article")
+    bare = arm.replace(pair_rules=())
+    states = {names: row.state for names, row in rows_of(bare).items()}
+    assert states["base", "link_2"] == states["link_2", "link_4"] == "guessed"
+    q = quasi_random_points(arm.lower, arm.upper, 2000)
+    assert np.array_equal(Bodies(bare, None).free(q), Bodies(arm, None).free(q))
+    assert Bodies(bare, None).unexamined == (LinkPair(0, 2), LinkPair(2, 4))
+    assert Bodies(bare, None).in_error == Bodies(arm, None).unexamined == ()
+    stated = bare.replace(envelopes=arm_shapes(bare).capsules)
+    assert not Bodies(stated, None).free(np.radians([[0.0, 45.0, -30.0, 0.0, 60.0, 0.0]])).any()
 
 
 def box_around(link: int, low: tuple[float, float, float], high: tuple[float, float, float]) -> ConvexPiece:

@@ -6,8 +6,10 @@ import warnings
 
 import numpy as np
 import pytest
+from roboticstoolbox import ctraj as toolbox_ctraj
 from roboticstoolbox import jtraj as toolbox_jtraj
 from scipy.spatial.transform import Rotation
+from spatialmath import SE3
 
 import er3a
 
@@ -52,6 +54,26 @@ def test_ctraj_goes_straight_and_turns_about_one_axis(arm):
     assert np.abs(axes - axes[-1]).max() < 1e-5
 
 
+def test_ctraj_is_on_the_toolbox_s_trapezoid(arm):
+    start, end = er3a.forward(arm, 0.3 * GOAL), er3a.forward(arm, GOAL)
+    theirs = toolbox_ctraj(SE3(start, check=False), SE3(end, check=False), len(T))
+    assert np.allclose(er3a.ctraj(start, end, T)[:, :3, 3], theirs.t, atol=1e-9)
+
+
+def test_a_pose_is_its_position_and_any_one_orientation():
+    random = np.random.default_rng(2)
+    for place, angles in zip(random.uniform(-1, 1, (20, 3)), random.uniform(-1.5, 1.5, (20, 3))):
+        T = er3a.pose(place, angles)
+        assert np.allclose(T, (SE3(place) * SE3.RPY(angles, order="zyx")).A, atol=1e-12)
+        assert np.allclose(er3a.rpy(T), angles, atol=1e-9)
+        assert np.allclose(er3a.pose(place, zyz=er3a.zyz(T)), T, atol=1e-12)
+        assert np.allclose(er3a.pose(place, quaternion=-3 * er3a.quaternion(T)), T, atol=1e-12)
+        assert np.allclose(er3a.zyz(er3a.pose(place, zyz=np.abs(angles))), np.abs(angles), atol=1e-9)
+        assert np.allclose(er3a.quaternion(T), Rotation.from_matrix(T[:3, :3]).as_quat(True, scalar_first=True))
+    assert np.allclose(er3a.zyz(er3a.pose([0, 0, 0], zyz=[0.3, np.pi, 0.2])), [0.1, np.pi, 0])
+    assert er3a.quaternion(np.stack([T, T])[None]).shape == (1, 2, 4)
+
+
 def test_rpy_is_scipy_s_zyx():
     T = er3a.forward(er3a.load_robot("er3_600"), np.random.default_rng(1).uniform(-1, 1, (40, 6)))
     assert np.allclose(er3a.rpy(T)[:, ::-1], Rotation.from_matrix(T[:, :3, :3]).as_euler("ZYX"), atol=1e-9)
@@ -81,18 +103,31 @@ def test_another_unit_in_a_table_is_warned_of():
     ("call", "message"),
     [
         (lambda arm, line: line.poses(T), "expected shares of the way"),
+        (lambda arm, line: er3a.line(line.T_start, line.poses(1.0), T), r"duration has shape \(50,\)"),
+        (lambda arm, line: er3a.pose([0, 0, 0], [0, 0, 0], zyz=[0, 0, 0]), "rpy and zyz each give"),
+        (lambda arm, line: er3a.pose([0, 0]), r"position has shape \(2,\)"),
+        (lambda arm, line: er3a.pose([0, 0, 0], quaternion=[0, 0, 0, 0]), "quaternion is 0"),
         (lambda arm, line: line.at(5.1), "lasts from 0 to 5 s"),
         (lambda arm, line: er3a.follow(arm, line, np.linspace(0, 6, 9)), "lasts from 0 to 5 s"),
         (lambda arm, line: er3a.jtraj(np.zeros(6), GOAL, 50), "expected times in s"),
         (lambda arm, line: er3a.jtraj(np.zeros(6), GOAL, T[::-1]), "does not rise"),
         (lambda arm, line: er3a.jtraj(np.zeros(5), GOAL, T), "q_end has shape"),
         (lambda arm, line: er3a.plot(arm, np.zeros(5)), "q has shape"),
+        (lambda arm, line: er3a.plot(arm, np.zeros(6), window=(0, 1)), "window has shape"),
     ],
 )
 def test_nothing_goes_beyond_the_ends_in_silence(arm, call, message):
     line = er3a.line(er3a.forward(arm, 0.3 * GOAL), er3a.forward(arm, GOAL), 5.0)
     with pytest.raises(er3a.Er3aError, match=message):
         call(arm, line)
+
+
+def test_a_followed_line_has_a_row_for_each_time_asked_for(arm):
+    line = er3a.line(er3a.forward(arm, 0.3 * GOAL), er3a.forward(arm, GOAL), 5.0, ramp=1 / 3)
+    found = er3a.follow(arm, line, T)
+    assert np.allclose(er3a.forward(arm, found.joints(T)), er3a.ctraj(line.T_start, line.poses(1.0), T), atol=1e-9)
+    for shown in (found, er3a.conditioning(arm, found.q)):
+        assert len(repr(shown).splitlines()) < 25
 
 
 def test_conditioning_needs_no_length(arm):
@@ -106,5 +141,7 @@ def test_plot_draws_the_arm_where_it_is(arm):
     figure = er3a.plot(arm, GOAL)
     corners = np.array(figure.axes[0].lines[0].get_data_3d()).T
     assert np.allclose(corners[-1], er3a.forward(arm, GOAL)[:3, 3], atol=1e-12)
+    assert figure.axes[0].get_zlim()[0] < 0
+    assert er3a.plot(arm, GOAL, window=(-1.5, 1.5, -1.5, 1.5, 0, 1.5)).axes[0].get_zlim() == (0, 1.5)
     moving = er3a.plot(arm, er3a.jtraj(np.zeros(6), GOAL, T[:2])[0])
     assert moving.to_jshtml().count("data:image") == 2

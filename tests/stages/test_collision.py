@@ -153,7 +153,7 @@ def test_shapes_in_error_end_no_other_stage_and_are_never_a_pass(stage, tmp_path
     assert verdict.status == "caution"
     assert [pair.second for pair in verdict.unexamined] == [3, 4, 6]
     assert say(verdict.findings[1]) == (
-        "Collisions not examined, because the shapes overlap in every joint vector tried (1024): "
+        "Collisions not examined, because the shapes overlap where no arm's can: "
         "base and link 3, base and link 4, base and link 6."
     )
     run.show("report", stage, study, "arm", tmp_path / stage, tmp_path / "page.html")

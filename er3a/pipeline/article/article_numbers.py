@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.stats import kendalltau
@@ -28,6 +28,9 @@ from er3a.pipeline.stages.validation.model import ReferenceCheck, ValidationSumm
 from er3a.pipeline.stages.workspace.model import VoidSummary, VoidUnexpected, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.skeleton import skeleton
+from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.profiles import quintic, trapezoid
+from er3a.planning.toolbox import RAMP, quaternion, zyz
 from er3a.references.subjects import Reach
 from er3a.robots.masses import Load
 from er3a.robots.robot import Robot
@@ -45,6 +48,7 @@ MOVE, LINE = "article_joint", "article_line"  # paths of the study
 COMPARED = 1000  # random poses that two measures rank
 HOLE_CAUSES = ("lower", "upper", "direction")  # section 6.2, as columns of a table
 NEAR_WRIST_DEG = (5.0, 1.0, 0.1)
+SHIFTED_DEG = (0.0, 5.0, 30.0)
 PAYLOAD_KG = 6.0  # section 1
 
 
@@ -61,7 +65,9 @@ class TableNumbers:
     solutions, within_limits : of the article's target; ``nearest_deg`` the one within the limits that is nearest to 0
     volume_m3 : proven bounds; reach_mm : greatest distance of the tool point from axis 1
     void_litres : proven bounds of the largest enclosed void, None without one; void_mm : its centre
+    other_voids : bounds (L) of other enclosed ones, and z (mm) of their centres
     line : of the article's straight line the verdict; None where the study has no such path
+    move_clearance_mm, line_clearance_mm : least clearance on the article's paths
     """
 
     statements: int | None
@@ -73,6 +79,8 @@ class TableNumbers:
     tool_mm: tuple[float, ...]
     example_mm: tuple[float, ...]
     example_rpy_deg: tuple[float, ...]
+    example_zyz_deg: tuple[float, ...]
+    example_quaternion: tuple[float, ...]
     solutions: int
     within_limits: int
     nearest_deg: tuple[float, ...] | None
@@ -80,9 +88,12 @@ class TableNumbers:
     reach_mm: float
     void_litres: tuple[float, float] | None
     void_mm: tuple[float, ...] | None
+    other_voids: tuple[tuple[float, float, float], ...]
     line: str | None
     line_crossings_s: tuple[float, ...]
     line_speed_deg_s: float | None
+    move_clearance_mm: float | None
+    line_clearance_mm: float | None
 
 
 @dataclass(frozen=True)
@@ -117,19 +128,26 @@ class ArticleNumbers:
     hidden_percent: float
     wrist_turn_deg: float
     wrist_against_deg: float
+    wrist_shift_mm: tuple[float, ...]
     wrist_gain: tuple[float, ...]
     residual_mm: float
     free_beyond_deg: float
     free_joint: int
     kept_solved: bool
     same_pose_rpy_deg: tuple[tuple[float, ...], tuple[float, ...]]
-    same_pose_apart: float
+    same_pose_apart_deg: float
     cloud_lowest_mm: float
     cloud_farthest_mm: float
     cloud_nearest_to_void_mm: float
     move_speed_deg_s: float
     move_acceleration_deg_s2: float
     line_speed_deg_s: float
+    quintic_crossings_s: tuple[float, ...]
+    crossing_speed_deg_s: float
+    peak_joint: int
+    peak_s: float
+    strategies_usable: tuple[StrategyName, ...]
+    strategies_unusable: tuple[StrategyName, ...]
     repair_mm: float | None
     repair_deg: float | None
     repair_longer_s: float | None
@@ -165,7 +183,7 @@ def agreements(numbers: ArticleNumbers) -> dict[str, Agreement]:
         "offset": agrees(printed.statements_met == printed.statements),
         "plot": agrees(numbers.hidden_percent == 0),
         "wrist": agrees(numbers.wrist_turn_deg > 1 + EXACT_DEG),
-        "target": agrees(numbers.same_pose_apart > EXACT_MM),
+        "target": "in_part" if numbers.same_pose_apart_deg < EXACT_DEG else "agrees",
         "ikine": "in_part" if numbers.free_beyond_deg > 0 else "agrees",
         "ikcon": agrees(numbers.kept_solved),
         "unreachable": "in_part" if printed.within_limits < corrected.within_limits else "agrees",
@@ -231,19 +249,21 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
         hidden_percent=_hidden_percent(robot),
         wrist_turn_deg=_turn_deg(robot, (0, 0, 0, 1, 0, 0)),
         wrist_against_deg=_turn_deg(robot, (0, 0, 0, 1, 0, -1)),
+        wrist_shift_mm=tuple(_shift_mm(robot, np.radians(angle)) for angle in SHIFTED_DEG),
         wrist_gain=tuple(_wrist_gain(robot, np.radians(angle)) for angle in NEAR_WRIST_DEG),
         residual_mm=_residual_mm(robot, target),
         free_beyond_deg=float(beyond.max()),
         free_joint=int(beyond.argmax()) + 1,
         kept_solved=bool(np.all(kept.solved)),
         same_pose_rpy_deg=rpy,
-        same_pose_apart=float(np.abs(same[0] - same[1]).max()),
+        same_pose_apart_deg=float(np.degrees(rotation_angle(same[0][:3, :3], same[1][:3, :3]))),
         cloud_lowest_mm=float(cloud[:, 2].min()),
         cloud_farthest_mm=float(np.hypot(cloud[:, 0], cloud[:, 1]).max()),
         cloud_nearest_to_void_mm=float(np.linalg.norm(cloud - void, axis=1).min()),
         move_speed_deg_s=max(move.max_joint_speed_deg_s or (np.nan,)),
         move_acceleration_deg_s2=_greatest_acceleration(results, tables.printed),
         line_speed_deg_s=max(line.max_joint_speed_deg_s or (np.nan,)),
+        **_of_the_line(results, tables.printed, printed, line),
         repair_mm=repair.max_deviation_mm if repair else None,
         repair_deg=repair.max_deviation_deg if repair else None,
         repair_longer_s=repair.duration_s - line.duration_s if repair else None,
@@ -274,8 +294,9 @@ def _table(study: Study, results: Path, name: str) -> TableNumbers:
     found = inverse(robot, _target())
     kept = found.q[found.within_limits]
     nearest = kept[np.abs(kept).max(axis=1).argmin()] if len(kept) else None
-    void = max(workspace.enclosed_voids, key=lambda each: each.volume_m3.lower, default=None)
-    line = next((path for path in trajectory.paths if path.name == LINE), None)
+    voids = sorted(workspace.enclosed_voids, key=lambda each: -each.volume_m3.lower)
+    void = voids[0] if voids else None
+    line, move = (next((path for path in trajectory.paths if path.name == own), None) for own in (LINE, MOVE))
     return TableNumbers(
         statements=claims.passed + claims.failed if claims else None,
         statements_met=claims.passed if claims else None,
@@ -286,6 +307,8 @@ def _table(study: Study, results: Path, name: str) -> TableNumbers:
         tool_mm=_mm(forward(robot, np.zeros(6))[:3, 3]),
         example_mm=_mm(example[:3, 3]),
         example_rpy_deg=tuple(np.degrees(rpy_of(example)).round(9).tolist()),
+        example_zyz_deg=tuple(np.degrees(zyz(example)).round(9).tolist()),
+        example_quaternion=tuple(quaternion(example).round(12).tolist()),
         solutions=len(np.unique(found.branch)),
         within_limits=len(np.unique(found.branch[found.within_limits])),
         nearest_deg=None if nearest is None else tuple(np.degrees(nearest).tolist()),
@@ -293,9 +316,12 @@ def _table(study: Study, results: Path, name: str) -> TableNumbers:
         reach_mm=1000 * workspace.reach_m.furthest_from_axis,
         void_litres=_litres(void) if void else None,
         void_mm=_mm(np.array(void.centroid_m)) if void else None,
+        other_voids=tuple((*_litres(each), 1000 * each.centroid_m[2]) for each in voids[1:]),
         line=line.verdict if line else None,
         line_crossings_s=tuple(each.t_s for each in line.singularities if each.crossing) if line else (),
         line_speed_deg_s=max(line.max_joint_speed_deg_s) if line and line.max_joint_speed_deg_s else None,
+        move_clearance_mm=move.clearance.least_mm if move and move.clearance else None,
+        line_clearance_mm=line.clearance.least_mm if line and line.clearance else None,
     )
 
 
@@ -389,6 +415,20 @@ def _turn_deg(robot: Robot, step_deg: Sequence[float]) -> float:
     return float(np.degrees(rotation_angle(T[0, :3, :3], T[1, :3, :3])))
 
 
+def _shift_mm(robot: Robot, angle: float) -> float:
+    """By how much one degree of joint 4 moves the tool point, joint 5 at an angle (rad) and the others at 0."""
+    q = np.zeros((2, 6))
+    q[:, 4], q[1, 3] = angle, np.radians(1.0)
+    return float(1000 * np.linalg.norm(np.diff(_points(robot, q), axis=0)))
+
+
+def _on_a_quintic(t: float) -> float:
+    """When (s) a quintic is where ctraj's trapezoid is at a time (s), both over the line's duration."""
+    there = float(trapezoid(np.array(t), DURATION_S, RAMP)[0])
+    times = np.linspace(0, DURATION_S, 100_001)
+    return float(np.interp(there, quintic(times, DURATION_S, np.zeros(1), np.ones(1))[0][:, 0], times))
+
+
 def _wrist_gain(robot: Robot, angle: float) -> float:
     """The fastest wrist joint while the tool turns at one unit about the worst axis, joint 5 at an angle (rad)."""
     q = np.zeros(6)
@@ -411,6 +451,23 @@ def _ranked_apart_percent(robot: Robot, seed: int) -> float:
 
 def _path(trajectory: TrajectorySummary, name: str) -> PathSummary:
     return next(path for path in trajectory.paths if path.name == name)
+
+
+def _of_the_line(results: Path, robot: str, table: TableNumbers, line: PathSummary) -> dict[str, Any]:
+    """When a quintic would cross, how fast joints are at the last crossing and at most, and what can be done."""
+    rows = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.checks
+    rows = rows.take((rows.path == LINE) & rows.reachable)
+    speeds = np.abs(rows.q_deg_s)
+    peak, joint = np.unravel_index(speeds.argmax(), speeds.shape)
+    crossings = table.line_crossings_s
+    return {
+        "quintic_crossings_s": tuple(map(_on_a_quintic, crossings)),
+        "crossing_speed_deg_s": float(np.interp(max(crossings, default=np.nan), rows.t_s, speeds.max(axis=1))),
+        "peak_joint": int(joint) + 1,
+        "peak_s": float(rows.t_s[peak]),
+        "strategies_usable": tuple(tried.name for tried in line.avoidance if tried.usable),
+        "strategies_unusable": tuple(tried.name for tried in line.avoidance if not tried.usable),
+    }
 
 
 def _greatest_acceleration(results: Path, robot: str) -> float:

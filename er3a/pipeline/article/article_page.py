@@ -35,7 +35,7 @@ from er3a.pipeline.messages.article import AGREEMENT, ITEMS, SECTIONS, Item
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import joined
-from er3a.pipeline.messages.trajectory import event_word
+from er3a.pipeline.messages.trajectory import event_word, strategy_word
 from er3a.pipeline.messages.workspace import change_text
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
@@ -222,21 +222,25 @@ LANGUAGE_NAMES = {"en": "English", "zh": "中文"}
 STATUS_OF_STAGES = ("collision", "programs", "vision", "dynamics")
 PAGES = {
     **dict.fromkeys(("teach", "wrist", "same_as_teach"), "teach"),
-    **dict.fromkeys(("zero_pose", "offset", "key_poses", "round_trip", "units"), "validation"),
+    **dict.fromkeys(("zero_pose", "offset", "key_poses", "boundary", "round_trip", "units"), "validation"),
     **dict.fromkeys(("target", "ikine", "ikcon", "unreachable", "eight", "choice", "poor_solver"), "inverse"),
     **dict.fromkeys(("cloud", "void", "hole"), "workspace"),
-    **dict.fromkeys(("jtraj", "animation", "ctraj", "line_singular", "condition", "avoidance"), "trajectory"),
+    **dict.fromkeys(
+        ("jtraj", "animation", "ctraj", "line_singular", "condition", "avoidance", "programs"), "trajectory"
+    ),
 }
 """The page of the printed table that shows more of an item, by the item's code."""
 ROUNDING = 1e-6  # mm or deg
-EXAMPLE_DEG = "0,45,-30,0,60,0"
+REAL_PAGES = {"payload": "dynamics", **{stage: stage for stage in ("collision", "vision", "dynamics")}}
+PLACES = {"same_as_teach": "#q=0,45,-30,0,60,0", "programs": f"#{MOVE}"}
+PAGES_IN = {"en": N_("in English"), "zh": N_("in Chinese")}
 ERRORS = (
     "circle_error_mm",
     "missed_after_mm",
     "residual_mm",
     "round_trip_deg",
     "shifted_apart_mm",
-    "same_pose_apart",
+    "same_pose_apart_deg",
 )
 BADGES = {"agrees": "pass", "differs": "fail", "in_part": "caution", "not_examined": "no_reference", "done": "done"}
 ROLES = {
@@ -272,10 +276,15 @@ def write_article(study: Study, results: Path, folder: Path) -> None:
         own = study.model_copy(update={"report": study.report.model_copy(update={"language": code})})
         language.use(code, own.own_titles())
         with house_style():
-            _write(study, results, numbers, folder / name, {each: pages[each] for each in pages if each != code})
+            others = {each: pages[each] for each in pages if each != code}
+            mark = "" if code == study.report.language else tr(PAGES_IN[study.report.language])
+            _write(study, results, numbers, folder / name, others, mark)
 
 
-def _write(study: Study, results: Path, numbers: ArticleNumbers, output: Path, others: dict[str, str]) -> None:
+def _write(
+    study: Study, results: Path, numbers: ArticleNumbers, output: Path, others: dict[str, str], mark: str
+) -> None:
+    """One page; ``others``: its siblings by language, ``mark``: what links to pages of another language say."""
     tables = study.article
     assert tables is not None
     drawn = draw(study, results, numbers)
@@ -296,6 +305,7 @@ def _write(study: Study, results: Path, numbers: ArticleNumbers, output: Path, o
         agreement_words=AGREEMENT,
         sections=[(code, title, [rows[k] for k in _of_section(code)]) for code, title in SECTIONS.items()],
         compared=_compared(numbers),
+        pages_in=mark,
         roles=[tr(word) for word in ROLES.values()],
         robots=[(name, study.robot(name), study.pages(name)) for name in tables.names],
         table_columns=["i>", "a (mm)>", "α (°)>", "d (mm)>", tr("offset (°)>"), tr("limits (°)>")],
@@ -320,9 +330,9 @@ def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str
             item.code,
             tr(item.title),
             tr(item.says),
-            _with_code(parts.get(f"stage_{item.code}") or tr(item.finds, **parts)),
+            _with_code(parts.get(f"instead_{item.code}") or tr(item.finds, **parts)),
             item.how,
-            tr(item.why, **parts) if item.why and status != "agrees" and f"stage_{item.code}" not in parts else "",
+            tr(item.why, **parts) if item.why and status != "agrees" and f"instead_{item.code}" not in parts else "",
             status,
             BADGES[status],
             _page_on(study.article, item.code) if study.article else "",
@@ -331,10 +341,9 @@ def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str
 
 def _page_on(tables: ArticleTables, code: str) -> str:
     """The address of the page that shows more of an item; empty where there is none."""
-    if code in STATUS_OF_STAGES:
-        return f"{tables.real}/{code}.html"
-    place = f"#q={EXAMPLE_DEG}" if code == "same_as_teach" else ""
-    return f"{tables.printed}/{PAGES[code]}.html{place}" if code in PAGES else ""
+    if code in REAL_PAGES:
+        return f"{tables.real}/{REAL_PAGES[code]}.html"
+    return f"{tables.printed}/{PAGES[code]}.html{PLACES.get(code, '')}" if code in PAGES else ""
 
 
 def _with_code(text: str) -> Markup:
@@ -370,15 +379,21 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
     parts |= {"changes_gone": len(gone), "changes_named": _named(gone), "changes_meeting": _named(meeting)}
     reach = numbers.reach
     if reach is None:
-        parts["stage_boundary"] = tr("No drawing of this arm was found, and this study knows no reach of it.")
+        parts["instead_boundary"] = tr("No drawing of this arm was found, and this study knows no reach of it.")
     else:
         parts |= {"reach_known_mm": reach.known_mm, "reach_printed_mm": reach.printed_mm}
     parts |= {key: np.nan for key in ("holding_nm", "holding_loaded_nm") if parts[key] is None}
-    parts |= {f"gain_{k}": value for k, value in enumerate(numbers.wrist_gain)}
+    listed = {"gain": numbers.wrist_gain, "wrist_shift": numbers.wrist_shift_mm}
+    listed |= {"zyz": numbers.printed.example_zyz_deg, "quaternion": numbers.printed.example_quaternion}
+    parts |= {f"{name}_{k}": value for name, values in listed.items() for k, value in enumerate(values)}
+    parts["quintic_crossings"] = _times(numbers.quintic_crossings_s)
+    parts["ways_usable"] = joined(map(strategy_word, numbers.strategies_usable)) or "–"
+    parts["ways_unusable"] = joined(map(strategy_word, numbers.strategies_unusable)) or "–"
     parts |= {f"figure_{name}": place for name, place in places.items()}
     for stage in STATUS_OF_STAGES:
         head = _head(study, results, stage)
         parts[f"stage_{stage}"] = tr("This study does not examine it.") if head is None else head.text
+        parts |= {f"instead_{stage}": parts[f"stage_{stage}"]} if stage in ("vision", "dynamics") else {}
     return parts
 
 
@@ -398,13 +413,22 @@ def _flat(table: TableNumbers) -> dict[str, Any]:
     found |= dict(zip(("example_roll", "example_pitch", "example_yaw"), found["example_rpy_deg"]))
     found |= dict(zip(("volume_low", "volume_high"), found["volume_m3"]))
     found |= dict(zip(("void_low", "void_high"), found["void_litres"] or (0.0, 0.0)))
-    found["crossings"] = _crossings(table)
+    found["crossings"] = _times(table.line_crossings_s)
+    found["other_voids"] = joined(
+        (
+            tr("{low} to {high} L at z = {z} mm", low=fixed(low, 2), high=fixed(high, 2), z=fixed(z, 0))
+            for low, high, z in table.other_voids
+        ),
+        ", ",
+    )
+    found["other_voids"] = found["other_voids"] or tr("none")
+    found |= {key: np.nan for key in ("move_clearance_mm", "line_clearance_mm") if found[key] is None}
     found["line"] = outcome_word(table.line) if table.line else "–"  # type: ignore[arg-type]
     return found
 
 
-def _crossings(table: TableNumbers) -> str:
-    return joined((fixed(t, 4) for t in table.line_crossings_s), ", ") or "–"
+def _times(times: tuple[float, ...]) -> str:
+    return joined((fixed(t, 4) for t in times), ", ") or "–"
 
 
 def _compared(numbers: ArticleNumbers) -> list[list[str]]:
@@ -441,7 +465,10 @@ def _compared(numbers: ArticleNumbers) -> list[list[str]]:
             tr("The article's straight line"),
             *(outcome_word(t.line) if t.line else tr("not examined") for t in tables),  # type: ignore[arg-type]
         ),
-        row(tr("It is singular at t (s)"), *(_crossings(t) if t.line else tr("not examined") for t in tables)),
+        row(
+            tr("It is singular at t (s)"),
+            *(_times(t.line_crossings_s) if t.line else tr("not examined") for t in tables),
+        ),
     ]
 
 
@@ -475,6 +502,7 @@ def _player(study: Study, results: Path, tables: ArticleTables) -> Any:
         MOVE: tr("The article's joint move (section 5.2), on both tables"),
         LINE: tr("The article's straight line (section 5.2), from where each table has the tool at joint angles 0"),
     }
+    labels = {MOVE: tr("Joint move"), LINE: tr("Straight line")}
     motions = []
     for name, text in texts.items():
         own, other = (_motion(results, robot, name) for robot in (tables.printed, tables.corrected))
@@ -487,12 +515,14 @@ def _player(study: Study, results: Path, tables: ArticleTables) -> Any:
                 meant(first, own.q_deg),
                 _events(results, tables, name),
                 beside=(meant(beside, q),),
+                label=labels[name],
             )
         )
     t = np.linspace(0, 4, 81)
     q = np.zeros((len(t), first.joints))
     q[:, 0] = np.linspace(first.lower[0], first.upper[0], len(t))
-    motions.append(PlayedMotion("joint_1", tr("Joint 1 alone, over its range (section 2.2)"), t, q, beside=(q,)))
+    text = tr("Joint 1 alone, over its range (section 2.2)")
+    motions.append(PlayedMotion("joint_1", text, t, q, beside=(q,), label=tr("Hand check: joint 1 alone")))
     signs = [tr("as printed"), tr("offset 2 = −90°")]
     return player(first, motions, beside=(beside,), signs=signs)
 

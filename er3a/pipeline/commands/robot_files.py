@@ -106,7 +106,7 @@ def export_urdf(
     if srdf is not None:
         texts[srdf] = export_srdf(arm)
         for pair in pairs_not_checked(arm):
-            print_note(f"{srdf}: {pair} overlap in every joint vector tried; their shapes are in error, not checked")
+            print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
     for file, text in texts.items():
         write_atomically(file, partial(Path.write_text, data=text, encoding="utf-8"))
         print(f"{file}: written")

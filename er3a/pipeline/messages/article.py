@@ -33,13 +33,13 @@ ITEMS = (
     Item(
         "payload",
         "1",
-        "",
+        "er3a.gravity(robot, q, er3a.Load(6))",
         N_("Payload"),
         N_("The arm is introduced as a desktop arm for 6 kg."),
         N_(
             "No document that er3a has states a payload of the ER3A-C60; nothing else on this page rests on 6 kg. With "
-            "6 kg at its flange the real arm's joint 2 would have to hold up to {holding_loaded_nm:.0f} N m, without "
-            "load {holding_nm:.0f} N m."
+            "6 kg at its flange the real arm's joint 2 would have to hold up to {holding_loaded_nm:.0f} N m at rest, "
+            "anywhere within its limits; without load {holding_nm:.0f} N m. The dynamics page is of motions."
         ),
         N_(
             "No source was found for it, and none for what the drives can hold. The manual of the arm's successor, the "
@@ -54,8 +54,9 @@ ITEMS = (
         N_("MATLAB's Robotics Toolbox is used, version 10 or 11 recommended."),
         N_("The Toolbox was not run here: er3a does each step by itself, and every other item says with what."),
         N_(
-            "It needs MATLAB. er3a's tests hold poses, the modified reading and the joint move against its Python "
-            "port, by the same author."
+            "It needs MATLAB. Its public repository names release 10 as the newest; no release 11 was found. er3a's "
+            "tests hold poses, the modified reading, the joint move and ctraj's time law against its Python port, by "
+            "the same author."
         ),
     ),
     Item(
@@ -80,8 +81,8 @@ ITEMS = (
         N_("Standard or modified"),
         N_("Manuals use either convention; find out which."),
         N_(
-            "Every robot file names its convention, `er3a new --dh --modified` reads the other one, and the "
-            "diagnosis tries it as a fault."
+            "Every robot file names its convention, `er3a new DIR --dh table.csv --convention modified` reads the "
+            "other one, and the diagnosis tries it as a fault."
         ),
     ),
     Item(
@@ -112,7 +113,7 @@ ITEMS = (
     Item(
         "units",
         "3.1",
-        'er3a.diagnose(robot, "er3a_c60")',
+        'er3a.diagnose(robot, "er3a_c60_article")',
         N_("Units"),
         N_(
             "Millimetres and degrees must become metres and radians; forgetting it is the commonest error (also "
@@ -142,22 +143,23 @@ ITEMS = (
             " all are 0."
         ),
         N_(
-            "With all offsets 0 the table meets {p_statements_met} of {p_statements} of the article's statements,"
-            " with offset 2 = −90° {c_statements_met} of {c_statements}."
+            "With all offsets 0 the table meets {p_statements_met} of {p_statements} of the article's statements "
+            "(what its text says of poses, and what its table prints: the validation page lists them), with offset 2 "
+            "= −90° {c_statements_met} of {c_statements}."
         ),
         N_("By the article's own zero pose offset 2 is not 0."),
     ),
     Item(
         "plot",
         "3.2",
-        "er3a.plot(robot, q)",
+        "er3a.plot(robot, q, window=(-1.5, 1.5, -1.5, 1.5, 0, 1.5))",
         N_("Plot at the zero pose"),
         N_("The arm is plotted at zero in a window from z = 0 to 1.5 m."),
         N_(
             "As printed the tool stands at z = {p_tool_z:.0f} mm: {hidden_percent:.0f} % of the arm's length is "
             "outside that window (figure {figure_zero}). With offset 2 = −90° it is at {c_tool_z:.0f} mm."
         ),
-        N_("The window hides the forearm and the tool: the table is not the arm described."),
+        N_("The window hides most of the forearm, and the tool: the table is not the arm described."),
     ),
     Item(
         "teach",
@@ -177,14 +179,15 @@ ITEMS = (
             "violently, or a slider to move the tool hardly at all (again in 6.2)."
         ),
         N_(
-            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere; against one degree of "
-            "joint 6 at joint 5 = 0 it turns by {wrist_against_deg:.3f}°, so no slider alone shows it. What grows is "
-            "the joint speed that a turn of the tool needs: {gain_0:.1f}, {gain_1:.1f} and {gain_2:.0f} times the"
-            " tool's own at joint 5 = 5°, 1° and 0.1° (figure {figure_wrist})."
+            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere. The tool point it "
+            "moves hardly at all: by {wrist_shift_0:.2f}, {wrist_shift_1:.2f} and {wrist_shift_2:.2f} mm at joint 5 = "
+            "0°, 5° and 30°. If joint 4 turns by 1° at joint 5 = 0 and joint 6 turns back by 1°, the tool turns by "
+            "{wrist_against_deg:.3f}°. What grows is the joint speed that a turn of the tool needs: {gain_0:.1f}, "
+            "{gain_1:.1f} and {gain_2:.0f} times the tool's own at joint 5 = 5°, 1° and 0.1° (figure {figure_wrist})."
         ),
         N_(
-            "It is the other way round: at the singularity the tool loses a direction, and joints must move fast "
-            "for small turns of the tool."
+            "The second is right of the tool's position, the first of no pose. At the singularity the tool loses a "
+            "direction, and joints must move fast for small turns of the tool."
         ),
     ),
     Item(
@@ -202,12 +205,13 @@ ITEMS = (
     Item(
         "rpy",
         "4.1",
-        "er3a.rpy(T)",
-        N_("Roll, pitch, yaw"),
-        N_("Orientation is read as roll-pitch-yaw (ZYX) or as ZYZ Euler angles."),
+        "er3a.rpy(T), er3a.zyz(T), er3a.quaternion(T)",
+        N_("Roll, pitch, yaw, Euler angles, quaternion"),
+        N_("Orientation is read as roll-pitch-yaw (ZYX), as ZYZ Euler angles or as a quaternion."),
         N_(
-            "Roll, pitch, yaw of the example as printed: {p_example_roll:.2f}°, {p_example_pitch:.2f}°, "
-            "{p_example_yaw:.2f}°."
+            "The example as printed: roll, pitch, yaw {p_example_roll:.2f}°, {p_example_pitch:.2f}°, "
+            "{p_example_yaw:.2f}°; ZYZ {zyz_0:.2f}°, {zyz_1:.2f}°, {zyz_2:.2f}°; quaternion w, x, y, z "
+            "{quaternion_0:.4f}, {quaternion_1:.4f}, {quaternion_2:.4f}, {quaternion_3:.4f}."
         ),
     ),
     Item(
@@ -221,12 +225,12 @@ ITEMS = (
     Item(
         "target",
         "4.2",
-        "er3a.inverse(robot, T)",
+        "T = er3a.pose([0.5, 0.2, 0.7], np.radians([0, 90, 0]))",
         N_("The target"),
         N_("The target is (0.5, 0.2, 0.7) m with roll, pitch, yaw 0°, 90°, 0°."),
         N_(
-            "At a pitch of 90° roll and yaw are one turn: 0°, 90°, 0° and 30°, 90°, 30° are the same pose (apart "
-            "by {same_pose_apart})."
+            "At a pitch of 90° roll and yaw are one turn: 0°, 90°, 0° and 30°, 90°, 30° are the same pose, "
+            "{same_pose_apart_deg}° apart."
         ),
         N_(
             "The example lies on the singularity of roll-pitch-yaw, which the article does not mention. It harms "
@@ -246,7 +250,10 @@ ITEMS = (
             "Iteration without limits reaches the target with joint {free_joint} {free_beyond_deg:.0f}° beyond "
             "its limit."
         ),
-        N_("The text is right and the comment wrong."),
+        N_(
+            "The text is right and the comment wrong. In the Toolbox's release 10 ikine has one output: the printed "
+            "line, which asks for an exit flag as a second one, would end in an error."
+        ),
     ),
     Item(
         "mask",
@@ -322,13 +329,13 @@ ITEMS = (
         N_("The void"),
         N_("The workspace is a hollow shell; a region near and below the base can't be reached."),
         N_(
-            "As printed the void is of {p_void_low:.0f} to {p_void_high:.0f} L with its centre at z = "
-            "{p_void_z:.0f} mm. With offset 2 = −90° {c_void_low:.2f} to {c_void_high:.2f} L are left, at z = "
-            "{c_void_z:.0f} mm (figure {figure_reach})."
+            "As printed the largest void is of {p_void_low:.0f} to {p_void_high:.0f} L with its centre at z = "
+            "{p_void_z:.0f} mm; others: {p_other_voids}. With offset 2 = −90° {c_void_low:.2f} to {c_void_high:.2f} L "
+            "are left, at z = {c_void_z:.0f} mm (figure {figure_reach})."
         ),
         N_(
-            "The printed table's void lies above the base, not below it. With the offset that the article's text "
-            "asks for it is all but gone."
+            "The printed table's large void lies above the base, not below it. With the offset that the article's text "
+            "asks for it is gone, and what is left is about the shoulder."
         ),
     ),
     Item(
@@ -338,14 +345,14 @@ ITEMS = (
         N_("Joint move"),
         N_("A quintic in joint space takes 5 s with 50 samples; angle, velocity and acceleration are plotted."),
         N_(
-            "Greatest velocity {move_speed_deg_s:.1f}°/s, greatest acceleration "
-            "{move_acceleration_deg_s2:.1f}°/s² (figure {figure_move}). The curve is the same for any table."
+            "Greatest velocity {move_speed_deg_s:.2f}°/s, greatest acceleration "
+            "{move_acceleration_deg_s2:.2f}°/s² (figure {figure_move}). The curve is the same for any table."
         ),
     ),
     Item(
         "animation",
         "5.2",
-        "er3a.plot(robot, q)",
+        "er3a.plot(robot, q_t)",
         N_("Animation with trail"),
         N_("Both motions are animated with the tool's trail."),
         N_(
@@ -356,10 +363,13 @@ ITEMS = (
     Item(
         "ctraj",
         "5.2",
-        "er3a.follow(robot, er3a.line(T0, T1, 5.0), t)",
+        "er3a.follow(robot, er3a.line(T0, T1, 5.0, ramp=1/3), t).joints(t)",
         N_("Straight line"),
         N_("50 poses on a straight line are solved one after the other with ikcon, each from the last."),
-        N_("er3a follows the whole line of both tables. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°."),
+        N_(
+            "er3a follows the whole line of both tables, in ctraj's own time law: a trapezoid of speed, each ramp a "
+            "third of the time. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°."
+        ),
     ),
     Item(
         "line_singular",
@@ -369,10 +379,14 @@ ITEMS = (
         N_("A straight line may cross singular regions; the example is played without a remark."),
         N_(
             "As printed the line is singular at t = {p_crossings} s: it starts with axes 4 and 6 in line and "
-            "crosses again. With offset 2 = −90°: t = {c_crossings} s. Joint speeds rise to "
-            "{p_line_speed_deg_s:.0f}°/s and {c_line_speed_deg_s:.0f}°/s (figure {figure_line})."
+            "crosses again (on a quintic in place of ctraj's trapezoid: {quintic_crossings} s). With offset 2 = −90°: "
+            "t = {c_crossings} s. No joint speed jumps: it is {crossing_speed_deg_s:.0f}°/s at the last crossing, and "
+            "at most {p_line_speed_deg_s:.0f}°/s, of joint {peak_joint} at t = {peak_s:.1f} s (figure {figure_line})."
         ),
-        N_("The article's own example is the case that it warns of."),
+        N_(
+            "The article's own line is singular at its start and once more, which it does not mention. This does no "
+            "harm here: the line asks for no motion in the direction that the tool loses."
+        ),
     ),
     Item(
         "condition",
@@ -396,8 +410,9 @@ ITEMS = (
         N_("What to do about it"),
         N_("Stop, go round in joint space, warn the operator, or bend the line by a via point (6.2)."),
         N_(
-            "All are tried and compared on the trajectory page. On the article's line the best leaves it by "
-            "{repair_mm:.0f} mm and {repair_deg:.1f}° and takes {repair_longer_s:.2f} s longer."
+            "All are tried and compared on the trajectory page. On the article's line as printed these work: "
+            "{ways_usable}; these do not, mostly because it begins at the singularity: {ways_unusable}. The one chosen "
+            "leaves it by {repair_mm:.0f} mm and {repair_deg:.1f}° and takes {repair_longer_s:.2f} s longer."
         ),
     ),
     Item(
@@ -419,13 +434,13 @@ ITEMS = (
     Item(
         "boundary",
         "6.1",
-        "",
+        'er3a.load_references("er3_600")',
         N_("Workspace drawing"),
         N_("Compare the cloud with the manual's drawing."),
         N_(
             "No drawing of this arm was found. A number of it is known from CAD models and a URDF: the wrist centre "
             "gets {reach_known_mm:.1f} mm from axis 1, as printed {reach_printed_mm:.1f} mm. For the ER3-600, whose "
-            "manual has a drawing, the default study compares all of it."
+            "manual has a drawing, `make run` compares all of it: reports/er3_600/validation.html."
         ),
         N_("The reach of the printed table is not that of the arm that it is said to be."),
     ),
@@ -464,23 +479,30 @@ ITEMS = (
     Item(
         "collision",
         "6.3",
-        'er3a.load_scene("scene.yaml")',
+        'er3a.clearance(robot, q_t, er3a.load_scene("data/scenes/wall_and_low_floor.yaml")).distance',
         N_("Collisions"),
         N_("Links as cylinders and boxes, checked along the path."),
-        "{stage_collision}",
+        N_(
+            "Along the article's joint move and line the printed table stays {p_move_clearance_mm:.0f} and "
+            "{p_line_clearance_mm:.0f} mm clear, with shapes guessed from it. The real arm, anywhere: {stage_collision}"
+        ),
     ),
     Item(
         "programs",
         "6.3",
-        "er3a.write_program(...)",
+        "er3a program write data/paths/er3a_c60_article.yaml --robot er3a_c60_article "
+        "--language krl --only article_joint",
         N_("CSV and robot programs"),
         N_("Trajectories are written as CSV or as controller programs (.src, .script)."),
-        "{stage_programs}",
+        N_(
+            "The trajectory page has the article's joint move as CSV, KRL and URScript to save. The programs page "
+            "checks other programs, of the real arm: {stage_programs}"
+        ),
     ),
     Item(
         "vision",
         "6.3",
-        "er3a.calibrate_hand_eye(...)",
+        'er3a.calibrate_hand_eye(er3a.load_hand_eye("data/vision/fixed_camera.yaml", robot))',
         N_("Camera"),
         N_("A calibrated camera gives a part's pose in the base frame, and inverse kinematics the joints to grasp it."),
         "{stage_vision}",

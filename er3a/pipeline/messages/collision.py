@@ -34,6 +34,7 @@ STATES: dict[PairState, str] = {
     "never": N_("never collide"),
     "joined": N_("adjacent"),
     "overlaps": N_("shapes in error"),
+    "guessed": N_("guess in error"),
     "meets": N_("can collide"),
     "undecided": N_("undecided"),
     "allowed": N_("allowed"),
@@ -49,9 +50,7 @@ TEXTS = texts(
         "link_pair": "{first} and {second}",
         "link_and_solid": "{link} and {solid}",
         "carried_and_link": "{link} and {carried}",
-        "pairs_unexamined": (
-            "Collisions not examined, because the shapes overlap in every joint vector tried ({count}): {pairs}."
-        ),
+        "pairs_unexamined": "Collisions not examined, because the shapes overlap where no arm's can: {pairs}.",
         "shapes_assumed#given": (
             "No document gives the shapes of the arm's links: collisions are judged by assumed shapes, and clear means "
             "clear of these."
@@ -121,7 +120,7 @@ def _(found: PairsUnexamined) -> str:
     named = listed(found.pairs[:NAMED])
     if len(found.pairs) > NAMED:
         named.append(sentence("more", count=len(found.pairs) - NAMED))
-    return say_as(found, count=TRIED, pairs=joined(named, ", "))
+    return say_as(found, pairs=joined(named, ", "))
 
 
 @say.register
@@ -218,6 +217,11 @@ def why(
                 "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the "
                 "shapes. What overlaps is not checked.",
                 count=TRIED,
+            )
+        case "guessed":
+            return tr(
+                "Joints hold them, and the table gives the link between them no length, so the guessed shapes overlap "
+                "beside it in a tenth or more of the joint vectors tried. Not checked: give shapes in the robot's file."
             )
     if not left_out_mm:
         return tr("They collide at joint values ({witness}).", witness=witness)

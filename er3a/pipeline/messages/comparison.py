@@ -11,7 +11,7 @@ from er3a.comparison.compare import (
     RangeDifference,
     RangeLayer,
 )
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.say import joined, say, word
 
 LAYERS = {
@@ -77,11 +77,13 @@ def _detail(name: str, found: Comparison) -> str:
         return say(layer)
     if name == "zero" and not layer.same:
         moved = [(k, value) for k, value in enumerate(layer.offsets_deg, 1) if abs(value) > 1e-3]
-        shown = ", ".join(f"J{k} {value:+.6g}" for k, value in moved)
+        shown = ", ".join(f"J{k} {with_unit(f'{value:+.6g}', 'deg')}" for k, value in moved)
         return joined([shown, *(say(each) for each in layer.causes)])
     if name == "directions" and not layer.same:
         shown = tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
         return joined([shown, *(say(each) for each in layer.causes)])
+    if name == "limits" and layer.same is False:
+        return tr("{limits} (the second's limits by the first's zeros and directions)", limits=say(layer))
     if name == "coupling":
         return tr("rows {rows}", rows=", ".join(map(str, layer.rows)))
     return "" if layer.same is not False else say(layer)

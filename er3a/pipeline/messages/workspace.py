@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.collision
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.pipeline.messages.language import N_, as_text
+from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace.model import (
@@ -48,6 +48,14 @@ SWEEPS = {"joint_2": N_("joint 2"), "joint_3": N_("joint 3"), "wrist": N_("wrist
 POINTS = {"tool_point": N_("tool point"), "wrist_centre": N_("wrist centre"), "flange": N_("flange")}
 
 
+ENTRIES = {
+    "a": N_("a{joint}"),
+    "d": N_("d{joint}"),
+    "offset": N_("offset {joint}"),
+    "direction": N_("direction {joint}"),
+    "lower": N_("lower limit {joint}"),
+    "upper": N_("upper limit {joint}"),
+}
 TEXTS = texts(
     {
         "workspace.flat": "The tool point moves on a line or not at all, so there is no volume.",
@@ -203,8 +211,13 @@ def _changes(found: VoidUnexpected) -> str:
 
 def change_text(change: SingleChange) -> str:
     """An entry and the value that was tried."""
-    variant = change.unit or "sign"
-    return sentence(f"single_change#{variant}", entry=change.entry, tried=as_text(change.tried, "+.6g"))
+    tried = as_text(change.tried, ".6g" if change.unit else "+.6g")
+    return sentence(f"single_change#{change.unit or 'sign'}", entry=entry_word(change), tried=tried)
+
+
+def entry_word(change: SingleChange) -> str:
+    """The entry, such as "offset 2"."""
+    return tr(ENTRIES[change.column], joint=change.joint)
 
 
 @say.register

@@ -657,10 +657,7 @@ def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
     if not search.bodies.unexamined:
         return []
     pairs = ", ".join(pair.label for pair in search.bodies.unexamined)
-    return [
-        f"Collisions of {pairs} were not examined: these shapes overlap in every joint vector tried, which no arm can "
-        f"do. {_remedy(arm)}"
-    ]
+    return [f"Collisions of {pairs} were not examined: these shapes overlap where no arm's can. {_remedy(arm)}"]
 
 
 def _remedy(arm: Arm) -> str:

@@ -42,7 +42,7 @@ class PlayedMotion:
 
     Attributes
     ----------
-    name, text : what it is called, and what is said of it where no event is near
+    name, text : what it is called, and what is said of it where no event is near; label : for people, if not the name
     t : (N,), s, rising; q : (N, n), joint coordinates, finite
     timed : false where no times are known: ``t`` counts points then, which are shown at an even pace
     beside : (N, n) each, joint coordinates of the arms that stand beside the first
@@ -56,3 +56,4 @@ class PlayedMotion:
     marks: Sequence[Mark] = field(default=())
     timed: bool = True
     beside: Sequence[Reals] = ()
+    label: str = ""

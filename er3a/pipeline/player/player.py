@@ -58,7 +58,7 @@ WORDS = {
         "Drag to turn, wheel or + and − to zoom. A click into a plot or on a time leads to that moment; coloured marks "
         "on the time bar are events."
     ),
-    "no_script": N_("The player needs JavaScript; the recording of this stage shows the same in the Rerun viewer."),
+    "no_script": N_("The player needs JavaScript; recordings show the same in the Rerun viewer."),
 }
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.pairs import PairsUnexamined
@@ -19,6 +18,7 @@ from er3a.kinematics.singularity import TYPES, NearSingular, characteristic_leng
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
+from er3a.pipeline.messages.collision import body_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.pages import Caveat, caveat
@@ -154,7 +154,8 @@ WORDS: dict[str, Any] = {
     "measures": N_("How near to a singularity?"),
     "measures_help": N_(
         "At a singularity the tool loses a direction, and near it slow tool motions need fast joints. The measures are "
-        "of the Jacobian with its linear rows divided by {length} mm, {length_is}; they are 0 at a singularity."
+        "of the Jacobian with its linear rows divided by {length} mm, {length_is}. At a singularity the first two are "
+        "0 and the condition number is infinite."
     ),
     "length_is": {"wrist": N_("the reach of the wrist centre"), "links": N_("half the length along all links")},
     "manipulability": N_("Manipulability"),
@@ -245,6 +246,7 @@ WORDS: dict[str, Any] = {
         "The robot's file gives no shapes of its links, so they are capsules along the table, as thick as arms of this "
         "size usually are: an estimate."
     ),
+    "clearance_allowed": N_("Not watched, as the robot's file decides: {pairs}."),
     "clearance_is": N_("Clearance {distance}: {pair}."),
     "overlap": N_("Collision: {pair} overlap by {distance}."),
     "overlap_deep": N_("Collision: {pair} overlap by {distance} or more."),
@@ -358,6 +360,9 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
         "near": NEAR_TOUCH,
         "unexamined": say(PairsUnexamined(found.unexamined)) if found.unexamined else None,
         "estimated": not arm_shapes(robot).given,
+        "allowed": [
+            f"{body_word(row.first)} / {body_word(row.second)}" for row in found.matrix if row.state == "allowed"
+        ],
         "bodies": [
             {
                 "kind": KINDS[int(layout.kind[b])],

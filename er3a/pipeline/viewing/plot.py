@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib import pyplot
 from matplotlib.animation import FuncAnimation
@@ -22,23 +24,30 @@ MOST_FRAMES = 200
 AXES_LENGTH = 0.12  # of the tool's axes, in parts of the arm's size
 
 
-def plot(robot: Robot, q: Reals, seconds: float = 5.0) -> Figure | FuncAnimation:
+def plot(robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] | None = None) -> Figure | FuncAnimation:
     """Draw an arm: its links, its joints, and its tool's axes (x red, y green, z blue).
 
     Parameters
     ----------
     q : (n,), rad or m: a figure; (N, n): an animation with the tool's trail, which a notebook plays
     seconds : how long the animation lasts
+    window : (6,), m, what the axes show: least and greatest x, y, z, as ``workspace`` of the Robotics Toolbox; None
+        for all of the motion
 
     Returns
     -------
-    drawn : a figure or an animation of Matplotlib: ``plt.show()`` opens it, ``.savefig`` or ``.save`` keeps it
+    drawn : a figure or an animation of Matplotlib: a notebook shows it, in a script ``plt.show()`` of
+        ``matplotlib.pyplot`` opens it (an animation has to be kept in a name until then); ``.savefig`` or ``.save``
+        writes it
 
     Raises
     ------
     ShapeError
-        if q is neither
+        if q is neither, or the window has not six numbers
     """
+    edges = None if window is None else as_floats(np.asarray(window), "window")
+    if edges is not None and edges.shape != (6,):
+        raise ShapeError("window", edges.shape, "(6,)")
     values = as_floats(q, "q")
     if values.ndim not in (1, 2) or values.shape[-1] != robot.joints or not len(values):
         raise ShapeError("q", values.shape, f"({robot.joints},) or (N, {robot.joints})")
@@ -47,7 +56,7 @@ def plot(robot: Robot, q: Reals, seconds: float = 5.0) -> Figure | FuncAnimation
     figure = pyplot.figure()
     axes: Any = figure.add_subplot(projection="3d")
     trail = forward(robot, motion)[:, :3, 3]
-    _frame(axes, robot, motion)
+    _frame(axes, robot, motion, edges)
     parts = _parts(axes, robot)
 
     def show(number: int) -> list[Any]:
@@ -66,7 +75,8 @@ def plot(robot: Robot, q: Reals, seconds: float = 5.0) -> Figure | FuncAnimation
         return figure
     animation = FuncAnimation(figure, show, frames=len(motion), interval=1000 * seconds / len(motion))
     pyplot.rcParams["animation.html"] = "jshtml"
-    pyplot.close(figure)  # a notebook would show it beside the animation
+    if "inline" in matplotlib.get_backend():
+        pyplot.close(figure)  # a notebook would show it beside the animation
     return animation
 
 
@@ -79,8 +89,13 @@ def _parts(axes: Any, robot: Robot) -> tuple[Any, Any, list[Any], Any]:
     return arm, joints, tool, way
 
 
-def _frame(axes: Any, robot: Robot, motion: Reals) -> None:
-    """Axes of one scale that hold the whole motion."""
+def _frame(axes: Any, robot: Robot, motion: Reals, window: Reals | None) -> None:
+    """Axes of one scale that hold the whole motion, or show what a window (6,) in m does."""
+    if window is not None:
+        axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title=robot.title)
+        axes.set(**{f"{name}lim": window[2 * k : 2 * k + 2] for k, name in enumerate("xyz")})
+        axes.set_box_aspect(np.ptp(window.reshape(3, 2), axis=1))
+        return
     points = np.concatenate([skeleton(robot, each) for each in motion])
     middle, half = (points.max(axis=0) + points.min(axis=0)) / 2, 0.55 * np.ptp(points, axis=0).max()
     axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title=robot.title)

@@ -166,7 +166,7 @@ def compute(study: Study, name: str) -> CollisionResults:
     mounting = tuple(stated(Mounting, contact) for contact in base_contacts(robot, scene))
     matrix = _matrix(bodies)
     places_found = _places_summary(places)
-    wrong = ShapesOverlap(bodies.unexamined, space.whole.value) if bodies.unexamined else None
+    wrong = ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
     undecided = int((matrix.state == "undecided").sum())
     home_found = None if at_home is None else HomeCollides(at_home, float(-least[0] * 1000), space.whole.value)
     closest = (*at_targets, *on_paths)
@@ -176,7 +176,9 @@ def compute(study: Study, name: str) -> CollisionResults:
         summary=CollisionSummary(
             verdict=_verdict(
                 pairs, mounting, wrong or home_found, _free_space(space, places_found, undecided, assumed is not None)
-            ).resting_on(assumed),
+            )
+            .without(() if wrong else bodies.unexamined)
+            .resting_on(assumed),
             figures=_figures(space, places_found, matrix),
             scene=scene.title if scene else None,
             samples=settings.samples,

@@ -217,4 +217,4 @@ class CollisionResults(Results[CollisionSummary]):
 
 
 RESULTS = CollisionResults
-STATES: tuple[PairState, ...] = ("overlaps", "meets", "undecided", "watched", "joined", "allowed", "never")
+STATES: tuple[PairState, ...] = ("overlaps", "guessed", "meets", "undecided", "watched", "joined", "allowed", "never")

@@ -11,7 +11,7 @@ from er3a.collision.scene import Scene
 from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS
+from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS, entry_word
 from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace.capability_section import capability_context
@@ -146,7 +146,7 @@ def _change_rows(summary: WorkspaceSummary) -> list[list[str]]:
     finding = summary.verdict.finding
     return [
         [
-            bracketed(change.entry, tr(change.unit)),
+            bracketed(entry_word(change), tr(change.unit)),
             f"{change.given:g}".replace("-", "−"),
             f"{change.tried:g}".replace("-", "−"),
             tr("{low} to {high}", low=number(change.left_litres[0], 3), high=number(change.left_litres[1], 3)),
