@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_FUNCTION = 80
 MOST_POSITIONAL = 6
-IN_EVERY_STAGE = {"entry", "model", "compute", "record", "report"}
+IN_EVERY_STAGE = {"entry", "model", "compute", "played", "record", "report"}
 IN_EVERY_LANGUAGE = {"language", "reader", "dialect", "writer"}
 LANGUAGES = "er3a/programs"  # a folder of it is a language of robot programs
 MESSAGES = "er3a/pipeline/messages"  # its modules are named after those that they speak for
