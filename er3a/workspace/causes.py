@@ -1,6 +1,5 @@
-"""What makes a void: each limit is widened by itself, and the void's cells are judged again.
-
-What of a void is left if one entry of the table is another: what else than a limit may make it.
+"""What makes a void: each limit is widened by itself, and the void's cells are judged again. What is left of it if one
+entry of the table is another: what else than a limit may make it.
 
 An offset that is off by a right angle, a direction turned round, and a length with the other sign or of half or twice
 its value (a diameter for a radius) are the commonest slips of a table. Each moves the reach of the arm as a whole, so
