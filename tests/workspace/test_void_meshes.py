@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
-from er3a.workspace.causes import Disappears, Relaxed
+from er3a.workspace.causes import Disappears, Relaxed, single_changes
 from er3a.workspace.section_arm import TURN
-from er3a.workspace.single_changes import single_changes
 from er3a.workspace.voids import Blocks, closed_volume, mesh, without_bare_contacts
 
 AROUND = 36

@@ -34,7 +34,7 @@ from er3a.planning.toolbox import RAMP, quaternion, zyz
 from er3a.references.subjects import Reach
 from er3a.robots.masses import Load
 from er3a.robots.robot import Robot
-from er3a.workspace.single_changes import SingleChange, with_entry
+from er3a.workspace.causes import SingleChange, with_entry
 
 EXAMPLE = np.array([0, np.pi / 4, -np.pi / 6, 0, np.pi / 3, 0])  # section 4.1
 TARGET_MM, TARGET_RPY_DEG = (500.0, 200.0, 700.0), (0.0, 90.0, 0.0)  # section 4.2

@@ -53,7 +53,7 @@ from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.planning.moves import JointMove
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.workspace.single_changes import SingleChange
+from er3a.workspace.causes import SingleChange
 
 COLOURS = (REFERENCE, MODEL, MUTED)  # printed, corrected, real
 DOTS = 3000

@@ -25,9 +25,9 @@ from er3a.workspace.causes import (
     Geometry,
     Relaxed,
     SeveralLimits,
+    SingleChange,
     VoidCause,
 )
-from er3a.workspace.single_changes import SingleChange
 
 FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),

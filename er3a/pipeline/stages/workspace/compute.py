@@ -58,10 +58,10 @@ from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid, shoulder_of
 from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import ReachExtremes, Tally, search_reach, section_cells, touched_growth
+from er3a.workspace.causes import single_changes
 from er3a.workspace.general_proof import Surface, surface_of
 from er3a.workspace.proven import Proven, prove_robot
 from er3a.workspace.side_view import border_lines, corner_side, side_views
-from er3a.workspace.single_changes import single_changes
 from er3a.workspace.voids import (
     UNSEEN_RATIO,
     Hull,

@@ -21,14 +21,13 @@ from er3a.sampling import tally
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.tally import UNTOUCHED, ReachExtremes, Tally
 from er3a.workspace.capability import Capability, ClearPoses, Overall
-from er3a.workspace.causes import Relaxed, Unlimited, VoidCause
+from er3a.workspace.causes import Relaxed, SingleChange, Unlimited, VoidCause
 from er3a.workspace.dexterous import Core
 from er3a.workspace.general_proof import Surface
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.placement import Places
 from er3a.workspace.proven import ProofMethod, Proven
 from er3a.workspace.side_view import BorderLine, SideView
-from er3a.workspace.single_changes import SingleChange
 from er3a.workspace.tool_inverse import MapsMissing
 from er3a.workspace.voids import Hull, Void, VoidKind
 
