@@ -1,6 +1,6 @@
 """The solver of any chain, chosen from its geometry, with one interface for all classes.
 
-Chains are constant links and joints that turn about or slide along z (:mod:`links`); base, tool, offsets and
+Chains are constant links and joints that turn about or slide along z (:mod:`chain`); base, tool, offsets and
 coupling are the caller's. Chains with more than six joints hold one joint after another at a given value until a class
 is met that needs none (six joints) or has its own parameter (arm angle); chains with fewer are completed by joints that
 they lack, and of what those turn it is told.

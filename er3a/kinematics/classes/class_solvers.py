@@ -1,6 +1,6 @@
 """The solvers of the classes of arms, with one interface.
 
-Chains are constant links and joints that turn about or slide along z (:mod:`links`); base, tool, offsets and coupling
+Chains are constant links and joints that turn about or slide along z (:mod:`chain`); base, tool, offsets and coupling
 are the caller's.
 """
 
