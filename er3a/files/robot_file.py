@@ -180,7 +180,7 @@ SLIDING = ("armature_kg", "coulomb_n", "viscous_n_s_m", "rated_n", "peak_n")
 def check_masses(
     inertia: InertiaFields | None, drives: DriveFields | None, wrist: WristLoadFields | None, slides: Sequence[bool]
 ) -> None:
-    """Refuse links and joints that the arm has not, and units of the other type of joint: ``ValueError``."""
+    """Reject links and joints the arm does not have, and units of the other type of joint: ``ValueError``."""
     rows: list[tuple[str, Sequence[DriveRow | WristRow]]] = [("drives", drives.rows if drives else [])]
     rows.append(("wrist_load", wrist.rows if wrist else []))
     for group, listed in rows:

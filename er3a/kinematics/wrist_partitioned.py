@@ -282,7 +282,7 @@ def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
 
 
 def has_branches(robot: Robot) -> bool:
-    """Whether the arm has the eight branches of :mod:`er3a.kinematics.solutions`, told by three signs."""
+    """Whether the arm has the eight branches of :mod:`er3a.kinematics.solutions`, which three signs name."""
     return closed_form_missing(robot) is None or parallel_axes_arm(robot) is not None
 
 

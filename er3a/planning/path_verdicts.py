@@ -18,5 +18,5 @@ PathVerdict = Literal[
 ]
 PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
 """The gravest first."""
-NOT_TO_BE_RUN = PATH_VERDICTS[:7]
+NOT_TO_BE_RUN = PATH_VERDICTS[: PATH_VERDICTS.index("undecided")]
 """Of paths that no arm should run as they are; others pass near singular poses, or leave something open."""

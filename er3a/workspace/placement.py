@@ -251,8 +251,8 @@ def survey(
     ----------
     robot : with the limits that hold, see :func:`narrowed`
     coarsest : m, about the spacing
-    free : which arms count; all, unless told otherwise
-    in_cone : what is asked at points; directions with this roll, unless told otherwise
+    free : which arms count; all, unless given
+    in_cone : what is asked at points; directions with this roll, unless given
     """
     slots = slot_count(robot)
     start, spacing, shape, points, asked = _lattice(robot, task, coarsest)
@@ -314,7 +314,7 @@ def serve(
     Parameters
     ----------
     points : (n, 3), m; rotations : (k, rolls, 3, 3), or (1 or n, k, rolls, 3, 3) if they differ between points
-    free : which arms count; all, unless told otherwise
+    free : which arms count; all, unless given
 
     Returns
     -------
@@ -560,7 +560,7 @@ def find_places(
     robot : with its own limits; grid : m, about the lattice's spacing
     count : how many places to choose; most_poses : how many neighbourhoods of poses their proofs may look at
     free : which arms count at the lattice's points; the proofs, of reach alone, look at none
-    in_cone : what is asked at points; directions with this roll, unless told otherwise
+    in_cone : what is asked at points; directions with this roll, unless given
 
     Nothing is proven of arms without a spherical wrist.
     """
@@ -644,7 +644,7 @@ def prove_place(
 
     Returns
     -------
-    answer : refuted means that there is a point and direction that no branch reaches, with any of the rolls
+    answer : refuted: no branch reaches some point and direction, with any of the rolls
     used : how many neighbourhoods were looked at
 
     Raises

@@ -337,7 +337,7 @@ def _measured_against(diagnosis: SetDiagnosis) -> str:
     """What residuals are measured against, and what of that is no evidence."""
     own = [own_title(title) for title in diagnosis.against if title in diagnosis.from_table]
     others = [own_title(title) for title in diagnosis.against if title not in diagnosis.from_table]
-    told = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
+    text = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
     if own:
         template = (
             N_("Also compared with {documents}: taken from the table, or the table from them, so no evidence for it.")
@@ -347,8 +347,8 @@ def _measured_against(diagnosis: SetDiagnosis) -> str:
                 "they are no evidence for its numbers."
             )
         )
-        told = joined([told, tr(template, documents=joined(own))], " ")
-    return told
+        text = joined([text, tr(template, documents=joined(own))], " ")
+    return text
 
 
 def _calibration_story(calibration: SetCalibration, corrections: Corrections) -> CalibrationStory:
