@@ -96,6 +96,7 @@ from er3a.programs.instructions import (
     Unknown,
     UnresolvedTarget,
 )
+from er3a.programs.writing import solutions_meant
 from er3a.robots.joint_limits import joint_shown, within
 from er3a.robots.robot import Robot
 
@@ -206,7 +207,7 @@ def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals
     findings: list[CheckFinding] = list(placed.taken)
     joint = placed.motion.kind == "joint"
     if target.branch is not None and joint:
-        met = target.branch.met(placed.arm, rows)
+        met = solutions_meant(target.branch, placed.arm, rows)
         rows = rows[met] if met.any() else rows
         findings += () if met.any() else (_branch_not_met(target, joint),)
     elif target.configuration and target.branch is None and joint and _different(rows) > 1:
@@ -795,7 +796,7 @@ class StepChecker:
         told = (*findings, *way.findings)
         target = placed.motion.target
         if isinstance(target, PoseTarget) and target.branch is not None and way.end is not None:
-            arrived = target.branch.met(way.arm, way.end[None])[0]
+            arrived = solutions_meant(target.branch, way.arm, way.end[None])[0]
             told += () if arrived else (_branch_not_met(target, joint=False),)
         return self._measured(CheckedMotion(kind, placed, before, way, way.end, told, moments=way.moments))
 

@@ -33,10 +33,8 @@ import scipy
 
 from er3a.by_value import ByValue
 from er3a.geometry.transforms import rpy_of, transform
-from er3a.kinematics.singularity import factors_where_defined
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Reals
 from er3a.robots.masses import MassBody
-from er3a.robots.robot import Robot
 
 RateUnit = Literal["m/s", "m/s2", "rad/s", "rad/s2", "share", "s"]
 ZoneKind = Literal["fine", "distance", "angle", "share", "velocity", "named"]
@@ -98,7 +96,6 @@ class Zone:
 
 
 FINE = Zone()
-NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,25 +141,6 @@ class MeantSolution(ByValue):
     ranges: Reals
     behind_axis_1: bool | None = None
     behind_lower_arm: bool | None = None
-
-    def met(self, robot: Robot, rows: Reals) -> Flags:
-        """Which of joint vectors (k, n) in rad are meant: (k,).
-
-        The wrist centre's sides are compared with those in the arm's zero pose; what has no side there, or has no such
-        sides at all, as an arm without a spherical wrist, is not asked for.
-        """
-        met: Flags = np.asarray(((rows >= self.ranges[:, 0]) & (rows <= self.ranges[:, 1])).all(axis=1), np.bool_)
-        if self.behind_axis_1 is None and self.behind_lower_arm is None:
-            return met
-        zero = factors_where_defined(robot, np.zeros((1, robot.joints)))
-        found = factors_where_defined(robot, rows)
-        for behind, there, here in (
-            (self.behind_axis_1, zero.shoulder[0], found.shoulder),
-            (self.behind_lower_arm, zero.elbow[0], found.elbow),
-        ):
-            if behind is not None and abs(there) > NO_SIDE:
-                met = met & (((here * there < 0) == behind) | (np.abs(here) < NO_SIDE))
-        return met
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,8 +16,9 @@ from er3a.by_value import ByValue
 from er3a.errors import PoseError
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import factors_where_defined
 from er3a.kinematics.solutions import Solutions
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.programs.instructions import (
     ArmMotion,
     Aside,
@@ -59,6 +60,7 @@ MOST_AT_ONCE = 2_000  # motions whose joints are solved together
 MOST_ROUNDS = 10  # over them
 
 Frames = tuple[NamedFrame, NamedFrame]
+NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,12 +254,32 @@ def _is_followed(motion: ArmMotion) -> bool:
     return given and motion.kind != "joint" and motion.angle is None
 
 
+def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals) -> Flags:
+    """Which of joint vectors (k, n) in rad are meant: (k,).
+
+    The wrist centre's sides are compared with those in the arm's zero pose; what has no side there, or has no such
+    sides at all, as an arm without a spherical wrist, is not asked for.
+    """
+    met: Flags = np.asarray(((rows >= branch.ranges[:, 0]) & (rows <= branch.ranges[:, 1])).all(axis=1), np.bool_)
+    if branch.behind_axis_1 is None and branch.behind_lower_arm is None:
+        return met
+    zero = factors_where_defined(robot, np.zeros((1, robot.joints)))
+    found = factors_where_defined(robot, rows)
+    for behind, there, here in (
+        (branch.behind_axis_1, zero.shoulder[0], found.shoulder),
+        (branch.behind_lower_arm, zero.elbow[0], found.elbow),
+    ):
+        if behind is not None and abs(there) > NO_SIDE:
+            met = met & (((here * there < 0) == behind) | (np.abs(here) < NO_SIDE))
+    return met
+
+
 def _chain(found: Solutions, reference: Reals, arm: Robot, branch: MeantSolution | None) -> list[Reals]:
     """The solution of each pose that is nearest to the one before, up to the first pose that has none."""
     chain: list[Reals] = []
     rows = np.where((found.solved & found.within_limits)[..., None], found.q, np.inf)
     for solutions in rows:
-        if branch is not None and (met := branch.met(arm, solutions) & np.isfinite(solutions[:, 0])).any():
+        if branch is not None and (met := solutions_meant(branch, arm, solutions) & np.isfinite(solutions[:, 0])).any():
             solutions = np.where(met[:, None], solutions, np.inf)
         away = np.abs(solutions - reference).max(axis=1)
         best = int(away.argmin())

@@ -30,7 +30,7 @@ from er3a.programs.languages import files_of, read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NotSimulated, NotUnderstood, ToolNotGiven
 from er3a.programs.rapid.data_types import branch_of
-from er3a.programs.writing import WriteOptions
+from er3a.programs.writing import WriteOptions, solutions_meant
 
 ROBOT = load_robot("er3a_c60")
 NONE = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -343,13 +343,13 @@ def test_of_several_solutions_the_one_with_the_configuration_is_taken(tmp_path):
         quarters = np.floor(np.degrees(row[[0, 3, 5]]) / 90).astype(int)
         for cfx in range(8):
             conf = (*quarters.tolist(), cfx)
-            if not branch_of(tuple(map(float, conf)), 6).met(ROBOT, row[None])[0]:
+            if not solutions_meant(branch_of(tuple(map(float, conf)), 6), ROBOT, row[None])[0]:
                 continue
             text = f"[[{x:.9f},{y:.9f},{z:.9f}],[{','.join(f'{each:.12f}' for each in turn)}],{list(conf)},{NONE}]"
             program = read_program(saved(tmp_path, f"MoveJ {text},@;"))
             check = check_program(program, ROBOT, CheckOptions(start=np.zeros(6)))
             end = check.motions[check.main[0]].end
-            met = branch_of(tuple(map(float, conf)), 6).met(ROBOT, rows)
+            met = solutions_meant(branch_of(tuple(map(float, conf)), 6), ROBOT, rows)
             nearest = rows[met][np.abs(rows[met]).max(axis=1).argmin()]
             np.testing.assert_allclose(end, nearest, atol=1e-6)
             assert "configuration_not_met" not in {each.finding.code for each in check.findings}

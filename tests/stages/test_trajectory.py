@@ -299,7 +299,7 @@ def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(result
 
 @pytest.mark.long
 def test_articles_moves_are_those_of_robotics_toolbox(study, article):
-    """jtraj and ctraj at the article's 50 samples of 5 s, ctraj on our law of time."""
+    """jtraj and ctraj at the article's 50 samples of 5 s."""
     rtb, sm = pytest.importorskip("roboticstoolbox"), pytest.importorskip("spatialmath")
     samples = article.samples
     joint = samples.take(samples.path == "article_joint")
@@ -311,8 +311,7 @@ def test_articles_moves_are_those_of_robotics_toolbox(study, article):
     line = samples.take(samples.path == "article_line")
     start = forward(study.robot("er3a_c60_article"), np.zeros(6))
     end = transform([0.6, 0.3, 0.5], [0, np.pi, 0])
-    share = rtb.jtraj(np.array([0.0]), np.array([1.0]), t).q[:, 0]
-    ctraj = rtb.ctraj(sm.SE3(start), sm.SE3(end), s=share)
+    ctraj = rtb.ctraj(sm.SE3(start), sm.SE3(end), t=50)
     np.testing.assert_allclose(line.xyz_mm / 1000, ctraj.t, atol=1e-9)
 
 

@@ -561,7 +561,7 @@ def test_the_corrected_file_that_a_page_advises_is_not_contradicted(study, tmp_p
     wrong = edited_robot(study, tmp_path, other_conventions)
     stored = computed(wrong, tmp_path / "out")
     assert isinstance(stored.results.summary.verdict.finding, DefinedOtherwise)
-    assert "take the corrected table from the validation page" in next_step("edited", "fail", {}, same_arm=True).text
+    assert "Take the corrected table from the validation page" in next_step("edited", "fail", {}, same_arm=True).text
     report(wrong, stored, tmp_path / "page.html")
     again = carried_out(wrong, (tmp_path / "page.html").read_text(encoding="utf-8"), tmp_path)
     assert again.results.summary.verdict.status != "fail"

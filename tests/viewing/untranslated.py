@@ -151,11 +151,14 @@ class PageTexts(HTMLParser):
 def _words_of(data: Any) -> list[str]:
     """Texts that a page hands to its scripts: names of what a figure in space shows, all below a key ``words`` (fields
     left out), or all if there are no further levels."""
+    if not isinstance(data, dict):
+        return []
     if "groups" in data:
         return [layer["name"] for group in data["groups"] for layer in group["layers"]]
     if "words" in data:
         return [re.sub(r"\{\w+\}", " ", text) for text in _leaves(data["words"], keys=False)]
-    return list(data.values()) if all(isinstance(value, str) for value in data.values()) else []
+    texts = data.values() if all(isinstance(value, str) for value in data.values()) else []
+    return [re.sub(r"\{\w+\}", " ", text) for text in texts]
 
 
 def _leaves(data: Any, keys: bool) -> Iterator[str]:

@@ -113,3 +113,9 @@ class Stage:
     def digest(self, verb: str) -> str:
         """The digest of what a verb's outcome depends on: its modules, and for a view the stage's sentences."""
         return code_digest(f"{self.package}.{verb}", *([] if verb == "compute" else [self.messages]))
+
+
+def program_files(path: Path) -> tuple[Path, ...]:
+    """A program's file and those that belong to it; by name, as all pages import the stages, and few read programs."""
+    files: tuple[Path, ...] = import_module("er3a.programs.languages").files_of(path)
+    return files

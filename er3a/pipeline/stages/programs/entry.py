@@ -11,8 +11,7 @@ from er3a.files.program_file import load_programs
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.stage import Stage, StudyFiles
-from er3a.programs.languages import files_of
+from er3a.pipeline.stages.stage import Stage, StudyFiles, program_files
 
 
 class ProgramsSettings(StrictModel):
@@ -33,7 +32,7 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     file = study.entry(robot).programs
     if file is None:
         return []
-    programs = [path for entry in load_programs(file).programs for path in files_of(Path(entry.file))]
+    programs = [path for entry in load_programs(file).programs for path in program_files(Path(entry.file))]
     return [Path(file), *programs, *study.scenes(robot, "trajectory")]
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from er3a.files.yaml_file import read_yaml
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.stage import Stage, StudyFiles
-from er3a.programs.languages import files_of
+from er3a.pipeline.stages.stage import Stage, StudyFiles, program_files
 
 
 def _inputs(study: StudyFiles, robot: str) -> list[Path]:
@@ -21,7 +20,7 @@ def _tables_of(path_file: str) -> list[Path]:
     paths = read_yaml(path_file).get("paths")
     listed = [path for path in paths if isinstance(path, dict)] if isinstance(paths, list) else []
     tables = [Path(file) for path in listed if isinstance(file := path.get("file"), str)]
-    programs = [files_of(Path(file)) for path in listed if isinstance(file := path.get("program"), str)]
+    programs = [program_files(Path(file)) for path in listed if isinstance(file := path.get("program"), str)]
     return [*tables, *(file for files in programs for file in files)]
 
 
