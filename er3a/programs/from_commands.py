@@ -180,8 +180,7 @@ class _Making:
         zone: Zone,
         via: PoseTarget | None = None,
     ) -> ArmMotion:
-        frames = {"tool": self.tool, "base": self.base}
-        return ArmMotion(kind, target, via=via, speed=speed, zone=zone, load=self.load, **frames)
+        return ArmMotion(kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base, load=self.load)
 
 
 def _plain(zones: list[Zone]) -> list[Zone]:

@@ -324,8 +324,9 @@ class RapidDialect:
         assert isinstance(call, Invocation)
         if call.function == "GRIPLOAD":
             given = call.arguments[0] if len(call.arguments) == 1 else None
-            memory.write("%GRIPLOAD", UNCLEAR if given is None else memory.value(given))
-            return None if load_of(typed(memory.read("%GRIPLOAD"), LOADDATA)) else Aside(doing.text)
+            gripped = UNCLEAR if given is None else memory.value(given)
+            memory.write("%GRIPLOAD", gripped)
+            return None if load_of(typed(gripped, LOADDATA)) else Aside(doing.text)
         if call.function in SETTINGS:
             return None if _set(memory, call) else Unknown(doing.text, may_move=False)
         if call.function in OUTPUTS and call.arguments:

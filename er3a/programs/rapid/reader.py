@@ -223,8 +223,8 @@ class Scope:
             array = self.shape_of(target.of, name)
             return array[1] if array and array[0] == "[]" and isinstance(array[1], tuple) else None
         if isinstance(target, Member):
-            parts = dict(each for each in self.shape_of(target.of, name) or () if isinstance(each, tuple))
-            return parts.get(target.name)
+            parts = (each for each in self.shape_of(target.of, name) or () if isinstance(each, tuple))
+            return next((each[1] for each in parts if each[0] == target.name and isinstance(each[1], tuple)), None)
         return self.shapes.get(name)
 
     def typed(self, value: Expression, shape: Shape | None) -> Expression:
