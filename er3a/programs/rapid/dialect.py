@@ -590,7 +590,7 @@ def _displace(memory: ProgramMemory, call: Invocation, values: list[Value], opti
 def arithmetic(sign: str, left: Value, right: Value) -> Value:
     """Sums and products: of numbers, texts and positions, a number times a position, cross products, turns.
 
-    RAPID overview, 1 Expressions: pos * pos is the cross product, orient * orient the product of turns.
+    RAPID Reference Manual, 7.1: pos * pos is the cross product, orient * orient the product of turns.
     """
     for side in (left, right):
         if isinstance(side, Unclear):
@@ -628,7 +628,7 @@ def _number_of(name: str, values: tuple[Value, ...]) -> Value | None:
 
 
 def _here(memory: ProgramMemory) -> Position:
-    """Where the arm stands; not known behind a motion that the program has not waited for (2 CRobT, 2 CPos)."""
+    """Where the arm stands; not known behind a motion that the program does not wait for (7-zonedata-1)."""
     return memory.here if memory.read(PASSING) in (None, False) else Position()
 
 

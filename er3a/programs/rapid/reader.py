@@ -1,7 +1,8 @@
 """Reads ABB RAPID: a module with the modules beside it that it uses.
 
 Instructions that are not understood are kept; blocks and texts without an end are errors. The grammar is that of ABB's
-*Technical reference manual: RAPID overview* (3HAC050947-001), section 1, Basic RAPID programming.
+*Technical reference manual: RAPID overview* (3HAC050947-001), section 1, Basic RAPID programming; sources are named in
+:mod:`er3a.programs.rapid.data_types`.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ RAPID = Lexicon(
     constants={"TRUE": True, "FALSE": False},
     folds=True,
 )
-"""RAPID overview, section 1 (Expressions): NOT, OR and XOR bind least."""
+"""RAPID Reference Manual, 7.7 Priority between operators: NOT, OR and XOR bind least."""
 ENDS = frozenset(
     (
         *("ENDPROC", "ENDFUNC", "ENDTRAP", "ENDMODULE", "ENDRECORD", "ENDIF", "ENDWHILE", "ENDFOR", "ENDTEST"),
