@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import get_args
 
 import pytest
+import yaml
 
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ArmClassCode
 from er3a.programs.languages import LANGUAGES
@@ -84,6 +85,14 @@ def test_each_name_has_its_entry():
     assert list(LANGUAGES) == list(get_args(LanguageName))
     assert list(RULES) == list(get_args(RuleName))
     assert set(ARM_CLASSES) == set(get_args(ArmClassCode))
+
+
+def test_the_hook_checks_the_files_of_every_language():
+    hooks = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
+    pattern = next(each["files"] for each in hooks if each["id"] == "er3a-check-program")
+    suffixes = [suffix for name, each in LANGUAGES.items() if name != "csv" for suffix in each.suffixes]
+    assert [suffix for suffix in suffixes if not re.search(pattern, f"cell/pick{suffix}")] == []
+    assert not re.search(pattern, "cell/cell.yaml")
 
 
 @pytest.mark.long

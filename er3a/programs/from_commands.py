@@ -37,6 +37,7 @@ from er3a.programs.instructions import (
     Zone,
 )
 from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
+from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 TO_START = Rate(0.1, "share")
@@ -65,6 +66,7 @@ def listing_of(
     name: str = "path",
     title: str = "",
     ends: Reals | None = None,
+    load: MassBody | str | None = None,
 ) -> PathListing:
     """A path's command as a sequence that begins with a joint motion to its start.
 
@@ -73,8 +75,9 @@ def listing_of(
     start : (n,), rad, joints at the path's start
     ends : (k, n), rad, joints at the end of each segment or row behind the start, where they are known: they fix the
         branch for languages that write joints
+    load : what hangs on the flange, as of :class:`er3a.programs.instructions.ArmMotion`
     """
-    making = _Making(robot, start)
+    making = _Making(robot, start, load)
     match command:
         case JointMoveCommand():
             making.joints(command.end[None], np.array([command.duration]), [FINE])
@@ -108,8 +111,8 @@ def listing_of(
 class _Making:
     """Puts the instructions of a path together."""
 
-    def __init__(self, robot: Robot, start: Reals):
-        self.tool, self.base = NamedFrame("", robot.tool), NamedFrame("", np.eye(4))
+    def __init__(self, robot: Robot, start: Reals, load: MassBody | str | None):
+        self.tool, self.base, self.load = NamedFrame("", robot.tool), NamedFrame("", np.eye(4)), load
         self.to_robot = np.linalg.inv(robot.base)
         self.pose: Reals = self.to_robot @ forward(robot, start)
         self.found: list[Instruction] = [self._motion("joint", JointTarget(start), TO_START, FINE)]
@@ -177,7 +180,7 @@ class _Making:
         zone: Zone,
         via: PoseTarget | None = None,
     ) -> ArmMotion:
-        return ArmMotion(kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base)
+        return ArmMotion(kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base, load=self.load)
 
 
 def _plain(zones: list[Zone]) -> list[Zone]:

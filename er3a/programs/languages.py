@@ -39,7 +39,7 @@ WITHOUT_JOINTS = "Write a table (csv), or a language that has these joints"
 
 
 def read_program(path: str | Path) -> Program:
-    """Read a robot program: KUKA KRL, URScript, EFORT RPL as text or XML, ABB RAPID, or a CSV table of joints.
+    """Read a robot program in one of the registered languages, or a CSV table of joints.
 
     Raises
     ------

@@ -194,8 +194,8 @@ def as_number(text: str) -> int | float:
     """A number as it is written: whole if it has no point and no exponent."""
     if text.isascii() and text.isdigit():
         return int(text) if len(text) < 19 else float(text)
-    if text[:2] in ("0x", "0X"):
-        return int(text[:18], 16)
+    if text[:1] == "0" and text[1:2].lower() in ("x", "o", "b"):
+        return int(text[:66], 0)
     return float(text)
 
 

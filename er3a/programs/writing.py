@@ -52,6 +52,7 @@ from er3a.programs.program_findings import (
     WrittenUnsafe,
     ZonesDropped,
 )
+from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 STEP_M, STEP_RAD = 0.02, 0.1
@@ -332,6 +333,8 @@ def _between(motion: ArmMotion, start: Reals) -> Reals:
 
 
 HEAD = "er3a: "
+AGAIN = "again"
+"""Load at the start of what is done for ever: the one at its end, or the one before."""
 RESERVED = frozenset(
     word
     for words in (
@@ -401,6 +404,7 @@ class Writer(ABC):
         self.tools: list[str] = []
         self.lines: list[str] = []
         self.said: list[str] = []
+        self.load: MassBody | str | None = None
         self.own = listing.language in self.languages
 
     def write(self) -> WrittenProgram:
@@ -410,6 +414,7 @@ class Writer(ABC):
         for i, instruction in enumerate(ready):
             if i == self.listing.repeats_from:
                 self.begin_loop()
+                self.load = AGAIN if any(each.load is not None for each in self.listing.motions) else None
             self._add(instruction)
         if self.listing.repeats_from is not None:
             self.end_loop()
@@ -450,6 +455,11 @@ class Writer(ABC):
     def verbatim(self, text: str) -> None:
         """Text of this language."""
 
+    def set_load(self, load: MassBody | None) -> None:
+        """What hangs on the flange from here; None for what is not known. A language without a word for it names it."""
+        if load is not None:
+            self.name_tool(f"a load of {load.mass:g} kg")
+
     def left_out(self, motion: ArmMotion) -> None:
         """A motion whose target can't be written."""
         self.count["left out"] += 1
@@ -463,7 +473,13 @@ class Writer(ABC):
 
     def _add(self, instruction: Instruction | ReadyMotion) -> None:
         match instruction:
-            case ReadyMotion():
+            case ReadyMotion(motion=motion):
+                if motion.load != self.load:
+                    self.load = motion.load
+                    if isinstance(motion.load, str):
+                        self.name_tool(f"the load {motion.load}")
+                    else:
+                        self.set_load(motion.load)
                 self.motion(instruction)
             case Remark(text=text):
                 self._remark(text)
@@ -568,6 +584,18 @@ def short(value: float, digits: int = 6) -> str:
     return text + "0" if text.endswith(".") else text
 
 
+def principal_axes(load: MassBody) -> tuple[Reals, Reals]:
+    """The axes of a load as a pose (4, 4), m, in the flange's frame, and its moments (3,) about them, kg m^2."""
+    moments, axes = np.linalg.eigh(load.inertia_matrix)
+    if not any(load.inertia[3:]):
+        moments, axes = np.array(load.inertia[:3]), np.eye(3)
+    pose = np.eye(4)
+    pose[:3, :3] = axes if np.linalg.det(axes) > 0 else -axes
+    pose[:3, 3] = load.centre
+    return pose, moments
+
+
+LOAD_DIGITS = 9  # of masses in kg, centres in m, moments in kg m^2
 ASSUMED_JOINT_SPEED = math.radians(100.0)  # rad/s, of a joint whose greatest speed no table gives
 
 

@@ -8,8 +8,11 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
 from er3a.program_check.program_check_findings import LoadAbovePayload, LoadNotExamined
-from er3a.programs.languages import read_program
+from er3a.programs.instructions import ArmMotion, JointTarget, Listing, NamedFrame
+from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
+from er3a.programs.program_findings import ToolNotGiven
+from er3a.programs.writing import WriteOptions, WrittenProgram
 from er3a.robots.masses import MassBody
 
 HOME = "0,-10,-10,0,-70,0"
@@ -36,11 +39,11 @@ def loads(language: str, tmp_path, *settings: str) -> list[MassBody | str | None
     return [motion.load for motion in run.listing().motions]
 
 
-def same(load: MassBody | str | None, mass: float, centre: tuple[float, ...], inertia: tuple[float, ...]) -> None:
+def same(load: MassBody | str | None, mass: float, centre: tuple, inertia: tuple, within: float = 1e-12) -> None:
     assert isinstance(load, MassBody)
     assert load.mass == pytest.approx(mass)
-    np.testing.assert_allclose(load.centre, centre, atol=1e-12)
-    np.testing.assert_allclose(load.inertia, inertia, atol=1e-12)
+    np.testing.assert_allclose(load.centre, centre, atol=within)
+    np.testing.assert_allclose(load.inertia, inertia, atol=within)
 
 
 def test_krl_gives_loads_by_variable_number_and_tool(tmp_path):
@@ -91,6 +94,54 @@ def test_rapid_adds_the_part_to_the_tool(tmp_path):
     file.write_text(file.read_text().replace(",fine,tG;", ",fine,tG\\TLoad:=whole;"))
     (all_of_it, *_) = execute(read_program(file), load_robot("er3a_c60")).listing().motions
     same(all_of_it.load, 2.5, (0, 0, 0.06), (0,) * 6)
+
+
+PART = MassBody(2.5, (0.01, -0.02, 0.05), (0.02, 0.03, 0.04, 0.001, -0.002, 0.003))
+PLAIN = MassBody(1.2, (0.0, 0.0, 0.07))
+
+
+def written(language: str, loads: list[MassBody | str | None], repeats_from: int | None = None) -> WrittenProgram:
+    """Joint motions with these loads, written."""
+    tool = NamedFrame("", np.array([[0, -1, 0, 0.0], [1, 0, 0, 0], [0, 0, 1, 0.1], [0, 0, 0, 1]]))
+    points = (np.radians([i, -10, -10, 0, -70, 0]) for i in range(len(loads)))
+    motions = [ArmMotion("joint", JointTarget(q), tool=tool, load=load) for q, load in zip(points, loads)]
+    robot = load_robot("er3a_c60")
+    return write_program(Listing("p", tuple(motions), repeats_from=repeats_from), language, WriteOptions(robot))
+
+
+def read_back(program: WrittenProgram, tmp_path) -> list[MassBody | str | None]:
+    for suffix, text in program.files.items():
+        (tmp_path / f"p{suffix}").write_text(text)
+    run = execute(read_program(tmp_path / f"p{next(iter(program.files))}"), load_robot("er3a_c60"))
+    return [step.instruction.load for step in run.steps if isinstance(step.instruction, ArmMotion)]
+
+
+@pytest.mark.parametrize("language", SUFFIX)
+def test_written_loads_come_back(language, tmp_path):
+    given = [None, PART, PART, PLAIN, None, PART]
+    found = read_back(written(language, given), tmp_path)
+    for load, wanted in zip(found, given, strict=True):
+        if wanted is None:
+            assert load is None
+        else:
+            same(load, wanted.mass, wanted.centre, wanted.inertia, 1e-8)
+
+
+@pytest.mark.parametrize("language", SUFFIX)
+def test_each_round_of_a_loop_begins_with_its_own_load(language, tmp_path):
+    found = read_back(written(language, [PART, PART, PLAIN], repeats_from=1), tmp_path)
+    assert len(found) >= 5
+    assert [load.mass for load in found] == [2.5, *([2.5, 1.2] * len(found))[: len(found) - 1]]
+
+
+def test_a_load_that_can_not_be_written_is_named():
+    for language, load, name in (
+        ("rpl", PART, "a load of 2.5 kg"),
+        ("xpl", PART, "a load of 2.5 kg"),
+        ("krl", "set_payload(2)", "the load set_payload(2)"),
+    ):
+        findings = written(language, [load]).findings
+        assert name in [each.name for each in findings if isinstance(each, ToolNotGiven)]
 
 
 def checked(tmp_path, text: str, robot: str = "er3_600") -> ProgramCheck:

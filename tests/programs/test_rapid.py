@@ -45,6 +45,13 @@ DATA = f"""
     num height;
   ENDRECORD
   VAR part plate:=[[[7,8,9],[1,0,0,0],[0,0,0,0],{NONE}],12];
+  RECORD pair
+    part lower;
+    num count{{2}};
+  ENDRECORD
+  VAR pair twin:=[[[[7,8,9],[1,0,0,0],[0,0,0,0],{NONE}],12],[4,5]];
+  CONST num size:=2;
+  VAR pos sized{{size}};
   VAR robtarget t;
   VAR num n:=3;
   VAR num list{{3}}:=[10,20,30];
@@ -110,6 +117,12 @@ POSES = {  # instructions, mm, quaternion (w first)
     "sum_of_pos": ("t:=p; t.trans:=p.trans+grid{2,3}; MoveL t,@;", (106, 200, 300), (1, 0, 0, 0)),
     "times_pos": ("t:=p; t.trans:=0.5*p.trans; MoveL t,@;", (50, 100, 150), (1, 0, 0, 0)),
     "cross": ("t:=p; t.trans:=[1,0,0]*[0,2,0]; MoveL t,@;", (0, 0, 2), (1, 0, 0, 0)),
+    "whole_pos_and_component": ("t:=p; t.trans:=[9,8,7]; t.trans.z:=6; MoveL t,@;", (9, 8, 6), (1, 0, 0, 0)),
+    "array_of_constant_size": (
+        "sized{2}:=[5,6,7]; MoveL Offs(p,sized{2}.x,sized{2}.y,sized{2}.z),@;",
+        (105, 206, 307),
+        (1, 0, 0, 0),
+    ),
     "own_record": ("MoveL Offs(plate.place,0,0,plate.height),@;", (7, 8, 21), (1, 0, 0, 0)),
     "orientzyx": ("t:=p; t.rot:=OrientZYX(90,0,0); MoveL t,@;", (100, 200, 300), (HALF, 0, 0, HALF)),
     "orientzyx_order": (
@@ -180,6 +193,11 @@ VALUES = {  # what stands behind n:=, and the number
     "dimension": ("Dim(grid,2)", 3),
     "string": ('StrLen("weld"+NumToStr(2.5,1))', 7),
     "element": ("list{2}", 20),
+    "hexadecimal": ("0x1F", 31),
+    "octal": ("0o17", 15),
+    "binary": ("0b101", 5),
+    "exponent": ("1E1+.5", 10.5),
+    "nested_record": ("twin.lower.height+twin.count{2}", 17),
 }
 
 
@@ -198,6 +216,13 @@ COURSES = {  # instructions, x of the targets in their order, relative to p
     "if": ("IF n=3 THEN n:=8; ELSEIF n=4 THEN n:=9; ELSE n:=7; ENDIF #n;", [8]),
     "compact_if": ("IF NOT flag AND n>2 n:=5; IF n=0 n:=6; #n;", [5]),
     "not_binds_least": ("IF NOT n=4 n:=1; #n;", [1]),
+    "not_of_a_whole_term": ("IF NOT flag AND n=0 n:=9; #n;", [9]),
+    "xor": ("IF (n=3) XOR (n=4) n:=9; #n;", [9]),
+    "recursion": ("down_from 3; MORE PROC down_from(num k) IF k=0 RETURN; #k; down_from k-1; ENDPROC", [3, 2, 1]),
+    "array_argument": (
+        "FOR i FROM 1 TO 3 DO n:=third(list); ENDFOR #n; MORE FUNC num third(num a{*}) RETURN a{3}/10; ENDFUNC",
+        [3],
+    ),
     "test": ("TEST n CASE 1,2: n:=10; CASE 3: n:=20; DEFAULT: n:=30; ENDTEST #n;", [20]),
     "goto": ("again: #n; Add n,-1; IF n>1 GOTO again;", [3, 2]),
     "call": ("go 4; go 5\\back; MORE PROC go(num x\\switch back) IF Present(back) x:=-x; #x; ENDPROC", [4, -5]),
@@ -254,6 +279,52 @@ def test_speeds_and_zones(case, tmp_path):
     assert (found.zone.kind, found.zone.value, found.zone.text) == (zone.kind, pytest.approx(zone.value), zone.text)
 
 
+RAMPS = {  # instructions, acceleration of a line behind them
+    "none": ("", None),
+    "share": ("AccSet 50,100;", Rate(0.5, "share")),
+    "at_least_20_percent": ("AccSet 10,100;", Rate(0.2, "share")),
+    "along_the_path": ("PathAccLim TRUE\\AccMax:=4,FALSE;", Rate(4.0, "m/s2")),
+    "slowing_down": ("PathAccLim TRUE\\AccMax:=4,TRUE\\DecelMax:=3;", Rate(3.0, "m/s2")),
+    "of_the_world": ("PathAccLim TRUE\\AccMax:=4,FALSE; WorldAccLim\\On:=2;", Rate(2.0, "m/s2")),
+    "off_again": ("AccSet 50,100; WorldAccLim\\On:=2; WorldAccLim\\Off;", Rate(0.5, "share")),
+}
+
+
+@pytest.mark.parametrize("case", RAMPS)
+def test_accelerations(case, tmp_path):
+    body, wanted = RAMPS[case]
+    assert move(tmp_path, f"{body} MoveL p,@;").acceleration == wanted
+
+
+STANDING = {  # what comes before a position is read, and whether the arm stands at p then
+    "stop_point": ("MoveL p,@;", True),
+    "zone": ("MoveL p,v100,z50,tool0;", False),
+    "zone_and_time": ("MoveL p,v100,z50,tool0; WaitTime 1;", False),
+    "zone_and_arrival": ("MoveL p,v100,z50,tool0; WaitRob\\InPos;", True),
+    "zone_and_time_behind_arrival": ("MoveL p,v100,z50,tool0; WaitTime\\InPos,0;", True),
+    "stopped_by_the_program": ("MoveL p,v100,z50,tool0; Stop;", True),
+    "concurrent": ("MoveL\\Conc,p,v100,fine,tool0;", False),
+    "broken_off": ("MoveL p,@; StopMove;", False),
+    "stored_path": ("MoveL p,@; StorePath; RestoPath;", False),
+    "searched": ("t:=p; SearchL\\Stop,di1,t,p,v100,tool0;", False),
+    "another_robot": ('MoveL p,@; t:=CRobT(\\TaskName:="T_ROB2");', None),
+}
+
+
+@pytest.mark.parametrize("case", STANDING)
+@pytest.mark.parametrize("read", ["t:=CRobT();", "t:=p; t.trans:=CPos();", "PDispOn p,tool0; t:=p;"])
+def test_a_position_is_read_only_where_the_arm_stands(case, read, tmp_path):
+    before, stands = STANDING[case]
+    found = move(tmp_path, f"{before} {'' if stands is None else read} MoveL t,@;")
+    known = isinstance(found.target, PoseTarget) and found.base.pose is not None
+    assert known == (stands is True)
+
+
+def test_a_point_that_was_searched_is_not_the_one_before(tmp_path):
+    found = move(tmp_path, "t:=p; SearchL\\Stop,di1,t,down,v100,tool0; MoveL t,@;")
+    assert isinstance(found.target, UnresolvedTarget)
+
+
 def test_frames_of_tools_and_work_objects(tmp_path):
     found = move(tmp_path, "MoveL p,v100,fine,gripper\\WObj:=table;")
     assert (found.tool.name, found.base.name) == ("gripper", "table")
@@ -267,6 +338,8 @@ def test_frames_of_tools_and_work_objects(tmp_path):
     mapped = move(tmp_path, "MoveL p,v100,fine,tGun;", frames={"TGUN": np.eye(4)})
     assert mapped.tool.pose is not None
     assert move(tmp_path, "MoveL p,v100,fine,tGun;").tool.pose is None
+    handed = "go tGun; MORE PROC go(PERS tooldata held) MoveL p,v100,fine,held; ENDPROC"
+    assert move(tmp_path, handed).tool.name == "tgun"
 
 
 def test_a_program_displacement_moves_the_work_object(tmp_path):
@@ -276,6 +349,7 @@ def test_a_program_displacement_moves_the_work_object(tmp_path):
     np.testing.assert_allclose(exe.base.pose[:3, 3], [0.003, 0.003, 0.003], atol=1e-12)
     off = move(tmp_path, "PDispSet [[1,2,3],[1,0,0,0]]; PDispOff; MoveL p,@;")
     np.testing.assert_allclose(off.base.pose, np.eye(4), atol=1e-12)
+    assert off.base.name == "wobj0"
 
 
 def test_joint_targets_and_arcs(tmp_path):
@@ -420,6 +494,10 @@ UNKNOWN = {
     "function": "n:=Mystery(3);",
     "grammar": "MoveL p v100 fine tool0;",
     "arguments": "MoveL p,v100;",
+    "switch_of_a_function": "text:=NumToStr(5,0\\Exp); %text%;",
+    "process": "SpotL p,v100,gun1,spot1,tool0;",
+    "loaded_module": 'Load "HOME:/more.mod"; %"more"%;',
+    "cleared_path": "ClearPath;",
 }
 
 
@@ -433,7 +511,13 @@ def test_what_is_not_understood_is_kept_and_may_move(case, tmp_path):
     assert isinstance(motions(execution)[-1].target, UnresolvedTarget)
 
 
-@pytest.mark.parametrize("text", ["SingArea\\Wrist;", "ActUnit CNV1;", "SyncMoveOn sync1,tasks;", "SoftAct 1,20;"])
+UNFOLLOWED = (
+    *("SingArea\\Wrist;", "ActUnit CNV1;", "SyncMoveOn sync1,tasks;", "SoftAct 1,20;", "EOffsSet [1,0,0,0,0,0];"),
+    *("MoveExtJ home,vrot10,fine;", "CirPathMode\\PathFrame;", "SpeedRefresh 50;", "IndReset Station,1;"),
+)
+
+
+@pytest.mark.parametrize("text", UNFOLLOWED)
 def test_what_is_not_simulated_is_named(text, tmp_path):
     program = read_program(saved(tmp_path, f"{text} MoveAbsJ home,@;"))
     assert [each.text for each in program.findings if isinstance(each, NotSimulated)] == [text.removesuffix(";")]

@@ -17,6 +17,7 @@ from er3a.kinematics.forward import forward
 from er3a.program_check.check_program import CheckOptions, assumed_limits, check_program
 from er3a.programs.instructions import numbers_of
 from er3a.programs.languages import read_program
+from er3a.robots.masses import MassBody
 
 ROBOT = load_robot("er3a_c60")
 HOME = np.radians([0.0, -20.0, 15.0, 0.0, -60.0, 0.0])
@@ -220,6 +221,134 @@ ENDMODULE
     )
 
 
+NEAR = HOME + np.radians([0, 0, 0, 0, 40.0, 0])  # joint 5 at -20 deg; a line turns it to -0.5 deg
+STRETCHED = HOME + np.radians([0, 0, 0, 0, 59.5, 0])
+CHOSEN = np.radians([20.0, -30.0, 20.0, 30.0, -60.0, 20.0])
+"""Joints of a pose that a joint motion goes to by its configuration."""
+LOAD = MassBody(50.0, (0.0, 0.01, 0.06))
+
+
+def stations():
+    """T_robot_tool (4, 4): a corner with a zone, a stop, an arc's middle and end, joint 5 near 0, one by its branch."""
+    corner, stop, via, end = (forward(ARM, HOME) for _ in range(4))
+    for pose, shift in ((corner, (-50, 30, 0)), (stop, (-50, 80, 20)), (via, (-80, 110, 20)), (end, (-110, 80, 20))):
+        pose[:3, 3] += np.array(shift) / 1000
+    return corner, stop, via, end, forward(ARM, STRETCHED), forward(ARM, CHOSEN)
+
+
+def second_krl():
+    def frame(T, more=""):
+        values = zip("XYZABC", numbers_of(T, "kuka"))
+        return "{" + ",".join(f"{key} {each:.12f}" for key, each in values) + more + "}"
+
+    def axes(q):
+        return "{" + ",".join(f"A{i} {each:.12f}" for i, each in enumerate(np.degrees(q), 1)) + "}"
+
+    corner, stop, via, end, singular, chosen = map(in_base, stations())
+    kg, centre = LOAD.mass, ",".join(f"{key} {each * 1000}" for key, each in zip("XYZ", LOAD.centre))
+    return (
+        ".src",
+        f"""DEF cell( )
+BAS(#VEL_PTP,100)
+BAS(#ACC_PTP,100)
+$TOOL={frame(TOOL)}
+$BASE={frame(BASE)}
+$VEL.CP={SPEED}
+$ACC.CP=2.0
+$APO.CDIS=20
+PTP {axes(HOME)}
+LIN {frame(corner)} C_DIS
+LIN {frame(stop)}
+PTP {axes(NEAR)}
+LIN {frame(singular)}
+PTP {axes(HOME)}
+LIN {frame(stop)}
+CIRC {frame(via)},{frame(end)}
+$LOAD={{M {kg},CM {{{centre},A 0,B 0,C 0}},J {{X 0,Y 0,Z 0}}}}
+PTP {frame(chosen, ",S 2,T 18")}
+END
+""",
+    )
+
+
+def second_urscript():
+    limits = assumed_limits(ARM, CheckOptions())
+    rates = f"a={limits.acceleration[0]:.12f}, v={limits.speed[0]:.12f}"
+
+    def pose(T):
+        return f"p[{numbers(numbers_of(T, 'ur'))}]"
+
+    corner, stop, via, end, singular, chosen = stations()
+    return (
+        ".script",
+        f"""def cell():
+  set_tcp({pose(TOOL)})
+  movej([{numbers(HOME)}], {rates})
+  movel({pose(corner)}, a=2.0, v={SPEED}, r=0.02)
+  movel({pose(stop)}, a=2.0, v={SPEED})
+  movej([{numbers(NEAR)}], {rates})
+  movel({pose(singular)}, a=2.0, v={SPEED})
+  movej([{numbers(HOME)}], {rates})
+  movel({pose(stop)}, a=2.0, v={SPEED})
+  movec({pose(via)}, {pose(end)}, a=2.0, v={SPEED})
+  set_payload({LOAD.mass}, [{numbers(LOAD.centre)}])
+  movej(get_inverse_kin({pose(chosen)}, qnear=[{numbers(CHOSEN + 0.1)}]), {rates})
+end
+""",
+    )
+
+
+def second_rpl():
+    corner, stop, _, _, singular, _ = stations()
+    return (
+        ".pgm",
+        f"""MJOINT({pointj(HOME)}, v100perc, fine, gun);
+MLIN({pointc(corner)}, v200, z20, gun);
+MLIN({pointc(stop)}, v200, fine, gun);
+MJOINT({pointj(NEAR)}, v100perc, fine, gun);
+MLIN({pointc(singular)}, v200, fine, gun);
+""",
+    )
+
+
+def second_rapid():
+    axes = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+
+    def pose(T):
+        values = numbers_of(T, "abb")
+        return f"[{numbers(values[:3])}],[{numbers(values[3:])}]"
+
+    def joint(q):
+        return f"MoveAbsJ [[{numbers(np.degrees(q))}],{axes}],vmax,fine,gun;"
+
+    corner, stop, via, end, singular, chosen = (f"[{pose(in_base(T))},[0,0,0,1],{axes}]" for T in stations())
+    centre = numbers([(LOAD.centre[0]) * 1000, LOAD.centre[1] * 1000, LOAD.centre[2] * 1000 - 100])
+    return (
+        ".mod",
+        f"""MODULE cell
+  PERS tooldata gun:=[TRUE,[{pose(TOOL)}],[0.001,[0,0,0.001],[1,0,0,0],0,0,0]];
+  PERS wobjdata plate:=[FALSE,TRUE,"",[{pose(np.eye(4))}],[{pose(BASE)}]];
+  PERS loaddata part:=[{LOAD.mass},[{centre}],[1,0,0,0],0,0,0];
+  CONST speeddata slow:=[{SPEED * 1000},{np.degrees(TURN_SPEED)},5000,1000];
+  PROC main()
+    ConfL \\Off;
+    {joint(HOME)}
+    MoveL {corner},slow,z20,gun\\WObj:=plate;
+    MoveL {stop},slow,fine,gun\\WObj:=plate;
+    {joint(NEAR)}
+    MoveL {singular},slow,fine,gun\\WObj:=plate;
+    {joint(HOME)}
+    MoveL {stop},slow,fine,gun\\WObj:=plate;
+    MoveC {via},{end},slow,fine,gun\\WObj:=plate;
+    GripLoad part;
+    MoveJ {chosen},vmax,fine,gun\\WObj:=plate;
+  ENDPROC
+ENDMODULE
+""",
+    )
+
+
+SECOND = {"krl": second_krl, "urscript": second_urscript, "rapid": second_rapid, "rpl": second_rpl}
 TEXTS = {"krl": krl, "urscript": urscript, "rpl": rpl, "xpl": xpl, "rapid": rapid}
 
 
@@ -245,6 +374,45 @@ def checks(tmp_path_factory):
 def carried_out(check):
     """The motions of the program's way, in their order."""
     return [check.motions[i] for i in check.main if i in check.motions]
+
+
+@pytest.fixture(scope="module")
+def seconds(tmp_path_factory):
+    """The second cell's check in each language: zone, singular line; where there are such, arc, load, configuration."""
+    folder = tmp_path_factory.mktemp("second")
+    options = CheckOptions(start=HOME, frames={"gun": TOOL}, measures=False)
+    return {name: check_program(read_program(saved(folder, *text())), ARM, options) for name, text in SECOND.items()}
+
+
+@pytest.mark.long
+def test_zones_arcs_loads_and_configurations_are_the_same(seconds):
+    ends = [carried_out(check)[-1].end for name, check in seconds.items() if name != "rpl"]
+    for end in ends:
+        np.testing.assert_allclose(end, CHOSEN, atol=1e-7)
+    for first, second in pairwise(seconds.values()):
+        both = list(zip(carried_out(first), carried_out(second)))  # RPL has no arcs, loads, configurations
+        assert len(both) in (5, 9)
+        for a, b in both:
+            assert (a.kind, a.placed.motion.zone.kind) == (b.kind, b.placed.motion.zone.kind)
+            assert a.placed.motion.zone.value == pytest.approx(b.placed.motion.zone.value)
+            assert {found.code for found in a.findings} == {found.code for found in b.findings}
+            np.testing.assert_allclose(a.end, b.end, atol=1e-7)
+            if a.way is not None:
+                assert a.way.law.duration == pytest.approx(b.way.law.duration, abs=1e-6)
+
+
+@pytest.mark.long
+def test_what_the_second_cell_is_for_is_found(seconds):
+    for name, check in seconds.items():
+        motions = carried_out(check)
+        assert [each.kind for each in motions][:5] == ["joint", "line", "line", "joint", "line"]
+        assert motions[1].placed.motion.zone.value == pytest.approx(0.02)
+        assert {found.code for found in motions[4].findings} == {"passes_singularity"}
+        if name != "rpl":
+            assert motions[7].kind == "arc"
+            load = motions[8].placed.motion.load
+            assert (load.mass, load.centre) == (50.0, pytest.approx(LOAD.centre, abs=1e-12))
+            assert [each.finding.code for each in check.findings].count("load_not_examined") == 1
 
 
 @pytest.mark.long

@@ -36,7 +36,10 @@ SceneFile = Annotated[Path | None, typer.Option(callback=given_files, help="a sc
 def check_program(
     files: Annotated[
         list[Path],
-        typer.Argument(callback=given_files, help="programs: .src, .script, .pgm, .XPL, or .csv of joints"),
+        typer.Argument(
+            callback=given_files,
+            help="robot programs, their language known by what they hold, or tables of joints over time (.csv)",
+        ),
     ],
     *,
     robot: RobotOption,

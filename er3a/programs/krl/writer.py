@@ -24,15 +24,18 @@ from er3a.programs.instructions import (
 )
 from er3a.programs.krl.dialect import AXIS_KEYS, FRAME_KEYS
 from er3a.programs.writing import (
+    LOAD_DIGITS,
     ReadyMotion,
     WriteOptions,
     Writer,
     ascii_text,
     fixed,
+    principal_axes,
     share_of_max,
     short,
     tool_speed,
 )
+from er3a.robots.masses import MassBody
 
 DIGITS = 6
 KNOWN_FRAMES = ("TOOL_DATA[", "BASE_DATA[", "$NULLFRAME", "$WORLD", "$ROBROOT")
@@ -85,6 +88,13 @@ class KrlWriter(Writer):
     def verbatim(self, text: str) -> None:
         """A line as it was read."""
         self.lines.append(text)
+
+    def set_load(self, load: MassBody | None) -> None:
+        """``$LOAD``, with the axes of its inertia; a mass below 0 for what is not known."""
+        pose, moments = (np.eye(4), np.zeros(3)) if load is None else principal_axes(load)
+        about = ",".join(f"{axis} {short(float(each), LOAD_DIGITS)}" for axis, each in zip("XYZ", moments))
+        mass = "-1.0" if load is None else short(load.mass)
+        self._set("$LOAD", f"$LOAD={{M {mass},CM {_frame_text(pose)},J {{{about}}}}}")
 
     def motion(self, ready: ReadyMotion) -> None:
         """PTP, LIN, CIRC with what has to be set before."""

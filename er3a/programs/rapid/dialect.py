@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
-from er3a.programs.evaluation import ProgramMemory
+from er3a.programs.evaluation import Position, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -58,7 +58,18 @@ from er3a.programs.rapid.data_types import (
     rotation_of,
     typed,
 )
-from er3a.programs.rapid.reader import ABSENT, ARITHMETIC, LATE, SEARCHES, STEP, TYPED, UPPER, WAITS
+from er3a.programs.rapid.reader import (
+    ABSENT,
+    ARITHMETIC,
+    LATE,
+    NOT_SIMULATED,
+    PASSING,
+    SEARCHES,
+    STEP,
+    TYPED,
+    UPPER,
+    WAITS,
+)
 from er3a.programs.syntax import (
     Doing,
     Invocation,
@@ -79,9 +90,9 @@ JOINT_FORMS = ("MOVEJ", "TRIGGJ")
 ARC_FORMS = ("MOVEC", "TRIGGC", "SEARCHC")
 SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
-SETTINGS = ("CONFJ", "CONFL", "ACCSET", "VELSET", "PDISPSET", "PDISPON", "PDISPOFF", "PATHACCLIM")
+SETTINGS = ("CONFJ", "CONFL", "ACCSET", "VELSET", "PDISPSET", "PDISPON", "PDISPOFF", "PATHACCLIM", "WORLDACCLIM")
 """Instructions that motions behind them depend on, and that are followed."""
-MODAL = ("%CONFJ", "%CONFL", "%ACC", "%SPEED", "%PDISP", "%ACCLIM", "%GRIPLOAD")
+MODAL = ("%CONFJ", "%CONFL", "%ACC", "%SPEED", "%PDISP", "%PATHACCLIM", "%WORLDACCLIM", "%GRIPLOAD")
 OUTPUTS = frozenset(
     (
         *(
@@ -107,18 +118,12 @@ RMQGETMSGDATA RMQGETMSGHEADER RMQREADWAIT RMQSENDMESSAGE RMQSENDWAIT SAVE SAVECF
 SETAO SETDATASEARCH SETDO SETGO SETSYSDATA SKIPWARN SOCKETACCEPT SOCKETBIND SOCKETCLOSE SOCKETCONNECT
 SOCKETCREATE SOCKETLISTEN SOCKETRECEIVE SOCKETRECEIVEFROM SOCKETSEND SOCKETSENDTO SPYSTART SPYSTOP STARTLOAD STOREPATH
 TEXTTABINSTALL TPERASE TPREADDNUM TPREADFK TPREADNUM TPSHOW TPWRITE TRIGGCHECKIO TRIGGEQUIP TRIGGINT TRIGGIO
-TRIGGRAMPAO TRIGGSPEED TRYINT UIMSGBOX UIMSGWRITE UIMSGWRITEABORT UISHOW UNLOAD UNPACKRAWBYTES WARMSTART WORLDACCLIM
+TRIGGRAMPAO TRIGGSPEED TRYINT UIMSGBOX UIMSGWRITE UIMSGWRITEABORT UISHOW UNLOAD UNPACKRAWBYTES WARMSTART
 WRITE WRITEANYBIN WRITEBIN WRITEBLOCK WRITECFGDATA WRITERAWBYTES WRITESTRBIN STOPMOVE STARTMOVE STOPMOVERESET
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Instructions that move nothing and set nothing that motions depend on (1, by their names)."""
-ASIDE_NAMED_TEXT = """
-SINGAREA SOFTACT SOFTDEACT CIRPATHMODE PATHRESOL MOTIONPROCESSMODESET CORRCON WZBOXDEF WZCYLDEF WZSPHDEF WZDISABLE
-WZENABLE WZFREE WZDOSET WZLIMSUP WZHOMEJOINTDEF WZLIMJOINTDEF ACTUNIT DEACTUNIT SYNCMOVEON SYNCMOVEOFF SYNCMOVERESUME
-SYNCMOVESUSPEND SYNCMOVEUNDO SUPSYNCSENSORON SUPSYNCSENSOROFF MOVEEXTJ INDAMOVE INDCMOVE INDDMOVE INDRMOVE INDRESET
-DROPWOBJ EOFFSON EOFFSSET EOFFSOFF
-"""
-ASIDE_NAMED = frozenset(ASIDE_NAMED_TEXT.split())
+ASIDE_NAMED = NOT_SIMULATED - {"CORRWRITE", "SYNCTOSENSOR"} | {"EOFFSOFF"}
 """Instructions that are named as not simulated: the arm itself goes where its targets say."""
 PARAMETERS: Mapping[str, int] = {
     **{"OFFS": 4, "RELTOOL": 4, "POSEMULT": 2, "POSEINV": 1, "POSEVECT": 2, "ORIENTZYX": 3, "EULERZYX": 1},
@@ -141,6 +146,14 @@ GETAXISDISTANCE GETMAXNUMBEROFCYCLICBOOL GETNEXTSYM GETSYSINFO GETMODALPAYLOADMO
 """
 ASKED = frozenset(ASKED_TEXT.split())
 """Functions whose value only the running cell knows."""
+SWITCHES: Mapping[str, frozenset[str]] = {
+    **dict.fromkeys(("CROBT", "CPOS"), frozenset(("TOOL", "WOBJ"))),
+    **dict.fromkeys(("CALCROBT", "CALCJOINTT"), frozenset(("WOBJ",))),
+    **dict.fromkeys(("TRUNC", "ROUND"), frozenset(("DEC",))),
+    "RELTOOL": frozenset(("RX", "RY", "RZ")),
+    "EULERZYX": frozenset("XYZ"),
+}
+"""What they take by name; a call with another, such as ``CRobT(\\TaskName:="T_ROB2")``, has no known value."""
 IN_DEGREES: Mapping[str, Callable[..., float]] = {
     "ABS": abs,
     "SQRT": math.sqrt,
@@ -215,7 +228,7 @@ class RapidDialect:
         if name == STEP:
             first, last = number(values[0]), number(values[1])
             return Unclear("a step") if first is None or last is None else 1 if first <= last else -1
-        if PARAMETERS.get(name) != len(values):
+        if PARAMETERS.get(name) != len(values) or named.keys() - SWITCHES.get(name, frozenset()):
             return unclear
         if name in ("CROBT", "CJOINTT", "CPOS", "CTOOL", "CWOBJ", "CALCROBT", "CALCJOINTT"):
             found = _of_position(memory, name, values, named, given)
@@ -257,6 +270,7 @@ class RapidDialect:
         ]
         speed, turn = _speed(memory, values[targets], options, kind)
         zone = FINE if form in SEARCHES else _zone(values[zone_at], options, placed[zone_at])
+        memory.write(PASSING, zone.kind != "fine" or "CONC" in options)
         via = made[0] if arc else None
         if isinstance(via, PoseTarget):
             via = replace(via, branch=None)
@@ -310,8 +324,9 @@ class RapidDialect:
         assert isinstance(call, Invocation)
         if call.function == "GRIPLOAD":
             given = call.arguments[0] if len(call.arguments) == 1 else None
-            memory.write("%GRIPLOAD", UNCLEAR if given is None else memory.value(given))
-            return Aside(doing.text)
+            gripped = UNCLEAR if given is None else memory.value(given)
+            memory.write("%GRIPLOAD", gripped)
+            return None if load_of(typed(gripped, LOADDATA)) else Aside(doing.text)
         if call.function in SETTINGS:
             return None if _set(memory, call) else Unknown(doing.text, may_move=False)
         if call.function in OUTPUTS and call.arguments:
@@ -414,7 +429,7 @@ def _tool(memory: ProgramMemory, expression: object, value: Value) -> tuple[Name
     pose, stationary = frame_of_tool(value)
     name = _name_of(expression)
     if pose is None:
-        name = name or (value.text if isinstance(value, Unclear) else "tooldata")
+        name = value.text.lower() if isinstance(value, Unclear) else name or "tooldata"
         pose = _mapped(memory, name)
     load = load_of(part(typed(value, TOOLDATA), "TLOAD"))
     return NamedFrame(name, pose, load if load is not None and load.mass > LEAST_LOAD else None), stationary
@@ -449,7 +464,7 @@ def _base(memory: ProgramMemory, expression: object, value: Value | None) -> tup
     pose, held = frame_of_object(value)
     name = _name_of(expression)
     if pose is None:
-        name = name or (value.text if isinstance(value, Unclear) else "wobjdata")
+        name = value.text.lower() if isinstance(value, Unclear) else name or "wobjdata"
         pose = _mapped(memory, name)
     return NamedFrame(name, pose), held
 
@@ -460,7 +475,9 @@ def _displaced(memory: ProgramMemory, base: NamedFrame) -> NamedFrame:
     if moved is None or base.pose is None:
         return base
     pose = pose_matrix(moved)
-    return NamedFrame("" if pose is not None else "PDispOn", None if pose is None else base.pose @ pose)
+    if pose is None or not np.array_equal(pose, np.eye(4)):
+        base = NamedFrame("PDispOn" if pose is None else "", None if pose is None else base.pose @ pose)
+    return base
 
 
 def _speed(
@@ -492,9 +509,10 @@ def _velocity(memory: ProgramMemory) -> tuple[float, float]:
 
 
 def _acceleration(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
-    limit = number(memory.read("%ACCLIM"))
-    if limit is not None and kind != "joint":
-        return Rate(limit, "m/s2")
+    limits = [number(memory.read(name)) for name in ("%PATHACCLIM", "%WORLDACCLIM")]
+    given = [each for each in limits if each is not None]
+    if given and kind != "joint":
+        return Rate(min(given), "m/s2")
     percent = number(memory.read("%ACC"))
     return None if percent is None else Rate(percent / 100, "share")
 
@@ -529,9 +547,10 @@ def _set(memory: ProgramMemory, call: Invocation) -> bool:
             found = numbers(tuple(values)) if len(values) == 2 else None
             memory.write("%SPEED", Unclear("VelSet") if found is None else found)
             return found is not None
-        case "PATHACCLIM":
-            limit = number(options.get("ACCMAX"))
-            memory.write("%ACCLIM", Unclear("off") if limit is None else limit)
+        case "PATHACCLIM" | "WORLDACCLIM":
+            limits = [number(options.get(key)) for key in ("ACCMAX", "DECELMAX", "ON")]
+            given = [each for each in limits if each is not None]
+            memory.write(f"%{call.function}", min(given) if given else Unclear("off"))
             return True
         case "PDISPOFF":
             memory.write("%PDISP", pose_record(np.eye(4)))
@@ -554,7 +573,9 @@ def _displace(memory: ProgramMemory, call: Invocation, values: list[Value], opti
     programmed = pose_matrix(typed(values[0], ROBTARGET))
     given = options.get("EXEP")
     actual = (
-        pose_matrix(typed(given, ROBTARGET)) if given is not None else memory.here.seen(tool, base, memory.cell.flange)
+        pose_matrix(typed(given, ROBTARGET))
+        if given is not None
+        else _here(memory).seen(tool, base, memory.cell.flange)
     )
     if programmed is None or actual is None:
         return False
@@ -569,7 +590,7 @@ def _displace(memory: ProgramMemory, call: Invocation, values: list[Value], opti
 def arithmetic(sign: str, left: Value, right: Value) -> Value:
     """Sums and products: of numbers, texts and positions, a number times a position, cross products, turns.
 
-    RAPID overview, 1 Expressions: pos * pos is the cross product, orient * orient the product of turns.
+    RAPID Reference Manual, 7.1: pos * pos is the cross product, orient * orient the product of turns.
     """
     for side in (left, right):
         if isinstance(side, Unclear):
@@ -606,6 +627,11 @@ def _number_of(name: str, values: tuple[Value, ...]) -> Value | None:
     return int(found) if whole else float(found)
 
 
+def _here(memory: ProgramMemory) -> Position:
+    """Where the arm stands; not known behind a motion that the program does not wait for (7-zonedata-1)."""
+    return memory.here if memory.read(PASSING) in (None, False) else Position()
+
+
 def _of_position(
     memory: ProgramMemory, name: str, values: tuple[Value, ...], named: Mapping[str, Value], given: Invocation
 ) -> Value | None:
@@ -614,7 +640,7 @@ def _of_position(
     2 CRobT, 2 CPos: in the work object, for the tool; where none is given, those of the last motion.
     """
     words = dict(given.keywords)
-    here = memory.here
+    here = _here(memory)
     if name == "CJOINTT":
         if here.joints is None:
             return None

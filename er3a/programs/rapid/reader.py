@@ -1,7 +1,8 @@
 """Reads ABB RAPID: a module with the modules beside it that it uses.
 
 Instructions that are not understood are kept; blocks and texts without an end are errors. The grammar is that of ABB's
-*Technical reference manual: RAPID overview* (3HAC050947-001), section 1, Basic RAPID programming.
+*Technical reference manual: RAPID overview* (3HAC050947-001), section 1, Basic RAPID programming; sources are named in
+:mod:`er3a.programs.rapid.data_types`.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from er3a.programs.syntax import (
 )
 
 PATTERN = re.compile(
-    rf"""(?P<comment>![^\n]*)|(?P<text>"(?:[^"\n]|"")*")|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
+    rf"""(?P<comment>![^\n]*)|(?P<text>"(?:[^"\n]|"")*")|(?P<number>0[xX][\da-fA-F]+|0[oO][0-7]+|0[bB][01]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
     r"""|(?P<mark>:=|<>|<=|>=|\S)"""
 )
 RAPID = Lexicon(
@@ -61,7 +62,7 @@ RAPID = Lexicon(
     constants={"TRUE": True, "FALSE": False},
     folds=True,
 )
-"""RAPID overview, section 1 (Expressions): NOT, OR and XOR bind least."""
+"""RAPID Reference Manual, 7.7 Priority between operators: NOT, OR and XOR bind least."""
 ENDS = frozenset(
     (
         *("ENDPROC", "ENDFUNC", "ENDTRAP", "ENDMODULE", "ENDRECORD", "ENDIF", "ENDWHILE", "ENDFOR", "ENDTEST"),
@@ -93,52 +94,22 @@ WAITS = frozenset(
         *("WAITROB", "WAITLOAD", "WAITSENSOR", "WAITWOBJ"),
     )
 )
-NOT_SIMULATED = frozenset(
-    (
-        *("SINGAREA", "SOFTACT", "SOFTDEACT", "ACTUNIT", "DEACTUNIT", "WAITWOBJ", "DROPWOBJ", "SYNCMOVEON"),
-        *(
-            "SYNCMOVEOFF",
-            "SYNCMOVERESUME",
-            "SYNCMOVESUSPEND",
-            "SYNCMOVEUNDO",
-            "WAITSYNCTASK",
-            "MOVEEXTJ",
-            "SUPSYNCSENSORON",
-        ),
-        *(
-            "SUPSYNCSENSOROFF",
-            "SYNCTOSENSOR",
-            "CORRCON",
-            "CORRWRITE",
-            "CIRPATHMODE",
-            "PATHRESOL",
-            "EOFFSON",
-            "EOFFSSET",
-        ),
-        *(
-            "INDAMOVE",
-            "INDCMOVE",
-            "INDDMOVE",
-            "INDRMOVE",
-            "INDRESET",
-            "WZENABLE",
-            "WZDOSET",
-            "WZLIMSUP",
-            "WZHOMEJOINTDEF",
-        ),
-        *(
-            "WZLIMJOINTDEF",
-            "WZBOXDEF",
-            "WZCYLDEF",
-            "WZSPHDEF",
-            "WZDISABLE",
-            "WZFREE",
-            "MOTIONPROCESSMODESET",
-        ),
-    )
-)
+NOT_SIMULATED_TEXT = """
+ACTUNIT CIRPATHMODE CORRCON CORRWRITE DEACTUNIT DROPWOBJ EOFFSON EOFFSSET INDAMOVE INDCMOVE INDDMOVE INDRESET
+INDRMOVE MOTIONPROCESSMODESET MOVEEXTJ PATHRESOL SINGAREA SOFTACT SOFTDEACT SPEEDREFRESH SUPSYNCSENSOROFF
+SUPSYNCSENSORON SYNCMOVEOFF SYNCMOVEON SYNCMOVERESUME SYNCMOVESUSPEND SYNCMOVEUNDO SYNCTOSENSOR TRIGGSPEED
+WAITSYNCTASK WAITWOBJ WZBOXDEF WZCYLDEF WZDISABLE WZDOSET WZENABLE WZFREE WZHOMEJOINTDEF WZLIMJOINTDEF WZLIMSUP
+WZSPHDEF
+"""
+NOT_SIMULATED = frozenset(NOT_SIMULATED_TEXT.split())
 """What is known to shape a motion or to move something else, and is not followed: it is named."""
 UPPER, ARITHMETIC, TYPED, STEP, LATE = "%UPPER", "%ARITHMETIC", "%TYPED", "%STEP", "%LATE"
+PASSING = "%PASSING"
+"""Whether the arm may not be at the last target yet, as behind a motion with a zone: the program goes on before."""
+ARRIVING = frozenset(("INPOS", "ZEROSPEED"))
+"""Options of waits that end where the arm stands still."""
+LEAVING = ("STOPMOVE", "STARTMOVE", "STARTMOVERETRY", "RESTOPATH", "CLEARPATH")
+"""Instructions that stop a motion on its way, or begin one again that the program does not wait for."""
 ABSENT = "%absent"
 MOST_LATE = 200
 MOST_ELEMENTS = 1000
@@ -246,6 +217,16 @@ class Scope:
         if isinstance(expression, Binary) and expression.operator in ("+", "-", "*"):
             return Invocation(ARITHMETIC, (Constant(expression.operator), expression.left, expression.right))
         return expression
+
+    def shape_of(self, target: Expression, name: str) -> Shape | None:
+        """The type of a variable with this name, or of a part of it."""
+        if isinstance(target, Element):
+            array = self.shape_of(target.of, name)
+            return array[1] if array and array[0] == "[]" and isinstance(array[1], tuple) else None
+        if isinstance(target, Member):
+            parts = (each for each in self.shape_of(target.of, name) or () if isinstance(each, tuple))
+            return next((each[1] for each in parts if each[0] == target.name and isinstance(each[1], tuple)), None)
+        return self.shapes.get(name)
 
     def typed(self, value: Expression, shape: Shape | None) -> Expression:
         """A value with the names of its type's components."""
@@ -603,7 +584,7 @@ class _BodyReader:
         name = f"{self.builder.name}/ERROR"
         if handler:  # what it does may come about at any time
             call = Invocation(name, tuple(map(Variable, known)))
-            self.builder.beside(self.builder.place, call, f"ERROR ({self.builder.name})", "interrupt")
+            self.builder.beside(self.builder.place, call, f"{handler} ({self.builder.name})", "interrupt")
         self.instructions(end)
         if self.cursor.word() not in HANDLERS:
             return
@@ -743,8 +724,7 @@ class _BodyReader:
             words.expect(":=")
             value = self.value(words)
             words.finish()
-            shape = self.scope.shapes.get(first) if isinstance(target, Variable) else None
-            builder.add(Assign(place, target, self.scope.typed(value, shape), text))
+            builder.add(Assign(place, target, self.scope.typed(value, self.scope.shape_of(target, first)), text))
             self.forget_changed(place, value, text)
             return
         words.take()
@@ -766,11 +746,15 @@ class _BodyReader:
             self.module.findings.append(NotSimulated(text, place))
         if name in MOTIONS:
             builder.add(Move(place, name, placed, text, (), named))
-            if name in SEARCHES:
-                builder.unknown(place, text)  # the arm stops where the signal comes
+            if name in SEARCHES:  # the arm stops where the signal comes, and the point sought is there
+                builder.unknown(place, text)
+                if len(placed) > 1 and isinstance(placed[1], (Variable, Element, Member)):
+                    builder.add(Assign(place, placed[1], Constant(Unclear(f"what {name} finds")), text))
             if name in CALLING and placed and placed[-1] is not None:
                 self.late(place, placed[-1], ((), ()), text)
             return
+        if name in LEAVING or (name.startswith("WAIT") and options & ARRIVING):
+            builder.add(Assign(place, Variable(PASSING), Constant(name in LEAVING), ""))
         if name == "WAITTIME" and placed:
             builder.add(Waiting(place, "seconds", placed[0], text))
             return
@@ -791,18 +775,18 @@ class _BodyReader:
             if isinstance(each, (Variable, Element, Member)):
                 builder.add(Assign(place, each, Constant(Unclear(f"what {name} gives")), text))
 
-    def _handler_moves(self, end: str) -> bool:
-        """Whether the routine has a handler that may move the arm."""
-        inside = False
+    def _handler_moves(self, end: str) -> str:
+        """The first of the routine's handlers that may move the arm; empty if none may."""
+        inside = ""
         for token in self.cursor.tokens[self.cursor.at :]:
             if token.kind != "name":
                 continue
             if token.text == end:
-                return False
-            inside = inside or token.text in HANDLERS
+                return ""
+            inside = token.text if token.text in HANDLERS else inside
             if inside and (token.text in MOTIONS or token.text in self.module.procedures):
-                return True
-        return False
+                return inside
+        return ""
 
 
 Given = tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]
@@ -950,7 +934,9 @@ def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
 
 
 def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
+    """Stop, behind which the arm stands at its target, and Break, which does not wait for that."""
     body.builder.add(Waiting(place, "operator", None, text))
+    body.builder.add(Assign(place, Variable(PASSING), Constant(text[:5].upper() == "BREAK"), ""))
 
 
 def _halt(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:

@@ -2,13 +2,14 @@
 
 Joint motions are MoveAbsJ, because cfx would need ABB's own zero and signs; lines and arcs carry the quarters of axes
 1, 4 and 6 where the joints are known, and are not supervised (``ConfL \\Off``). What was read as RAPID keeps its
-configuration. Durations are written as ``\\T``. A tool without known mass has the least load that a controller takes,
-and is named.
+configuration. Durations are written as ``\\T``. A tool is declared with all that hangs on the flange, once for each
+load; one without known mass has the least load that a controller takes, and is named.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,7 +34,17 @@ from er3a.programs.rapid.data_types import (
     ZONES,
     quarters_of,
 )
-from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, ascii_text, fixed, share_of_max, short
+from er3a.programs.writing import (
+    LOAD_DIGITS,
+    ReadyMotion,
+    WriteOptions,
+    Writer,
+    ascii_text,
+    fixed,
+    principal_axes,
+    share_of_max,
+    short,
+)
 from er3a.robots.masses import MassBody
 
 NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -56,7 +67,7 @@ class RapidWriter(Writer):
         super().__init__(listing, options)
         if self.name.lower() in RESERVED:
             self.name = f"p{self.name}"
-        self.frames: dict[tuple[str, bytes], str] = {}
+        self.frames: dict[tuple[str, bytes, MassBody | None], str] = {}
         self.declared: list[str] = []
         self.settings: dict[str, str] = {}
 
@@ -98,6 +109,9 @@ class RapidWriter(Writer):
         """A line as it was read."""
         self.lines.append(f"{text};")
 
+    def set_load(self, load: MassBody | None) -> None:
+        """In the data of the tools (:meth:`_frame`)."""
+
     def motion(self, ready: ReadyMotion) -> None:
         """MoveAbsJ, MoveJ, MoveL, MoveC with what has to be set before."""
         motion = ready.motion
@@ -125,7 +139,8 @@ class RapidWriter(Writer):
         base = (
             "" if motion.base.pose is None and not motion.base.name else f"\\WObj:={self._frame(motion.base, 'wobj')}"
         )
-        tool = self._frame(motion.tool, "tool")
+        load = motion.load if isinstance(motion.load, MassBody) else motion.tool.load
+        tool = self._frame(replace(motion.tool, load=load), "tool")
         self._set_before(motion)
         self.lines.append(f"{form} {','.join(texts)},{speed},{zone},{tool}{base};")
 
@@ -151,9 +166,10 @@ class RapidWriter(Writer):
             if frame.name:
                 self.name_tool(frame.name)
             return frame.name if plain else null
-        if np.array_equal(frame.pose, np.eye(4)) and (not frame.name or frame.name.lower() in (null, "base", "world")):
+        unnamed = not frame.name or frame.name.lower() in (null, "base", "world")
+        if np.array_equal(frame.pose, np.eye(4)) and unnamed and frame.load is None:
             return null
-        key = (kind, frame.pose.tobytes())
+        key = (kind, frame.pose.tobytes(), frame.load)
         if key not in self.frames:
             taken = {*self.frames.values(), "tool0", "wobj0"}
             name = frame.name if plain and frame.name not in taken else f"er3a_{kind}{len(self.frames) + 1}"
@@ -230,14 +246,11 @@ def _load_text(load: MassBody | None) -> str:
     """loaddata, with the principal axes of the inertia; the least that a controller takes if it is not known."""
     if load is None:
         return f"[{LEAST_LOAD},[0,0,{LEAST_LOAD}],[1,0,0,0],0,0,0]"
-    moments, axes = np.linalg.eigh(load.inertia_matrix)
-    if np.array_equal(load.inertia_matrix, np.diag(np.diag(load.inertia_matrix))):
-        moments, axes = np.diag(load.inertia_matrix), np.eye(3)
-    turn = np.eye(4)
-    turn[:3, :3] = axes if np.linalg.det(axes) > 0 else -axes
-    quaternion = ",".join(fixed(each, QUATERNION_DIGITS) for each in numbers_of(turn, "abb")[3:])
+    pose, moments = principal_axes(load)
+    quaternion = ",".join(fixed(each, QUATERNION_DIGITS) for each in numbers_of(pose, "abb")[3:])
     centre = ",".join(short(each * 1000) for each in load.centre)
-    return f"[{short(load.mass)},[{centre}],[{quaternion}],{','.join(short(float(each), 9) for each in moments)}]"
+    about = ",".join(short(float(each), LOAD_DIGITS) for each in moments)
+    return f"[{short(load.mass)},[{centre}],[{quaternion}],{about}]"
 
 
 def _pose_text(pose: Reals) -> str:

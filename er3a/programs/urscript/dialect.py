@@ -292,7 +292,7 @@ class UrScriptDialect:
         if call.function in LOADS:
             loaded = _placed(LOADS[call.function], values, keywords)
             memory.write("%load", Unclear(doing.text) if loaded is None else _load_set(memory.read("%load"), loaded))
-            return Aside(doing.text)
+            return Aside(doing.text) if isinstance(_load(memory.read("%load")), str) else None
         output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
         if output is not None and len(output) == 2:
             return Output(f"{OUTPUTS[call.function]}[{shown(output['n'])}]", shown(output["b"]))

@@ -7,7 +7,17 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import Output, Pause, PoseTarget, numbers_of
 from er3a.programs.urscript.dialect import DEFAULTS
-from er3a.programs.writing import ReadyMotion, Writer, duration, fixed, leading_joint_speed, short, tool_speed
+from er3a.programs.writing import (
+    LOAD_DIGITS,
+    ReadyMotion,
+    Writer,
+    duration,
+    fixed,
+    leading_joint_speed,
+    short,
+    tool_speed,
+)
+from er3a.robots.masses import MassBody
 
 DIGITS = 9
 
@@ -57,6 +67,13 @@ class UrScriptWriter(Writer):
     def verbatim(self, text: str) -> None:
         """A line as it was read."""
         self._line(" ".join(text.split()))
+
+    def set_load(self, load: MassBody | None) -> None:
+        """``set_payload``, and with an inertia ``set_target_payload``."""
+        load = load or MassBody(0.0)
+        parts = [f"[{', '.join(short(each, LOAD_DIGITS) for each in part)}]" for part in (load.centre, load.inertia)]
+        given = ", ".join((short(load.mass), *parts)) if any(load.inertia) else f"{short(load.mass)}, {parts[0]}"
+        self._line(f"set_{'target_' if any(load.inertia) else ''}payload({given})")
 
     def motion(self, ready: ReadyMotion) -> None:
         """movej, movel, movep, movec."""

@@ -431,7 +431,7 @@ class ProgramFiles(Table):
     repairs them as a table in csv."""
 
     path: Texts = column("name of the path")
-    language: Texts = column("krl, urscript, rpl, xpl or csv")
+    language: Texts = column("language of the program, by its name in a study (`trajectory.programs`)")
     file: Texts = column("name of the file")
     text: Texts = column("what the file holds")
 

@@ -9,7 +9,7 @@ import numpy as np
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, ProgramFiles
-from er3a.pipeline.stages.trajectory.motion import Motion
+from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.profiles import Times
@@ -58,7 +58,8 @@ def written(
     ends: Reals | None = motion.q[-1:] if isinstance(command, ToolMoveCommand) else None
     if ends is not None and not np.isfinite(ends).all():
         ends = None
-    made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends)
+    load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
+    made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends, load)
     options = WriteOptions(robot, start, notes=(*unsafe, *made.findings), head=head)
     program = write_program(made.listing, language, options)
     return program.files, program.findings

@@ -394,7 +394,7 @@ class GraspPrograms(Table):
     """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
 
     target: Texts = column("name of the object")
-    language: Texts = column("krl, urscript, rpl, xpl or csv")
+    language: Texts = column("language of the program, by its name in a study (`trajectory.programs`)")
     file: Texts = column("name of the file")
     text: Texts = column("what the file holds")
 
