@@ -14,6 +14,7 @@ import scipy
 from markupsafe import Markup
 
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
+from er3a.collision.shapes import arm_shapes
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.language import N_, tr
@@ -177,11 +178,11 @@ def drawn_size(robot: Robot) -> float:
 def drawn_shapes(robot: Robot) -> dict[str, list[dict[str, Any]]]:
     """What an arm's links are drawn by: ``visuals``, how they look, and ``pieces``, the convex pieces of their meshes.
 
-    Beside visuals, all shapes that the robot's file gives are among the pieces, capsules too.
+    Beside visuals, the shapes that collisions are measured with are all among the pieces, capsules too.
     """
     visuals = [_drawn(each.link, each.points, each.faces) for each in robot.visuals]
     shapes = [(each.link, np.array(each.points)) for each in robot.hulls]
-    for each in robot.envelopes if visuals else ():
+    for each in arm_shapes(robot).capsules if visuals else ():
         ball = each.radius * fibonacci_sphere(BALL)
         shapes.append((each.link, np.concatenate([ball + each.start, ball + each.end])))
     corners = max(FEWEST_CORNERS, MOST_FACES // (2 * len(shapes) or 1))
