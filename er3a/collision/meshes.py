@@ -96,14 +96,23 @@ def link_pieces(vertices: Reals, faces: Integers, closed: bool, seed: int) -> Co
     """
     if closed and _beyond_hull(vertices, faces) <= NEARLY_CONVEX:
         return hull_of(vertices)
-    coarse = vertices, faces
-    if len(faces) > LINK_TRIANGLES:
-        library = load_open3d()
-        points, corners = library.utility.Vector3dVector(vertices), library.utility.Vector3iVector(faces)
-        simple = library.geometry.TriangleMesh(points, corners).simplify_quadric_decimation(LINK_TRIANGLES)
-        coarse = np.asarray(simple.vertices), np.asarray(simple.triangles)
-    pieces = _split(coarse[0], coarse[1], seed, **LINK_SEARCH)
+    pieces = _split(*simplified(vertices, faces, LINK_TRIANGLES), seed, **LINK_SEARCH)
     return ConvexPieces(pieces, uncovered(vertices, faces, pieces), np.nan)
+
+
+def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Integers]:
+    """Vertices and faces of a mesh with at most so many triangles: edges collapse where the surface bends least [1]_.
+
+    References
+    ----------
+    .. [1] M. Garland, P. S. Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH (1997).
+    """
+    if len(faces) <= most:
+        return vertices, faces
+    library = load_open3d()
+    points, corners = library.utility.Vector3dVector(vertices), library.utility.Vector3iVector(faces)
+    simple = library.geometry.TriangleMesh(points, corners).simplify_quadric_decimation(most)
+    return np.asarray(simple.vertices), np.asarray(simple.triangles)
 
 
 def _beyond_hull(vertices: Reals, faces: Integers) -> float:

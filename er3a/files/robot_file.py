@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 from collections.abc import Collection, Sequence
 from pathlib import PurePosixPath
@@ -17,12 +18,13 @@ from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
-from er3a.robots.robot import MOST_JOINTS, Grade, PairRule, Robot
+from er3a.robots.robot import MOST_JOINTS, Grade, PairRule, Robot, Visual
 
 HEAVIEST_LINK_KG = 20_000.0
 HEAVIEST_PAYLOAD_KG = 2_500.0
 """The strongest arms carry 2.3 t."""
 METRES_BELOW_MM = 0.5
+MOST_PACKED = 400_000  # letters of a link's corners or triangles
 
 IMPOSSIBLE = {
     "not_finite": "is no finite number",
@@ -487,6 +489,43 @@ class Envelopes(Sourced):
         return self
 
 
+class LinkVisual(StrictModel):
+    """Triangles that pictures show link ``link`` by, in the frame of its joint; nothing is measured with them.
+
+    In base64, as ``er3a import-urdf`` writes them: ``points_mm`` x, y, z of each corner as 32-bit floats, ``faces``
+    three corners (from 0) of each triangle as 16-bit integers, both little-endian.
+    """
+
+    link: Annotated[int, Field(ge=0)]
+    points_mm: Annotated[str, Field(max_length=MOST_PACKED)]
+    faces: Annotated[str, Field(max_length=MOST_PACKED)]
+
+    @model_validator(mode="after")
+    def _triangles(self):
+        self.visual()
+        return self
+
+    def visual(self) -> Visual:
+        """In metres; ``ValueError`` for what is no triangles."""
+        try:
+            points, faces = (
+                np.frombuffer(base64.b64decode(text, validate=True), kind).reshape(-1, 3)
+                for text, kind in ((self.points_mm, "<f4"), (self.faces, "<u2"))
+            )
+            if not len(faces) or faces.max() >= len(points) or not np.isfinite(points).all():
+                raise ValueError
+        except ValueError:
+            raise ValueError("holds no triangles | Import the URDF again, or remove the link from visuals") from None
+        return Visual(self.link, points / 1000.0, faces.astype(np.int64))
+
+
+def link_visual(visual: Visual) -> dict[str, int | str]:
+    """The fields of a :class:`LinkVisual`."""
+    packed = ((1000 * visual.points).astype("<f4"), visual.faces.astype("<u2"))
+    points, faces = (base64.b64encode(array.tobytes()).decode() for array in packed)
+    return {"link": visual.link, "points_mm": points, "faces": faces}
+
+
 class DecidedPair(StrictModel):
     """Two bodies by name (``base``, ``link_1`` ..., in a scene also solids and what is carried), and why."""
 
@@ -556,6 +595,7 @@ class RobotFile(StrictModel):
     flange: SourcedPlacement | None = None
     tool: SourcedPlacement | None = None
     envelopes: Envelopes | None = None
+    visuals: Annotated[list[LinkVisual], Field(max_length=MOST_JOINTS + 1)] = []
     collision: CollisionPairs | None = None
     inertia: Inertia | None = None
     drives: DriveGroup | None = None
@@ -640,10 +680,11 @@ class RobotFile(StrictModel):
     @model_validator(mode="after")
     def _check_links(self):
         count = len(self.dh.rows)
-        for key in ("capsules", "meshes", "hulls"):
-            for i, shape in enumerate(getattr(self.envelopes, key) if self.envelopes else []):
+        given = {f"envelopes.{key}": getattr(self.envelopes, key, []) for key in ("capsules", "meshes", "hulls")}
+        for key, shapes in {**given, "visuals": self.visuals}.items():
+            for i, shape in enumerate(shapes):
                 if shape.link > count:
-                    raise ValueError(f"envelopes.{key}[{i}].link: the arm has no link {shape.link} | 0 to {count}")
+                    raise ValueError(f"{key}[{i}].link: the arm has no link {shape.link} | 0 to {count}")
         if self.collision:
             try:
                 self.collision.check({"base", *(f"link_{k}" for k in range(1, count + 1))})

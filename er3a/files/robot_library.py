@@ -130,6 +130,7 @@ def robot_of(content: RobotFile) -> Robot:
         references=tuple(content.references),
         envelopes=_envelopes(content.envelopes),
         hulls=_hulls(content.envelopes),
+        visuals=tuple(each.visual() for each in content.visuals),
         pair_rules=content.collision.rules() if content.collision else (),
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
         origins=_origins(content),

@@ -20,6 +20,7 @@ from er3a.files.robot_file import (
     TURNING,
     BodyFields,
     RobotFile,
+    link_visual,
 )
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.files.yaml_file import parse
@@ -132,6 +133,8 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         content["coupling"] = sourced("coupling") | {"rows": _coupling_rows(robot.coupling)}
     if robot.envelopes or robot.hulls:
         content["envelopes"] = sourced("envelopes") | _shapes(robot)
+    if robot.visuals:
+        content["visuals"] = [link_visual(each) for each in robot.visuals]
     if robot.pair_rules:
         content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
     for group, fields in mass_groups(robot).items():

@@ -33,6 +33,7 @@ import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.collision.matrix import collision_matrix
+from er3a.collision.meshes import simplified
 from er3a.errors import Er3aError, InputError
 from er3a.formats.urdf_tree import (
     CylinderOfLink,
@@ -45,6 +46,7 @@ from er3a.formats.urdf_tree import (
     peak_torque,
     read_chain,
     urdf_root,
+    visual_surface,
     with_capsules,
     write_friction,
     write_masses,
@@ -53,9 +55,9 @@ from er3a.formats.urdf_tree import (
 from er3a.geometry.transforms import rot_y, rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source, robot_name
+from er3a.robots.robot import MOST_JOINTS, ConvexPiece, Envelope, Robot, Source, Visual, robot_name
 
 PARALLEL = 1e-12
 NEARLY_PARALLEL = math.radians(1.0)  # as far as arms are made wrong; on links of 0.1 m a normal is 6 m away, or more
@@ -214,6 +216,7 @@ STEP_RAD = math.pi / 12
 LEAST_DECIMALS = 4  # of lengths in m: a file that prints fewer left zeros out
 MANY_TURNS, MOST_TURNED = 4 * math.pi + 0.01, 20 * math.pi
 FOLLOWS = 1e-6  # rad or m
+DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
@@ -249,7 +252,7 @@ def import_urdf(
     snap: bool = False,
     split: bool | Split = False,
 ) -> UrdfImport:
-    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over its shapes and masses.
+    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over shapes, looks and masses.
 
     The flange is the tip: the link that ``tip`` names, else the end of the fixed joints behind the last joint, or that
     joint's own link if they branch. Loads, cameras and tools are mounted there.
@@ -281,6 +284,7 @@ def import_urdf(
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = urdf_root(path), link_places(found, shift)
     envelopes, hulls, shaped = link_shapes(path, root, robot, placed, _asked(split))
+    visuals, unseen = link_visuals(path, root, robot, placed)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     stated = {
@@ -293,10 +297,14 @@ def import_urdf(
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         text = f"As {path.name} states it, but for the inertia of {which}, for which the nearest possible one was taken"
         more["inertia"] = Source(text, "export")
-    robot = robot.replace(envelopes=envelopes, hulls=hulls, masses=masses, sources={**robot.sources, **more})
+    robot = robot.replace(
+        envelopes=envelopes, hulls=hulls, visuals=visuals, masses=masses, sources={**robot.sources, **more}
+    )
     first, last = found.joints[0].parent, found.joints[-1].child
     beyond = _followers_beyond(moving, coupling, shift, limits)
-    return UrdfImport(robot, (*found.notes, *notes, *beyond, *shaped, *weighed), float(misfit), names, first, last)
+    return UrdfImport(
+        robot, (*found.notes, *notes, *beyond, *shaped, *unseen, *weighed), float(misfit), names, first, last
+    )
 
 
 def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = None) -> tuple[Robot, tuple[str, ...]]:
@@ -509,6 +517,39 @@ def link_shapes(
     return tuple(capsules), tuple(pieces), tuple(notes)
 
 
+def link_visuals(
+    path: Path, root: ElementTree.Element, robot: Robot, placed: LinkPlaces
+) -> tuple[tuple[Visual, ...], tuple[str, ...]]:
+    """The visual geometry of a URDF, one surface for each link, simplified to ``DRAWN_TRIANGLES`` in all, and notes."""
+    zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
+    parts: dict[int, list[tuple[Reals, Integers]]] = {}
+    missing = list[str]()
+    for link in root.findall("link"):
+        visuals, place = link.findall("visual"), placed(link.get("name", "?"))
+        if place is None:
+            continue
+        T, number = place
+        T = np.linalg.inv(zero[number]) @ T
+        for visual in visuals:
+            try:
+                points, faces = visual_surface(path, link.get("name", "?"), visual)
+            except Er3aError:
+                missing.append(link.get("name", "?"))
+                continue
+            parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3], faces))
+    found = []
+    for number, meshes in sorted(parts.items()):
+        starts = np.cumsum([0, *(len(points) for points, _ in meshes)])
+        faces = np.concatenate([faces + start for (_, faces), start in zip(meshes, starts)])
+        points = np.concatenate([points for points, _ in meshes])
+        points, faces = simplified(points, faces, DRAWN_TRIANGLES // len(parts))
+        used, corners = np.unique(faces, return_inverse=True)
+        found.append(Visual(number, points[used], corners.reshape(-1, 3)))
+    names = ", ".join(dict.fromkeys(missing))
+    note = f"pictures show no visual geometry of {names}: it was not found, or can't be read"
+    return tuple(found), (note,) if missing else ()
+
+
 def _coupling(path: Path, found: UrdfChain, moving: list[UrdfJoint]) -> tuple[list[UrdfJoint], Reals, Reals]:
     """The independent joints behind the chain's, what each of the chain's is made of (m, n), and its constant (m,)."""
     sources: list[UrdfJoint] = []
@@ -602,8 +643,8 @@ def export_urdf(robot: Robot, meshes: str | Path | None = None) -> str:
 
     Parameters
     ----------
-    meshes : folder for the convex pieces of the links, one OBJ file each, which the text names by the folder's name as
-        if it were beside the URDF; None leaves the pieces out
+    meshes : folder for the convex pieces of the links and for how they look, one OBJ file each, which the text names by
+        the folder's name as if it were beside the URDF; None leaves them out
 
     Raises
     ------

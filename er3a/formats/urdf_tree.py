@@ -39,7 +39,7 @@ from er3a.errors import Er3aError, InputError
 from er3a.formats.mesh_file import read_link_mesh, read_link_vertices, read_text
 from er3a.geometry.transforms import rpy_of, transform, translation
 from er3a.kinematics.forward import frames
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, NoBody, moved, nearest_body, no_body, together
 from er3a.robots.robot import ConvexPiece, Envelope, Robot
 
@@ -644,6 +644,38 @@ def collision_shapes(
     return [CylinderOfLink(made[0], Envelope(link, start, end, radius))]
 
 
+def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[Reals, Integers]:
+    """Points (k, 3), m, in the frame of the URDF's link ``name``, and triangles (f, 3) of one ``<visual>``.
+
+    Raises
+    ------
+    InputError
+        for numbers that make no shape, or a mesh that is not there or can't be read
+    """
+    import trimesh  # takes a while
+
+    where, origin, shape = f"visual of link {name}", visual.find("origin"), visual.find("geometry/*")
+    xyz, rpy = (numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    match shape.tag if shape is not None else "":
+        case "box":
+            made = trimesh.creation.box(_sizes(path, where, numbers(path, where, shape, "size", (1.0, 1.0, 1.0))))
+        case "cylinder":
+            given = [numbers(path, where, shape, key, None) for key in ("radius", "length")]
+            radius, length = _sizes(path, where, np.concatenate(given)).tolist()
+            made = trimesh.creation.cylinder(radius, length, PRISM_SIDES)
+        case "sphere":
+            made = trimesh.creation.icosphere(
+                2, float(_sizes(path, where, numbers(path, where, shape, "radius", None))[0])
+            )
+        case "mesh" if shape is not None and (file := mesh_of(path, shape.get("filename", ""))):
+            points, faces, _ = read_link_mesh(file, numbers(path, where, shape, "scale", (1.0, 1.0, 1.0)))
+            made = trimesh.Trimesh(points, faces, process=False)
+        case _:
+            raise InputError(path, where, "no shape was found", "Give a box, cylinder, sphere or mesh")
+    made.apply_transform(transform(xyz, rpy))
+    return np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
+
+
 def with_capsules(shapes: Sequence[Envelope | ConvexPiece | CylinderOfLink]) -> list[Envelope | ConvexPiece]:
     """The shapes of one link, each cylinder as a prism, or as its capsule if a sphere of its radius is at each end."""
     found, at_ends = list[Envelope | ConvexPiece](), set[int]()
@@ -678,49 +710,58 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
         link, ends = elements[names[capsule.link]], _in_link(robot, capsule.link, [capsule.start, capsule.end])
         length = float(np.linalg.norm(ends[1] - ends[0]))
         for point in ends if length else ends[:1]:
-            _collision(link, translation(*point), "sphere", radius=repr(capsule.radius))
+            _geometry(link, "collision", translation(*point), "sphere", radius=repr(capsule.radius))
         if length:
             T = translation(*ends.mean(axis=0))
             T[:3, :3] = Rotation.align_vectors(ends[1:] - ends[:1], [[0, 0, 1]])[0].as_matrix()
-            _collision(link, T, "cylinder", radius=repr(capsule.radius), length=repr(length))
+            _geometry(link, "collision", T, "cylinder", radius=repr(capsule.radius), length=repr(length))
     if meshes is None:
         return
-    if robot.hulls:
+    if robot.hulls or robot.visuals:
         meshes.mkdir(parents=True, exist_ok=True)
+    for visual in robot.visuals:
+        file = meshes / f"{names[visual.link]}_visual.obj"
+        file.write_text(_obj(_in_link(robot, visual.link, visual.points), visual.faces), encoding="utf-8")
+        _geometry(elements[names[visual.link]], "visual", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
     for number, piece in enumerate(robot.hulls, start=1):
         file = meshes / f"{names[piece.link]}_{number}.obj"
-        file.write_text(_obj(_in_link(robot, piece.link, piece.points)), encoding="utf-8")
+        points = _in_link(robot, piece.link, piece.points)
+        file.write_text(_obj(points, _hull_faces(points)), encoding="utf-8")
         link = elements[names[piece.link]]
-        collision = _collision(link, np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
+        collision = _geometry(link, "collision", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
         if piece.margin:
             collision.set("margin", repr(piece.margin))
 
 
-def _in_link(robot: Robot, link: int, points: Sequence[tuple[float, float, float]]) -> Reals:
+def _in_link(robot: Robot, link: int, points: Reals | Sequence[tuple[float, float, float]]) -> Reals:
     """Points (n, 3) of a robot's link in the frame of the URDF's: that of link 0 is the world's."""
     array = np.array(points)
     return array @ robot.base[:3, :3].T + robot.base[:3, 3] if link == 0 else array
 
 
-def _collision(link: ElementTree.Element, T: Reals, shape: str, **attributes: str) -> ElementTree.Element:
-    collision = ElementTree.SubElement(link, "collision")
+def _geometry(link: ElementTree.Element, tag: str, T: Reals, shape: str, **attributes: str) -> ElementTree.Element:
+    element = ElementTree.SubElement(link, tag)
     xyz, rpy = (" ".join(map(repr, values.tolist())) for values in (T[:3, 3], rpy_of(T)))
-    ElementTree.SubElement(collision, "origin", xyz=xyz, rpy=rpy)
-    ElementTree.SubElement(ElementTree.SubElement(collision, "geometry"), shape, attributes)
-    return collision
+    ElementTree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
+    ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape, attributes)
+    return element
 
 
-def _obj(points: Reals) -> str:
-    """The hull of points (n, 3) as an OBJ file, or a fan of triangles if they lie in a plane."""
+def _hull_faces(points: Reals) -> Integers:
+    """Triangles (f, 3) of the hull of points (n, 3), or a fan of triangles if they lie in a plane."""
     try:
         hull = scipy.spatial.ConvexHull(points)
     except scipy.spatial.QhullError:
-        faces = np.array([(0, k, k + 1) for k in range(1, len(points) - 1)])
-    else:
-        corners = points[hull.simplices]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        outwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) > 0
-        faces = np.where(outwards[:, None], hull.simplices, hull.simplices[:, ::-1])
+        return np.array([(0, k, k + 1) for k in range(1, len(points) - 1)])
+    corners = points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) > 0
+    faces: Integers = np.where(outwards[:, None], hull.simplices, hull.simplices[:, ::-1])
+    return faces
+
+
+def _obj(points: Reals, faces: Integers) -> str:
+    """Triangles (f, 3) of points (n, 3) as an OBJ file."""
     lines = [("v", *point) for point in points.tolist()] + [("f", *face) for face in (faces + 1).tolist()]
     return "".join(f"{kind} {x!r} {y!r} {z!r}\n" for kind, x, y, z in lines)
 

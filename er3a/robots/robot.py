@@ -21,7 +21,7 @@ import numpy as np
 from er3a.by_value import ByValue, Displayed, ReadOnly, Sheet, shortly
 from er3a.errors import InputWarning, RobotError, ShapeError
 from er3a.geometry.transforms import rot_x, rot_y, rpy_of, translation
-from er3a.numerics.arrays import Flags, Reals, as_floats
+from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.robots.masses import Masses
 
 MOST_JOINTS = 10
@@ -82,6 +82,18 @@ class ConvexPiece:
     margin: float
 
 
+@dataclass(frozen=True, eq=False)
+class Visual(ByValue):
+    """How a link looks: points (k, 3), m, in the frame as of :class:`Envelope`, and triangles (f, 3) of them.
+
+    Only pictures use it: nothing is measured with it.
+    """
+
+    link: int
+    points: Reals
+    faces: Integers
+
+
 @dataclass(frozen=True)
 class PairRule:
     """What a person decided of a pair of bodies: not looked at (``allow``) or looked at as a whole (``watch``).
@@ -126,6 +138,7 @@ class Robot(ByValue, Displayed):
     zero_pose : what the arm looks like at q = 0, in words
     references : names of the reference sets (folders of data/manual_refs) that it is checked against
     envelopes, hulls : capsules around the links, and convex pieces of them; both empty where the file gives none
+    visuals : how the links look, where the file says so; robots that differ in them alone are equal
     pair_rules : which pairs of links a person decided on
     masses : of links and what drives and wrist can do, as far as known
     derived : what :func:`er3a.robots.robot.derived` keeps of this robot
@@ -164,6 +177,7 @@ class Robot(ByValue, Displayed):
     continuous: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))
     combined: tuple[CombinedLimit, ...] = ()
     hulls: tuple[ConvexPiece, ...] = ()
+    visuals: tuple[Visual, ...] = field(default=(), compare=False)
     pair_rules: tuple[PairRule, ...] = ()
     masses: Masses = field(default_factory=Masses)
     sources: Mapping[str, Source] = field(default_factory=dict)

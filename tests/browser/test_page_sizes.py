@@ -11,7 +11,7 @@ from selenium.webdriver.common.by import By
 from testing import chromium
 from tests.browser.pages import PAGES, PAGES_OF_EACH_KIND
 
-LARGEST_PAGE = 6_000_000
+LARGEST_PAGE = 2_000_000
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
@@ -15,6 +16,7 @@ from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.page import render
+from er3a.robots.robot import Visual
 from testing.small_study import ROOT
 
 pytestmark = pytest.mark.long
@@ -36,9 +38,27 @@ Promise.all([import("er3a/kinematics"), import("er3a/values")]).then(([kinematic
 });"""
 
 
+PAINTED = """const [done] = arguments;
+requestAnimationFrame(() => requestAnimationFrame(() => done(document.querySelector("canvas.arm").toDataURL())));"""
+
+
 def bow(robot) -> PlayedMotion:
     q = np.linspace(0.2, 0.8, len(T))[:, None] * robot.upper
     return PlayedMotion("bow", "It bows.", T, q, [PlayedEvent(1.2, 1.3, "stretched", "caution")])
+
+
+def written(folder, shown) -> None:
+    (folder / "page.html.j2").write_text(TEMPLATE, encoding="utf-8")
+    render(
+        folder / "page.html.j2",
+        folder / "page.html",
+        command=None,
+        provenance=Provenance(inputs=(), code="0" * 64),
+        player=shown,
+        drawing_head=drawing_head(),
+        link=moment("bow", 1.25, "the event"),
+        stretch=stretch("way", 2.0, 4.0),
+    )
 
 
 @pytest.fixture
@@ -47,17 +67,7 @@ def page(browser, tmp_path):
     still = PlayedMotion("still", "It stands.", np.array([0.0, 1.0]), np.zeros((2, 6)))
     way = PlayedMotion("way", "It goes.", np.arange(9.0), np.zeros((9, 6)), timed=False)
     scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
-    (tmp_path / "page.html.j2").write_text(TEMPLATE, encoding="utf-8")
-    render(
-        tmp_path / "page.html.j2",
-        tmp_path / "page.html",
-        command=None,
-        provenance=Provenance(inputs=(), code="0" * 64),
-        player=player(robot, [bow(robot), still, way], scene),
-        drawing_head=drawing_head(),
-        link=moment("bow", 1.25, "the event"),
-        stretch=stretch("way", 2.0, 4.0),
-    )
+    written(tmp_path, player(robot, [bow(robot), still, way], scene))
     browser.get_log("browser")
     browser.get((tmp_path / "page.html").as_uri())
     WebDriverWait(browser, 10).until(lambda _: clock(browser))
@@ -196,3 +206,21 @@ def test_a_way_without_times_counts_its_points_and_what_is_played_is_framed(page
     page.execute_script("document.querySelector('.player .forward').click()")
     until(page, lambda: clock(page) == "point 5 of 8")
     assert "now" not in stretch.get_attribute("class")
+
+
+def test_an_arm_with_meshes_is_drawn_as_them_as_the_shapes_checked_or_as_both(browser, tmp_path):
+    corners = np.array([[x, y, z] for x in (0, 0.1) for y in (0, 0.1) for z in (0, 0.4)])
+    robot = load_robot("er3a_c60")
+    written(tmp_path, player(robot.replace(visuals=(Visual(2, corners, ConvexHull(corners).simplices),)), [bow(robot)]))
+    browser.get((tmp_path / "page.html").as_uri())
+    WebDriverWait(browser, 10).until(lambda _: clock(browser))
+    pictures = set()
+    for look in ("visual", "checked", "both"):
+        browser.find_element(By.CSS_SELECTOR, f".looks option[value={look}]").click()
+        pictures.add(browser.execute_async_script(PAINTED))
+    assert len(pictures) == 3
+    assert browser.get_log("browser") == []
+
+
+def test_an_arm_without_meshes_has_one_look(page):
+    assert page.find_elements(By.CSS_SELECTOR, ".looks") == []

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from er3a.pipeline.player.player import MOST_FACES, drawn_pieces, drawn_size
+from er3a.pipeline.player.player import MOST_FACES, drawn_shapes, drawn_size
 from er3a.robots.robot import ConvexPiece
 from testing.arms import gantry, make_arm
 
@@ -19,7 +19,7 @@ def pieces(count: int, corners: int) -> tuple[ConvexPiece, ...]:
 
 
 def test_pieces_are_closed_and_face_outwards():
-    drawn = drawn_pieces(make_arm(hulls=pieces(3, 40)))
+    drawn = drawn_shapes(make_arm(hulls=pieces(3, 40)))["pieces"]
     assert [piece["link"] for piece in drawn] == [0, 1, 2]
     for piece in drawn:
         points, faces = np.array(piece["points"]), np.array(piece["faces"])
@@ -30,11 +30,11 @@ def test_pieces_are_closed_and_face_outwards():
 
 
 def test_many_pieces_are_drawn_with_fewer_faces():
-    drawn = drawn_pieces(make_arm(hulls=pieces(70, 64)))
+    drawn = drawn_shapes(make_arm(hulls=pieces(70, 64)))["pieces"]
     assert sum(len(piece["faces"]) for piece in drawn) <= 1.05 * MOST_FACES
 
 
 def test_flat_pieces_are_left_out_and_an_arm_without_lengths_has_a_size():
     flat = ConvexPiece(1, ((0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)), 0.0)
-    assert drawn_pieces(make_arm(hulls=(flat,))) == []
+    assert drawn_shapes(make_arm(hulls=(flat,)))["pieces"] == []
     assert drawn_size(gantry()) == 2.5

@@ -28,10 +28,10 @@ from er3a.planning.path_verdicts import PathVerdict
 
 FIGURES = {
     "safe": N_("Safe paths"),
-    "singular_poses": N_("Singular poses met"),
-    "near_passes": N_("Near-singular passes"),
-    "colliding": N_("Paths with a collision"),
-    "max_joint_speed": N_("Highest joint speed, against its limit"),
+    "singular_poses": N_("Singular poses met, on all paths"),
+    "near_passes": N_("Near-singular passes, on all paths"),
+    "colliding": N_("Paths with a collision, of all"),
+    "max_joint_speed": N_("Highest joint speed on all paths, against its limit"),
     "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
     "speed_ratio": N_("Ratio to that joint's limit"),
     "velocity_check": N_("Velocity check, greatest error"),

@@ -10,7 +10,7 @@ import { add, column, scaled } from "er3a/algebra";
 import { constantLinks } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
 import { eyeOf, Picture } from "er3a/scene";
-import { armSolids, recoloured, sceneSolids } from "er3a/solids";
+import { armLooks, recoloured, sceneSolids } from "er3a/solids";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
 const place = document.getElementById("player");
@@ -19,10 +19,10 @@ const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, told] = ["arm", "motion", "time", "clock", "told"].map(part);
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
-const arms = [data, ...data.beside].map(({ table, pieces }) => {
-  return { table, links: constantLinks(table), solids: armSolids(table, data.size, data.colours, pieces) };
+const arms = [data, ...data.beside].map((arm, k) => {
+  const carried = k === 0 ? sceneSolids(data.carried, table.a.length + 1) : [];
+  return { table: arm.table, links: constantLinks(arm.table), looks: armLooks(arm.table, data.size, data.colours, arm, carried) };
 });
-arms[0].solids.push(...sceneSolids(data.carried, table.a.length + 1));
 const surroundings = sceneSolids(data.scene);
 const picture = new Picture(canvas);
 const floor = data.floor ?? column(table.base, 3)[2];
@@ -92,8 +92,9 @@ const isNow = ({ t: from, until }) => t >= from - 1e-9 && t <= until + 1e-9;
 function draw() {
   const touching = new Set(motion.events.filter(isNow).flatMap((event) => event.bodies));
   const seen = (solids) => recoloured(solids, touching, data.colours.touching);
-  const shown = arms.map((arm, k) => {
-    return { solids: seen(arm.solids), poses: posesOf(arm, valuesAt(motion.times, motion.values[k], t)), ghost: false };
+  const shown = arms.flatMap((arm, k) => {
+    const poses = posesOf(arm, valuesAt(motion.times, motion.values[k], t));
+    return arm.looks(part("looks")?.value).map(({ solids, ghost }) => ({ solids: seen(solids), poses, ghost }));
   });
   const { page } = orbit;
   picture.fit();
@@ -235,6 +236,7 @@ part("back").addEventListener("click", () => step(-1));
 part("forward").addEventListener("click", () => step(1));
 part("next").addEventListener("click", nextEvent);
 part("undock").addEventListener("click", () => place.classList.remove("docked"));
+part("looks")?.addEventListener("change", refresh);
 chooser.addEventListener("change", () => goTo(chooser.value, motions.get(chooser.value).times[0]));
 bar.addEventListener("input", () => goTo(null, Number(bar.value)));
 for (const link of document.querySelectorAll("[data-t]")) {

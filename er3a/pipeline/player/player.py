@@ -14,12 +14,13 @@ import scipy
 from markupsafe import Markup
 
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
+from er3a.collision.shapes import arm_shapes
 from er3a.geometry.vectors import fibonacci_sphere
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.teach.scripts import TEACH, import_map
-from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, rgb
+from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, link_colour
 from er3a.robots.joint_limits import shown, size_of, theta_limits
 from er3a.robots.robot import Robot
 
@@ -27,6 +28,7 @@ _HERE = Path(__file__).parent
 MOST_FRAMES, FRAMES_IN_ALL, FEWEST_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 UNTIMED_S = 8.0  # how long a motion without times is shown
 MOST_FACES, FEWEST_CORNERS = 2000, 12  # of an arm, and of a convex piece
+BALL = 24  # corners of each end of a capsule
 SCENE_COLOUR = "#b9a78f"
 COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
 AXES = ("#b42318", "#18794e", "#0b5c94")
@@ -36,7 +38,14 @@ TABLE = (
 )
 DRAWING = ("algebra", "kinematics", "orbit", "scene", "solids")
 LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
+LOOKS = {
+    "visual": N_("meshes"),
+    "checked": N_("the shapes checked"),
+    "both": N_("both"),
+}
+"""What an arm with meshes can be shown by; see ``teach/solids.js``."""
 WORDS = {
+    "looks": N_("arm drawn as"),
     "player": N_("Motion playback"),
     "motion": N_("motion"),
     "play": N_("Play"),
@@ -84,6 +93,7 @@ def player(
     return Markup(
         environment.get_template("player.html.j2").render(
             words=words,
+            looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
             data=_data(robot, shown, scene, words, beside, signs),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
@@ -122,8 +132,8 @@ def _data(
     return {
         "table": table_data(robot),
         "size": size,
-        "pieces": drawn_pieces(robot),
-        "beside": [{"table": table_data(arm), "pieces": drawn_pieces(arm)} for arm in beside],
+        **drawn_shapes(robot),
+        "beside": [{"table": table_data(arm), **drawn_shapes(arm)} for arm in beside],
         "signs": [{"text": text, "at": at.tolist()} for text, at in zip(signs, bases)],
         "width": max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
         "target": (np.mean(bases, axis=0) + robot.base[:3, 2] * 0.35 * size).tolist(),
@@ -165,12 +175,19 @@ def drawn_size(robot: Robot) -> float:
     return size_of(robot) + float(np.linalg.norm(robot.last_to_tool[:3, 3]) + ways) or 1.0
 
 
-def drawn_pieces(robot: Robot) -> list[dict[str, Any]]:
-    """The convex pieces of an arm's meshes with fewer corners, so that the whole arm has about ``MOST_FACES`` faces."""
-    corners = max(FEWEST_CORNERS, MOST_FACES // (2 * len(robot.hulls) or 1))
-    drawn = []
-    for piece in robot.hulls:
-        points = np.array(piece.points)
+def drawn_shapes(robot: Robot) -> dict[str, list[dict[str, Any]]]:
+    """What an arm's links are drawn by: ``visuals``, how they look, and ``pieces``, the convex pieces of their meshes.
+
+    Beside visuals, the shapes that collisions are measured with are all among the pieces, capsules too.
+    """
+    visuals = [_drawn(each.link, each.points, each.faces) for each in robot.visuals]
+    shapes = [(each.link, np.array(each.points)) for each in robot.hulls]
+    for each in arm_shapes(robot).capsules if visuals else ():
+        ball = each.radius * fibonacci_sphere(BALL)
+        shapes.append((each.link, np.concatenate([ball + each.start, ball + each.end])))
+    corners = max(FEWEST_CORNERS, MOST_FACES // (2 * len(shapes) or 1))
+    pieces = []
+    for link, points in shapes:
         if len(points) > corners:
             points = points[np.unique((fibonacci_sphere(corners) @ points.T).argmax(axis=1))]
         try:
@@ -179,13 +196,13 @@ def drawn_pieces(robot: Robot) -> list[dict[str, Any]]:
             continue
         a, b, c = np.moveaxis(points[hull.simplices], 1, 0)
         inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
-        faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
-        shade = zip(rgb(LINK), rgb(JOINTS[piece.link - 1] if piece.link else BODY))
-        colour = "#" + "".join(f"{round(0.6 * grey + 0.4 * own):02x}" for grey, own in shade)
-        drawn.append(
-            {"link": piece.link, "points": np.round(points, 5).tolist(), "faces": faces.tolist(), "colour": colour}
-        )
-    return drawn
+        pieces.append(_drawn(link, points, np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)))
+    return {"pieces": pieces, "visuals": visuals}
+
+
+def _drawn(link: int, points: Reals, faces: Integers) -> dict[str, Any]:
+    """A surface of a link, grey with something of its joint's colour."""
+    return {"link": link, "points": np.round(points, 5).tolist(), "faces": faces.tolist(), "colour": link_colour(link)}
 
 
 def floor_of(scene: Scene | None) -> float | None:

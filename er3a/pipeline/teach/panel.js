@@ -198,7 +198,7 @@ function refresh() {
 function frame(now) {
   awaited = false;
   const T = frames(table, links, q);
-  view.show(q, ghost, showRow(), clearance.show(T));
+  view.show(q, ghost, showRow(), clearance.show(T), byId("looks")?.value);
   showPose(T.at(-1));
   showMeasures(data, arm, T);
   if (!listed) findSolutions(T.at(-1), now);
@@ -228,6 +228,7 @@ export const points = addTasks(data, goal, arm, {
   joints, moveTo, refusal, tool: () => frames(table, links, q).at(-1), why: (found) => whyNot(data, found),
 });
 
+byId("looks")?.addEventListener("change", refresh);
 for (const k of JOINTS) showJoint(k);
 takeLink();
 addEventListener("hashchange", takeLink);

@@ -23,7 +23,7 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.player.player import drawn_pieces, drawn_size, floor_of, scene_data, table_data
+from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, scene_data, table_data
 from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_status
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
@@ -48,6 +48,8 @@ WORDS: dict[str, Any] = {
     ),
     "view_help": N_("Drag to turn the view. With the picture in focus the wheel and the plus and minus keys zoom."),
     "views": {"overview": N_("Overview"), "side": N_("Side"), "front": N_("Front"), "top": N_("Top")},
+    "looks": N_("Arm drawn as"),
+    "look": LOOKS,
     "frames": N_("Frames of the table"),
     "frames_none": N_("none"),
     "frames_all": N_("all"),
@@ -340,7 +342,7 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
         "name": robot.name,
         "table": table_data(robot),
         "size": drawn_size(robot),
-        "pieces": drawn_pieces(robot),
+        **drawn_shapes(robot),
         "characteristic_length": characteristic_length(robot),
         "no_closed_form": say(missing) if missing else None,
         "branch_labels": labels,

@@ -16,12 +16,22 @@ const DRUM_SIDES = 22;
 const SHORT = 1e-6; // m
 
 /**
- * Everything that is drawn of an arm of the given size (m): convex pieces `{link, points, faces, colour}` of links whose
- * shapes are known, rods and drums of all others.
+ * What shows an arm: a function of `visual`, `checked` or `both` that returns groups `{solids, ghost}`, in which the
+ * shapes that are checked are pale beside the arm's meshes. An arm without meshes has one look.
  */
-export function armSolids(table, size, colours, pieces = []) {
-  const known = new Set(pieces.map((piece) => piece.link));
-  const own = pieces.map(({ link, points, faces, colour }) => ({ frame: link, ...mesh({ points, faces, colour }) }));
+export function armLooks(table, size, colours, { pieces, visuals }, carried = []) {
+  const [visual, checked] = [visuals, pieces].map((surfaces) => [...armSolids(table, size, colours, surfaces), ...carried]);
+  const groups = { visual: [visual], checked: [checked], both: [visual, checked] };
+  return (look = "visual") => groups[visuals.length ? look : "checked"].map((solids, k) => ({ solids, ghost: k > 0 }));
+}
+
+/**
+ * Everything that is drawn of an arm of the given size (m): surfaces `{link, points, faces, colour}` of links that
+ * have them, rods and drums of all others.
+ */
+function armSolids(table, size, colours, surfaces) {
+  const known = new Set(surfaces.map(({ link }) => link));
+  const own = surfaces.map(({ link, points, faces, colour }) => ({ frame: link, ...mesh({ points, faces, colour }) }));
   return [...own, ...plainSolids(table, size, colours).filter((solid) => !known.has(solid.frame))];
 }
 

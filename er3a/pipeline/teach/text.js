@@ -1,6 +1,7 @@
 /** Words and numbers as people read them. */
 
 const THIN_SPACE = "\u202f";
+const NOTHING = 1e-12; // what rounding leaves of 0
 const DEGREES = 180 / Math.PI;
 
 /** A sentence with its `{names}` filled in. */
@@ -15,7 +16,7 @@ export function fixed(value, decimals = 1) {
 /** A number with significant digits; powers of ten where it is very small or great. */
 export function significant(value, digits = 3) {
   if (value === Infinity) return "∞";
-  if (value === 0) return "0";
+  if (Math.abs(value) < NOTHING) return "0";
   if ( Math.abs(value) >= 1e-3 && Math.abs(value) < 1e6) return value.toPrecision(digits).replace("-", "−");
   const [mantissa, power] = value.toExponential(digits - 1).split("e");
   const raised = String(Number(power)).replace(/[-\d]/g, (sign) => (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[sign]));

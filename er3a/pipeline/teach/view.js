@@ -4,7 +4,7 @@ import { add, column, moved, norm, scaled, subtract, turned } from "er3a/algebra
 import { frames, tableFrames } from "er3a/kinematics";
 import { Orbit } from "er3a/orbit";
 import { eyeOf, Picture } from "er3a/scene";
-import { armSolids, drums, recoloured, sceneSolids } from "er3a/solids";
+import { armLooks, drums, recoloured, sceneSolids } from "er3a/solids";
 
 const TOUCHING = "#d1242f";
 const FRAME_COLOURS = ["#d62728", "#2ca02c", "#1f77b4"]; // of x, y, z
@@ -21,11 +21,11 @@ function lookedAt(table, links, size) {
 
 export class ArmView extends Orbit {
   /** `draw` is called when the view has changed and the picture has to be drawn again. */
-  constructor(canvas, { table, size, colours, joint_names: names, pieces, scene, carried, floor }, links, draw) {
+  constructor(canvas, { table, size, colours, joint_names: names, pieces, visuals, scene, carried, floor }, links, draw) {
     super(canvas, ...lookedAt(table, links, size), () => draw());
     Object.assign(this, { table, links, size, rows: table.coupling ? table.a.map((_, k) => String(k + 1)) : names });
     this.surroundings = sceneSolids(scene ?? []);
-    this.solids = [...armSolids(table, size, colours, pieces), ...sceneSolids(carried ?? [], table.a.length + 1)];
+    this.looks = armLooks(table, size, colours, { pieces, visuals }, sceneSolids(carried ?? [], table.a.length + 1));
     this.drums = drums(table, size);
     this.jointColours = colours.joints;
     this.picture = new Picture(canvas);
@@ -34,21 +34,23 @@ export class ArmView extends Orbit {
   }
 
   /**
-   * Draws the arm at joint values `q`, a pale one at `ghost` (null for none), the table's frames with these numbers, and
+   * Draws the arm at joint values `q` by a look of `armLooks`, a pale one at `ghost` (null for none), the table's frames with these numbers, and
    * the nearest pair, `{from, to, text, touching}`: a line, and bodies of those names in red.
    */
-  show(q, ghost, numbers = [], nearest = null) {
-    const { picture, solids, page, size, base, floor } = this;
+  show(q, ghost, numbers = [], nearest = null, look = "visual") {
+    const { picture, page, size, base, floor } = this;
     picture.fit();
     picture.begin(eyeOf(this));
     const poses = this.#poses(q);
+    const groups = this.looks(look);
+    const [{ solids }] = groups;
     picture.floor(base, size / 10, floor, page.grid);
     picture.shadow(solids, poses, floor, page.grid);
     const touching = new Set(nearest?.touching ?? []);
-    const [around, shown] = [this.surroundings, solids].map((things) => recoloured(things, touching, TOUCHING));
-    const groups = [...picture.around(around, poses), { solids: shown, poses, ghost: false }];
-    if (ghost) groups.push({ solids, poses: this.#poses(ghost), ghost: true });
-    picture.solids(groups);
+    const seen = (things) => recoloured(things, touching, TOUCHING);
+    const arm = groups.map((group) => ({ ...group, solids: seen(group.solids), poses }));
+    if (ghost) arm.push({ solids, poses: this.#poses(ghost), ghost: true });
+    picture.solids([...picture.around(seen(this.surroundings), poses), ...arm]);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
     else this.#axes(poses);
     this.#toolFrame(poses.at(-1));

@@ -14,16 +14,17 @@ import rerun as rr
 import rerun.blueprint as rrb
 import scipy
 
+from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Solid, Sphere
-from er3a.collision.shapes import Body
+from er3a.collision.shapes import Body, arm_bodies
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.viewing.palette import BODY, JOINT_NAMES, LINK, legible, rgb
+from er3a.pipeline.viewing.palette import BODY, JOINT_NAMES, LINK, legible, link_colour, rgb
 from er3a.pipeline.viewing.palette import JOINTS as JOINT_COLOURS
 from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import size_of
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, Visual
 
 TIMELINE = "t"
 ARM = "/arm/**"
@@ -34,6 +35,7 @@ AXES = ((255, 80, 80), (80, 200, 80), (110, 130, 255))
 """Colours of a frame's x, y and z."""
 _TAPER = (1.0, 0.92, 0.8, 0.66, 0.55, 0.45)
 _PLANE_THICKNESS = 0.002  # m
+CHECKED, CHECKED_ALPHA = "checked", 110
 
 Shape = rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D | rr.Capsules3D | rr.Mesh3D
 
@@ -64,7 +66,9 @@ def arm_view(
         look_target=centre,
         eye_up=[0, 0, 1],
     )
-    return rrb.Spatial3DView(origin="/", contents=list(contents), name=name, eye_controls=eye)
+    links = range(robot.rows + 1) if robot.visuals else ()
+    hidden: Any = {f"{ARM[:-2]}{link_label(k)}/{CHECKED}": rrb.EntityBehavior(visible=False) for k in links}
+    return rrb.Spatial3DView(origin="/", contents=list(contents), name=name, eye_controls=eye, overrides=hidden or None)
 
 
 def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str = "arm", ghost: bool = False) -> None:
@@ -73,16 +77,23 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
     Parameters
     ----------
     ghost : draw it translucent grey, without axes, as a further arm beside the main one
+
+    An arm that has visuals is shown by them; the shapes that collisions are measured with stand beside them as
+    ``checked``, below each link.
     """
     radius = 0.028 * size_of(robot)
     parts = link_parts(robot)
-    _log_base(stream, robot, entity, radius, ghost)
+    looks = () if ghost else robot.visuals
+    _log_visuals(stream, robot, looks, entity)
+    seen = {each.link for each in looks}
+    _log_base(stream, robot, entity, radius, plate=not ghost and 0 not in seen)
     for k in range(robot.rows):
         path = f"{entity}/link_{k + 1}"
         size = radius * _TAPER[min(k, len(_TAPER) - 1)]
         along = parts[k + 1, ALONG_Z, :3, 3]
         across = along + parts[k + 1, TO_NEXT_AXIS, :3, 3]
-        _log_segments(stream, f"{path}/body", [(np.zeros(3), along), (along, across)], size * 0.75, ghost)
+        if k + 1 not in seen:
+            _log_segments(stream, f"{path}/body", [(np.zeros(3), along), (along, across)], size * 0.75, ghost)
         colour = (*rgb(BODY), 90) if ghost else (*rgb(JOINT_COLOURS[k]), 255)
         drum = rr.Cylinders3D(
             lengths=[size * 2.6],
@@ -91,7 +102,8 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
             colors=[colour],
             fill_mode="solid" if not ghost else "transparentfillmajorwireframe",
         )
-        stream.log(f"{path}/joint", drum, static=True)
+        if k + 1 not in seen:
+            stream.log(f"{path}/joint", drum, static=True)
         if not ghost:
             arrow = np.array([0, 0, robot.direction[k] * size * 3.2])
             axis = rr.Arrows3D(origins=[along / 2], vectors=[arrow], radii=[size * 0.12], colors=[colour])
@@ -129,18 +141,28 @@ def _moving_entities(robot: Robot, entity: str) -> list[str]:
     return [*(f"{entity}/link_{k + 1}" for k in range(robot.rows)), f"{entity}/tool"]
 
 
-def _log_base(stream: rr.RecordingStream, robot: Robot, entity: str, radius: float, ghost: bool) -> None:
+def _log_visuals(stream: rr.RecordingStream, robot: Robot, visuals: Sequence[Visual], entity: str) -> None:
+    """How links look, and beside that, hidden until asked for, the shapes that collisions are measured with."""
+    for each in visuals:
+        surface = _mesh(each.points, each.faces, (*rgb(link_colour(each.link)), 255))
+        stream.log(f"{entity}/{link_label(each.link)}/visual", surface, static=True)
+    for number, body in enumerate(arm_bodies(robot) if visuals else ()):
+        shape = body_shape(body, (*rgb(BODY), CHECKED_ALPHA))
+        stream.log(f"{entity}/{body.name}/{CHECKED}/{number}", shape, static=True)
+
+
+def _log_base(stream: rr.RecordingStream, robot: Robot, entity: str, radius: float, plate: bool) -> None:
     stream.log(f"{entity}/base", rr.Transform3D(translation=robot.base[:3, 3], mat3x3=robot.base[:3, :3]), static=True)
-    if not ghost:
+    if plate:
         height = radius * 0.9
-        plate = rr.Cylinders3D(
+        disc = rr.Cylinders3D(
             lengths=[height],
             radii=[radius * 2.2],
             centers=[[0, 0, height / 2]],
             colors=[rgb(BODY)],
             fill_mode="solid",
         )
-        stream.log(f"{entity}/base/plate", plate, static=True)
+        stream.log(f"{entity}/base/plate", disc, static=True)
 
 
 def _log_segments(
@@ -212,8 +234,16 @@ def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
     hulls = [scipy.spatial.ConvexHull(piece) for piece in pieces]
     starts = np.cumsum([0, *(len(piece) for piece in pieces)])
     triangles = [start + _outward(hull) for start, hull in zip(starts, hulls)]
+    return _mesh(np.concatenate(pieces), np.concatenate(triangles), colour)
+
+
+def _mesh(points: Reals, faces: Integers, colour: tuple[int, ...]) -> rr.Mesh3D:
+    """Triangles, each lit as it lies."""
+    corners = points[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
     return rr.Mesh3D(
-        vertex_positions=np.concatenate(pieces), triangle_indices=np.concatenate(triangles), albedo_factor=colour
+        vertex_positions=corners.reshape(-1, 3), vertex_normals=np.repeat(normals, 3, axis=0), albedo_factor=colour
     )
 
 

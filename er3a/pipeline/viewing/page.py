@@ -209,12 +209,13 @@ class Head:
         return self.text.removesuffix(self.banner).rstrip()
 
 
-def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
+def head_of(stored: Stored[Any], figure_words: dict[str, str], links: Mapping[str, str] | None = None) -> Head:
     """The head of a stage's page.
 
     Parameters
     ----------
     figure_words : names of key figures by code, marked with ``N_``
+    links : as of :class:`Head`
     """
     verdict, stage = stored.results.summary.verdict, stored.stage
     shown = tuple(
@@ -244,6 +245,7 @@ def head_of(stored: Stored[Any], figure_words: dict[str, str]) -> Head:
         stored.results.summary,
         missed,
         tuple(figure for figure in shown if figure.name in NUMERICS),
+        links or {},
     )
 
 
@@ -332,11 +334,14 @@ def led(text: str) -> tuple[str, str]:
 
 def linked(text: str, links: Mapping[str, str]) -> Markup:
     """A text in which the first of each of some words leads to an address."""
-    html = escape(text)
-    for name, address in links.items():
-        link = Markup('<a href="{}">{}</a>').format(address, name)
-        html = Markup(re.sub(rf"(?<![\w-]){re.escape(str(escape(name)))}(?![\w-])", lambda _: str(link), html, count=1))  # noqa: B023
-    return html
+    html, left = escape(text), {str(escape(name)): address for name, address in links.items()}
+    names = "|".join(map(re.escape, sorted(left, key=len, reverse=True)))
+
+    def link(found: re.Match[str]) -> str:
+        address = left.pop(found[0], None)
+        return found[0] if address is None else f'<a href="{escape(address)}">{found[0]}</a>'
+
+    return Markup(re.sub(rf"(?<![\w-])(?:{names})(?![\w-])", link, html)) if left else html
 
 
 def whole_sentence(finding: str) -> str:

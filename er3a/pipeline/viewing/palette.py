@@ -38,6 +38,12 @@ def rgb(colour: str) -> tuple[int, int, int]:
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
+def link_colour(link: int) -> str:
+    """Of a link that a surface shows: grey, with something of the colour of the joint that moves it."""
+    shade = zip(rgb(LINK), rgb(JOINTS[link - 1] if link else BODY))
+    return "#" + "".join(f"{round(0.6 * grey + 0.4 * own):02x}" for grey, own in shade)
+
+
 def legible(colour: str) -> tuple[int, int, int]:
     """A colour of the same hue that can be read on the viewer's dark ground as well as on its light one.
 

@@ -76,7 +76,7 @@ def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
-        head=head_of(stored, FIGURES),
+        head=head_of(stored, FIGURES, {each.name: f"#{each.name}" for each in summary.programs}),
         command=run_command(study, f"{stored.robot}/programs.html"),
         robot=robot,
         robot_pages=study.pages(stored.robot),

@@ -120,7 +120,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         Path(__file__).with_name("report.html.j2"),
         output,
         summary,
-        head=head_of(stored, FIGURES),
+        head=head_of(stored, FIGURES, {path.name: f"#{path.name}" for path in summary.paths}),
         command=run_command(study, f"{stored.robot}/trajectory.html"),
         robot=robot,
         robot_pages=study.pages(stored.robot),

@@ -1,0 +1,89 @@
+"""How links look in a URDF: apart from their shapes, where the URDF places them, simplified, through robot files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from er3a.errors import InputError
+from er3a.files.robot_library import load_robot
+from er3a.files.robot_writer import write_robot
+from er3a.formats.urdf import DRAWN_TRIANGLES, export_urdf, import_urdf
+from er3a.kinematics.forward import frames
+from er3a.pipeline.player.player import drawn_shapes
+
+RADIUS, SIZE = 0.05, (0.1, 0.2, 0.3)
+URDF = """<robot name="r"><link name="base"><visual><geometry><mesh filename="lost.stl"/></geometry></visual></link>
+<link name="upper"><visual><origin xyz="0.1 0.2 0.3" rpy="0 0.4 0"/><geometry><mesh filename="ball.stl"/></geometry>
+</visual><collision><geometry><sphere radius="0.06"/></geometry></collision></link>
+<link name="fore"><visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual></link>
+<joint name="one" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.4" rpy="0.3 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="0"/></joint>
+<joint name="two" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.5 0 0" rpy="0 0.2 0"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1" effort="0"/></joint></robot>"""
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm")
+    trimesh.creation.icosphere(5, RADIUS).export(folder / "ball.stl")  # 20 480 triangles
+    (folder / "arm.urdf").write_text(URDF)
+    return import_urdf(folder / "arm.urdf")
+
+
+def surface(robot, link: int) -> trimesh.Trimesh:
+    """In the world, all joints at 0."""
+    found = next(each for each in robot.visuals if each.link == link)
+    T = frames(robot, np.zeros(robot.joints))[link - 1]
+    return trimesh.Trimesh(found.points @ T[:3, :3].T + T[:3, 3], found.faces)
+
+
+def test_links_look_as_their_urdf_says_and_are_checked_by_other_shapes(imported):
+    robot = imported.robot
+    assert [each.link for each in robot.visuals] == [1, 2]
+    c, s = np.cos(0.3), np.sin(0.3)
+    ball, box = surface(robot, 1), surface(robot, 2)
+    assert ball.center_mass == pytest.approx([0.1, 0.2 * c - 0.3 * s, 0.4 + 0.2 * s + 0.3 * c], abs=1e-4)
+    assert len(ball.faces) <= DRAWN_TRIANGLES // 2
+    assert np.linalg.norm(ball.vertices - ball.center_mass, axis=1) == pytest.approx(RADIUS, abs=3e-4)
+    assert ball.volume == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.01)
+    assert box.volume == pytest.approx(np.prod(SIZE))
+    assert [each.radius for each in robot.envelopes] == [0.06]
+    assert any("base" in note and "visual" in note for note in imported.notes)
+
+
+def test_looks_come_back_from_a_robot_file_and_change_no_robot(imported, tmp_path):
+    write_robot(imported.robot.replace(name="arm"), tmp_path / "arm.yaml")
+    again = load_robot(tmp_path / "arm.yaml")
+    for one, other in zip(imported.robot.visuals, again.visuals, strict=True):
+        assert np.allclose(one.points, other.points, atol=1e-7)
+        assert np.array_equal(one.faces, other.faces)
+    (tmp_path / "out.urdf").write_text(export_urdf(imported.robot, tmp_path / "meshes"))
+    exported = import_urdf(tmp_path / "out.urdf").robot
+    for link in (1, 2):
+        assert surface(exported, link).volume == pytest.approx(surface(imported.robot, link).volume)
+        assert np.allclose(surface(exported, link).bounds, surface(imported.robot, link).bounds, atol=1e-6)
+    assert again == again.replace(visuals=())
+    assert hash(again) == hash(again.replace(visuals=()))
+
+
+def test_pages_get_the_looks_beside_all_shapes_that_are_checked(imported):
+    drawn = drawn_shapes(imported.robot)
+    assert [each["link"] for each in drawn["visuals"]] == [1, 2]
+    (sphere,) = drawn["pieces"]
+    assert sphere["link"] == 1
+    assert np.ptp(sphere["points"], axis=0) == pytest.approx(0.12, abs=0.01)
+    assert drawn_shapes(imported.robot.replace(visuals=()))["visuals"] == []
+
+
+@pytest.mark.parametrize("damage", ["faces: AAA", "faces: ////////", "points_mm: AAAA"])
+def test_a_damaged_surface_is_one_clear_error(imported, tmp_path, damage):
+    key = damage.partition(":")[0]
+    write_robot(imported.robot.replace(name="arm"), tmp_path / "arm.yaml")
+    text = (tmp_path / "arm.yaml").read_text()
+    start = text.index(f"{key}: ", text.index("visuals:"))
+    end = min(at for at in (text.find(mark, start) for mark in (",", "}", "\n")) if at > 0)
+    (tmp_path / "arm.yaml").write_text(text[:start] + damage + text[end:])
+    with pytest.raises(InputError, match=r"visuals.*no triangles"):
+        load_robot(tmp_path / "arm.yaml")
