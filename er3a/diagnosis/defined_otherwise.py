@@ -221,8 +221,8 @@ def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conv
     )
     q, table = joints_of(robot, poses), tables_of(robot)
     steps = np.arange(0, 2 * np.pi, SCAN if robot.joints < MOST_SCANNED else 2 * SCAN)
-    moved = np.array(list(itertools.product(steps, repeat=len(inner))))
-    many = table[np.zeros(len(moved), dtype=int)].with_column("offset", inner, table.offset[:, inner] + moved)
+    turned = np.array(list(itertools.product(steps, repeat=len(inner))))
+    many = table[np.zeros(len(turned), dtype=int)].with_column("offset", inner, table.offset[:, inner] + turned)
 
     def gaps(tables: Tables, shift: Reals, count: int) -> Reals:
         """Differences (H, numbers), in about m, to distances and turns between the first poses; shift (H, 3) of the
@@ -242,7 +242,7 @@ def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conv
     for signs in itertools.product((1.0, -1.0), repeat=robot.joints):
         tables = many.with_column("direction", slice(None), table.direction * np.array(signs))
         size = np.linalg.norm(gaps(tables, np.zeros((len(tables), 3)), SCANNED_AT), axis=1)
-        best = np.argpartition(size, KEPT_OF_SCAN)[:KEPT_OF_SCAN]
+        best = np.argsort(size)[:KEPT_OF_SCAN]
         scanned.append((size[best], tables[best]))
     order = np.argsort(np.concatenate([size for size, _ in scanned]))[: KEPT_OF_SCAN**2]
     tables = join([tables for _, tables in scanned])[order]
@@ -266,15 +266,16 @@ def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conv
         )
     length = SPREAD * max(float(expected_of([r])[1][0]) for r in stated if isinstance(r.quantity, PointCoordinate)) / MM
     tolerances = Tolerances(length, length / LEVER)
-    size = np.abs(gaps(tables, shift, count)).max(axis=1)
-    changed = (tables.direction != table.direction).sum(axis=1) + (
-        np.abs(wrapped(tables.offset - table.offset)) > tolerances.angle
-    ).sum(axis=1)
+    T = frames_of(tables, robot, q)[:, :, -1]
+    at = T[..., :3, 3] + np.einsum("hpij,hj->hpi", T[..., :3, :3], shift)
+    bases = [_placed_on(own, xyz) for own in at]  # distances are the same of an arm and of its mirror image
+    left = [np.linalg.norm(own @ B[:3, :3].T + B[:3, 3] - xyz, axis=1).max() for own, B in zip(at, bases)]
+    moved = np.abs(wrapped(tables.offset - table.offset)) > tolerances.angle
+    changed = (tables.direction != table.direction).sum(axis=1) + moved.sum(axis=1)
     found = []
-    for row in np.lexsort((changed, size > 2 * length))[:KEPT_OF_SCAN].tolist():
+    for row in np.lexsort((changed, np.array(left) > 2 * length))[:KEPT_OF_SCAN].tolist():
         arm = robot_of(tables, row, robot)
-        arm = arm.replace(flange=arm.flange @ translation(*shift[row]))
-        start = arm.replace(base=_placed_on(forward(arm.without_tool(), q)[:, :3, 3], xyz) @ arm.base)
+        start = arm.replace(base=bases[row] @ arm.base, flange=arm.flange @ translation(*shift[row]))
         found.append(_fitted_to(robot, [start], (), stated, tolerances, meets))
     return min((each for each in found if each is not None), key=lambda each: len(each.faults), default=None)
 
