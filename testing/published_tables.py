@@ -93,6 +93,22 @@ QUOTED: dict[str, tuple[Row, ...]] = {
         (0, 90, 0, 0, 1),
         (0, -90, 158, 180, -1),
     ),
+    "KUKA_KR120_R2500_pro": (
+        (0, 0, 675, 0, -1),
+        (350, -90, 0, 0, 1),
+        (1150, 0, 0, -90, 1),
+        (-41, -90, 1000, 0, -1),
+        (0, 90, 0, 0, 1),
+        (0, -90, 215, 180, -1),
+    ),
+    "KUKA_KR210_L150_2": (
+        (0, 0, 750, 0, -1),
+        (350, -90, 0, 0, 1),
+        (1250, 0, 0, -90, 1),
+        (-55, -90, 1500, 0, -1),
+        (0, 90, 0, 0, 1),
+        (0, -90, 230, 180, -1),
+    ),
     "PUMA_560": (
         (0, 0, 0, 0, 1),
         (0, -90, 139.7, 0, 1),
@@ -134,6 +150,9 @@ PAIRS = (
         "rtbdata/xacro/kuka_description/kuka_lbr_iiwa/urdf/lbr_iiwa_14_r820.urdf",
     ),
     Pair(CATALOGUE, "KUKA_KR16_2", "rtbdata/xacro/kuka_description/kuka_kr16/urdf/kr16_2.urdf"),
+    Pair(CATALOGUE, "KUKA_KR120_R2500_pro", "rtbdata/xacro/kuka_description/kuka_kr120/urdf/kr120r2500pro.urdf"),
+    Pair(CATALOGUE, "KUKA_KR210_L150_2", "rtbdata/xacro/kuka_description/kuka_kr210/urdf/kr210l150.urdf"),
+    Pair(TOOLBOX, "Baxter", f"{EXAMPLES}/baxter_description/urdf/baxter.urdf", "left_wrist"),
     Pair(TOOLBOX, "AL5D", "rtbdata/xacro/lynxmotion_al5d_description/urdf/al5d_robot.urdf"),
     Pair(TOOLBOX, "Jaco", f"{EXAMPLES}/kinova_description/robots/kinova.urdf"),
 )

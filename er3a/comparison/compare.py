@@ -496,10 +496,11 @@ def _causes_of_zeros(robot: Robot, b: Mechanism, found: Match, tolerances: Toler
                 return
     if np.abs(np.sin(zeros)).max() > tolerances.angle:
         return  # a turned normal turns zeros by half turns
+    ends = found.layers - int(found.reverses.sum() + (np.abs(zeros) > tolerances.angle).sum())
     rows = [k for k in range(robot.rows) if abs(math.sin(robot.alpha[k])) > tolerances.angle]
     for negated in (*([k] for k in rows), rows):
         alpha = np.where(np.isin(np.arange(robot.rows), negated), -robot.alpha, robot.alpha)
-        if joints_agree(mechanism_of(robot, alpha=alpha), b, tolerances):
+        if joints_agree(mechanism_of(robot, alpha=alpha), b, tolerances, ends):
             names = tuple(f"alpha{k + 1}" for k in negated)
             yield Cause("one_alpha_negated", "a", names) if len(names) == 1 else Cause("all_alphas_negated", "a")
             return

@@ -383,12 +383,13 @@ def is_same_mechanism(one: Mechanism, other: Mechanism, tolerances: Tolerances) 
     return _best_match(one, other, tolerances, may_differ=False) is not None
 
 
-def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
-    """Whether geometry, zeros and directions agree, with all axes and normals the way that both tables have them."""
+def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances, most_layers: int) -> bool:
+    """Whether geometry, zeros and directions agree, with ``most_layers`` of base and flange at most."""
     least = np.where(one.sliding, tolerances.length, tolerances.angle)
     return any(
-        not (found.reverses.any() or (np.abs(found.zeros) > least).any())
-        for found in _settled(one, other, np.ones(len(one.d)), tolerances, may_differ=False)
+        found.layers <= most_layers and not (found.reverses.any() or (np.abs(found.zeros) > least).any())
+        for senses, normals in _likely_senses(one, other, tolerances, may_differ=False)
+        for found in _settled(one, with_senses(other, senses, normals), senses, tolerances, may_differ=False)
     )
 
 

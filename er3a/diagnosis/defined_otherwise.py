@@ -27,6 +27,7 @@ from er3a.comparison.mechanism import (
     wrapped,
 )
 from er3a.diagnosis.faults import (
+    SIDES,
     BaseElsewhere,
     CountedFromGround,
     Fault,
@@ -37,10 +38,11 @@ from er3a.diagnosis.faults import (
     WrongLength,
     WrongLimit,
     WrongOffset,
+    limit_stated,
 )
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.kinematics.forward import forward, frames
-from er3a.kinematics.table_batch import tables_of
+from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import joints_of, predict_tables
 from er3a.references.quantities import (
@@ -52,6 +54,7 @@ from er3a.references.quantities import (
     FlangeTurn,
     Limit,
     PointCoordinate,
+    Pose,
     PoseOutside,
 )
 from er3a.references.reference import Reference, expected_of, quantities_of
@@ -71,6 +74,10 @@ ROUNDS = 8
 STEP = 1e-6
 ROUND_DEG, ROUND_MM = 1e-6, 1e-6
 PARALLEL = 1 - 1e-6
+SCAN = math.pi / 4
+SCANNED_AT = 5  # poses
+KEPT_OF_SCAN = 16
+MOST_SCANNED = 7  # joints
 SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 
 
@@ -86,7 +93,7 @@ class Conventions:
 
 def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) -> Conventions | None:
     """How references define zeros, directions, base and flange of a table otherwise; None if that is not the reason
-    why they are missed, or if they don't state all joint axes.
+    why they are missed, or if they state neither all joint axes nor many poses.
 
     Parameters
     ----------
@@ -97,11 +104,13 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
         return None
     stated = [r for r in references if not isinstance(r.quantity, Limit | PoseOutside)]
     lines = _lines(stated, robot.joints)
-    if lines is None:
-        return None
-    found = (_conventions(robot, stated, lines, meets, finer) for finer in FINER)
-    best = next((each for each in found if each is not None), None)
-    return best and _with_limits(robot, best, references)
+    if lines is not None:
+        found = (_conventions(robot, stated, lines, meets, finer) for finer in FINER)
+        best = next((each for each in found if each is not None), None)
+    else:
+        best = _from_poses(robot, stated, meets)
+    chosen = best and _with_limits(robot, best, references)
+    return chosen if chosen and chosen.faults else None
 
 
 def counted_from_ground(robot: Robot, references: Sequence[Reference], meets: float) -> list[Conventions]:
@@ -154,20 +163,33 @@ def _conventions(
         return None
     later = int(robot.convention == "modified")  # rows of a and alpha are those of the joint behind
     wrong = [(each.column, each.link + later * (each.column != "d")) for each in found.differences]
-    expected, uncertainty = expected_of(stated)
-    quantities = quantities_of(stated)
+    start = _moved(robot, found)
+    for (column, row), each in zip(wrong, found.differences):
+        start = _with_entry(start, column, row, each.other)
+    flips = itertools.product(*([1.0] if sure else [1.0, -1.0] for sure in signed))
+    starts = [start.replace(direction=start.direction * np.array(flip)) for flip in flips]
+    return _fitted_to(robot, starts, wrong, stated, tolerances, meets)
+
+
+def _fitted_to(
+    robot: Robot,
+    starts: Sequence[Robot],
+    wrong: Sequence[tuple[str, int]],
+    stated: Sequence[Reference],
+    tolerances: Tolerances,
+    meets: float,
+) -> Conventions | None:
+    """The start that comes nearest to what is stated, of nearly equal ones that with the fewest directions reversed,
+    fitted; None if something is missed then."""
+    quantities, (expected, uncertainty) = quantities_of(stated), expected_of(stated)
 
     def off(arm: Robot) -> Reals:
         difference = predict_tables(tables_of(arm), arm, quantities)[0] - expected
         return np.asarray(difference / uncertainty)
 
-    start = _moved(robot, found)
-    for (column, row), each in zip(wrong, found.differences):
-        start = _with_entry(start, column, row, each.other)
-    flips = [[1.0] if sure else [1.0, -1.0] for sure in signed]
     tried = []
-    for flip in itertools.product(*flips):
-        arm = _with_flange(start.replace(direction=start.direction * np.array(flip)), stated)
+    for start in starts:
+        arm = _with_flange(start, stated)
         reversed_count = int((arm.direction != robot.direction).sum())
         tried.append((round(float(np.abs(off(arm)).max()), 3), reversed_count, arm))
     least = min(worst for worst, _, _ in tried)
@@ -181,24 +203,121 @@ def _conventions(
         *(_wrong_entry(robot, best, column, row) for column, row in wrong),
         *_differences(robot, best, tolerances),
     )
-    return Conventions(faults, best, left) if faults else None
+    return Conventions(faults, best, left)
+
+
+def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conventions | None:
+    """What :func:`_conventions` finds, without joint axes, of a table whose geometry is right: distances between
+    flanges, and turns between them where orientations are stated, depend on neither base nor (turns) flange. Directions
+    and zeros that give them are scanned in steps of ``SCAN``, and the best fitted."""
+    points, turns = _stated_flanges(stated)
+    poses, inner = list(points), list(range(1, robot.joints - 1))
+    known = 3 * (len(points) + sum(pose in turns for pose in poses)) - 12 - len(inner)
+    if robot.joints > MOST_SCANNED or known < 2 * robot.joints:
+        return None
+    xyz, R = (
+        np.array([points[pose] for pose in poses]),
+        np.array([turns.get(pose, np.full((3, 3), np.nan)) for pose in poses]),
+    )
+    q, table = joints_of(robot, poses), tables_of(robot)
+    steps = np.arange(0, 2 * np.pi, SCAN if robot.joints < MOST_SCANNED else 2 * SCAN)
+    turned = np.array(list(itertools.product(steps, repeat=len(inner))))
+    many = table[np.zeros(len(turned), dtype=int)].with_column("offset", inner, table.offset[:, inner] + turned)
+
+    def gaps(tables: Tables, shift: Reals, count: int) -> Reals:
+        """Differences (H, numbers), in about m, to distances and turns between the first poses; shift (H, 3) of the
+        flange in its own frame."""
+        T = frames_of(tables, robot, q[:count])[:, :, -1]
+        turn = T[..., :3, :3]
+        at = T[..., :3, 3] + np.einsum("hpij,hj->hpi", turn, shift)
+        one, other = np.triu_indices(count, 1)
+        far = np.sqrt(((at[:, one] - at[:, other]) ** 2).sum(axis=2)) - np.linalg.norm(xyz[one] - xyz[other], axis=1)
+        if not turns:
+            return np.asarray(far)
+        flat, stated_flat = turn.reshape(*turn.shape[:2], 9), R.reshape(-1, 9)
+        turned = (flat @ flat.transpose(0, 2, 1) - stated_flat[:count] @ stated_flat[:count].T)[:, one, other]
+        return np.concatenate([far, LEVER * np.nan_to_num(turned)], axis=1)
+
+    scanned = []
+    for signs in itertools.product((1.0, -1.0), repeat=robot.joints):
+        tables = many.with_column("direction", slice(None), table.direction * np.array(signs))
+        size = np.linalg.norm(gaps(tables, np.zeros((len(tables), 3)), SCANNED_AT), axis=1)
+        best = np.argsort(size)[:KEPT_OF_SCAN]
+        scanned.append((size[best], tables[best]))
+    order = np.argsort(np.concatenate([size for size, _ in scanned]))[: KEPT_OF_SCAN**2]
+    tables = join([tables for _, tables in scanned])[order]
+    shift, count, free = np.zeros((len(tables), 3)), len(poses), np.eye(len(inner) + 3)
+    for _ in range(2 * ROUNDS):
+        here = gaps(tables, shift, count)
+        ahead = [
+            gaps(
+                tables.with_column("offset", inner, tables.offset[:, inner] + STEP * row[:-3]),
+                shift + STEP * row[-3:],
+                count,
+            )
+            for row in free
+        ]
+        slopes = np.stack([(each - here) / STEP for each in ahead], axis=2)
+        step = -np.einsum("hkm,hm->hk", np.linalg.pinv(slopes, rcond=1e-6), here)
+        step *= np.minimum(1.0, SCAN / np.abs(step).max(axis=1, keepdims=True))
+        tables, shift = (
+            tables.with_column("offset", inner, tables.offset[:, inner] + step[:, :-3]),
+            shift + step[:, -3:],
+        )
+    length = SPREAD * max(float(expected_of([r])[1][0]) for r in stated if isinstance(r.quantity, PointCoordinate)) / MM
+    tolerances = Tolerances(length, length / LEVER)
+    T = frames_of(tables, robot, q)[:, :, -1]
+    at = T[..., :3, 3] + np.einsum("hpij,hj->hpi", T[..., :3, :3], shift)
+    bases = [_placed_on(own, xyz) for own in at]  # distances are the same of an arm and of its mirror image
+    left = [np.linalg.norm(own @ B[:3, :3].T + B[:3, 3] - xyz, axis=1).max() for own, B in zip(at, bases)]
+    moved = np.abs(wrapped(tables.offset - table.offset)) > tolerances.angle
+    changed = (tables.direction != table.direction).sum(axis=1) + moved.sum(axis=1)
+    found = []
+    for row in np.lexsort((changed, np.array(left) > 2 * length))[:KEPT_OF_SCAN].tolist():
+        arm = robot_of(tables, row, robot)
+        start = arm.replace(base=bases[row] @ arm.base, flange=arm.flange @ translation(*shift[row]))
+        found.append(_fitted_to(robot, [start], (), stated, tolerances, meets))
+    return min((each for each in found if each is not None), key=lambda each: len(each.faults), default=None)
+
+
+def _stated_flanges(stated: Sequence[Reference]) -> tuple[dict[Pose, Reals], dict[Pose, Reals]]:
+    """Positions (3,), m, of the flange by pose, where all coordinates are stated, and rotation matrices."""
+    parts, turns = dict[Pose, dict[str, float]](), dict[Pose, Reals]()
+    for reference in stated:
+        quantity = reference.quantity
+        if isinstance(quantity, PointCoordinate) and quantity.point == "flange":
+            value = float(expected_of([reference])[0][0]) / MM
+            parts.setdefault(quantity.pose, {}).setdefault(quantity.coordinate, value)
+        elif isinstance(quantity, FlangeTurn):
+            turns.setdefault(quantity.pose, np.array(quantity.stated))
+    whole = {pose: np.array([own[c] for c in COORDINATES]) for pose, own in parts.items() if len(own) == 3}
+    return whole, turns
+
+
+def _placed_on(points: Reals, stated: Reals) -> Reals:
+    """The frame (4, 4) that brings points (P, 3) nearest to stated ones [Kabsch, Acta Cryst. A 32 (1976)]."""
+    middle, target = points.mean(axis=0), stated.mean(axis=0)
+    U, _, V = np.linalg.svd((stated - target).T @ (points - middle))
+    T = np.eye(4)
+    T[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
+    T[:3, 3] = target - T[:3, :3] @ middle
+    return T
 
 
 def _with_limits(given: Robot, found: Conventions, references: Sequence[Reference]) -> Conventions:
-    """What was found, with limits as they are stated; those that the robot's file gives otherwise are faults."""
+    """What was found, with limits as they are stated, or as wide as poses that are shown; those that the robot's file
+    gives otherwise are faults."""
     lower, upper, faults = found.corrected.lower.copy(), found.corrected.upper.copy(), list(found.faults)
     source = given.sources.get("limits")
     assumed = source is not None and source.grade == "inferred"
-    for reference in references:
-        quantity = reference.quantity
-        if isinstance(quantity, Limit) and not given.slides[quantity.joint - 1]:
-            stated, uncertainty = (float(each[0]) for each in expected_of([reference]))
-            ends, joint = (lower if quantity.side == "lower" else upper), quantity.joint - 1
-            own = math.degrees(ends[joint])
-            if abs(own - stated) > uncertainty:
-                ends[joint] = math.radians(stated)
-                if not assumed:
-                    faults.append(WrongLimit(joint + 1, quantity.side, own, stated))
+    for joint, side in itertools.product(np.flatnonzero(~given.slides).tolist(), SIDES):
+        ends = lower if side == "lower" else upper
+        own = math.degrees(ends[joint])
+        stated = limit_stated(joint, side, own, references)
+        if stated is not None:
+            ends[joint] = math.radians(stated)
+            if not assumed:
+                faults.append(WrongLimit(joint + 1, side, own, stated))
     return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper), found.left)
 
 

@@ -340,14 +340,14 @@ def limit_repairs(given: Tables, references: Sequence[Reference]) -> list[Repair
     for joint in range(given.a.shape[-1]):
         for side in SIDES:
             now = float(np.degrees(getattr(given, side)[0, joint]))
-            fits = _limit_stated(joint, side, now, references)
+            fits = limit_stated(joint, side, now, references)
             if fits is not None:
                 fault = WrongLimit(joint + 1, side, now, fits)
                 found.append(Repair(fault, _set(side, joint, np.radians(fits)), free=True))
     return found
 
 
-def _limit_stated(joint: int, side: Side, now: float, references: Sequence[Reference]) -> float | None:
+def limit_stated(joint: int, side: Side, now: float, references: Sequence[Reference]) -> float | None:
     """What references say (deg) about a limit that is ``now``; None if they don't contradict it."""
     stated = [r for r in references if r.quantity == Limit(joint + 1, side) and r.expected is not None]
     if stated:

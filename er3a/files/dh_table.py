@@ -154,9 +154,9 @@ def _in_own_units(
     as_printed: bool,
     own: set[str],
 ) -> Iterator[str]:
-    """Take all values to mm and degrees. Lengths that are another unit's, and degrees that were read twice, are
-    refused, or with ``as_printed`` taken for what they are, with a note; so are twists that can only be radians, which
-    are otherwise left as they are, with a note. ``own``: columns that said their unit."""
+    """Take all values to mm and degrees. Lengths that are another unit's are refused, or with ``as_printed`` taken for
+    what they are, with a note; so are twists that can only be radians, which are otherwise left as they are, with a
+    note. Degrees that were converted twice are taken once. ``own``: columns that said their unit."""
     lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
     unit = length_unit or "mm"
     if length_unit is None and lengths and not any(_unit(row) == "mm" for row in rows):
@@ -187,11 +187,8 @@ def _in_own_units(
                 row[column] = value * (DEGREES["rad"] if column in turned else _scale_of(column, unit))
     for row in twice:
         alpha, once = row["alpha_deg"], math.radians(row["alpha_deg"])
-        problem = f"{alpha:g} deg is more than ten turns: it is {once:.6g} deg that were converted twice"
-        if not as_printed:
-            remedy = f"Write {once:.6g}; er3a compare reads it so"
-            raise InputError(path, f"row {row['row']}, column alpha_deg", problem, remedy)
         row["alpha_deg"] = once
+        problem = f"{alpha:g} deg is more than ten turns: read as {once:.6g} deg that were converted twice"
         yield f"row {row['row']}, column alpha_deg: {problem}"
 
 

@@ -434,6 +434,8 @@ SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
 WIDE_DEG = 30.0
 STEP_IN_RADIANS, NEAR_STEP = math.pi / 12, 2e-3  # 15 deg, written with four digits
 LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
+_COORDINATES = LENGTHS[:3]
+LONGEST_ARM = 4.0  # times the farther of both points from the base
 ANGLES = ("lower_deg", "upper_deg", "speed_deg_s")
 
 
@@ -636,6 +638,8 @@ def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
 def _check_angles(path: Path, table: list[Fields]) -> None:
     """Refuse poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
     all_small = max(_sizes(table, [*_POSE, *_FURTHER])) < WIDEST_IN_RADIANS
+    if all_small and _COORDINATES[0] in table[0]:
+        _check_arcs(path, table)
     for fields in table:
         for column in (*_POSE, *(each for each in _FURTHER if fields[each] is not None)):
             steps = fields[column] / STEP_IN_RADIANS
@@ -645,6 +649,21 @@ def _check_angles(path: Path, table: list[Fields]) -> None:
                     problem = f"{fields[column]:g} deg looks like radians"
                     raise InputError(path, where, problem, f"Write {degrees}; {AS_WRITTEN}")
                 suspect(f"{path}: {where}: {fields[column]:g} deg may be radians; those would be {degrees}")
+
+
+def _check_arcs(path: Path, table: list[Fields]) -> None:
+    """Refuse points that move by more than joints that turn so little can move them."""
+    first: dict[tuple[str, str], Fields] = {}
+    whole = [row for row in table if all(row[column] is not None for column in _COORDINATES)]
+    for row in whole:
+        start = first.setdefault((row.get("point", "point"), row["source"]), row)
+        point, other = (np.array([each[column] for column in _COORDINATES]) for each in (start, row))
+        turned = sum(abs((row[column] or 0.0) - (start[column] or 0.0)) for column in (*_POSE, *_FURTHER))
+        moved, longest = np.linalg.norm(other - point), LONGEST_ARM * max(map(np.linalg.norm, (point, other)))
+        if turned and moved > longest * math.radians(turned):
+            where = f"row {row['row']}, columns {_POSE[0]} to {_POSE[-1]}"
+            problem = f"{turned:.4g} deg in all from row {start['row']} can't move the point by {moved:.4g} mm; "
+            raise InputError(path, where, f"{problem}the joint values can only be radians", RADIANS.remedy)
 
 
 def _check_repeats(path: Path, rows: tuple[Row, ...]) -> None:

@@ -11,6 +11,7 @@ import er3a
 from er3a.comparison.compare import best_of
 from er3a.files.by_name import read_arm
 from er3a.formats.urdf_tree import read_chain
+from er3a.geometry.transforms import rot_x
 from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries
 from testing.published_tables import PAIRS, best_alignment_mm, urdf_flange, urdf_path, write_csv
 from testing.readme import README
@@ -120,6 +121,19 @@ def test_a_twist_of_the_wrong_sign_is_named_where_it_only_moves_zeros(row):
     found = er3a.compare(right.replace(alpha=np.where(np.arange(6) == row, -1, 1) * right.alpha), right)
     assert (found.verdict, found.geometry.same) == ("same_arm", True)
     assert [each.entries for each in found.zero.causes] == [(f"alpha{row + 1}",)]
+
+
+def test_a_twist_of_the_wrong_sign_is_named_against_other_frames():
+    right = er3a.to_standard(er3a.load_robot("ur5e"))
+    turned = right.replace(  # the last axis written the other way, as a URDF may have it
+        alpha=right.alpha + np.pi * (np.arange(6) == 4),
+        d=np.where(np.arange(6) == 5, -1, 1) * right.d,
+        direction=np.where(np.arange(6) == 5, -1, 1) * right.direction,
+        flange=rot_x(np.pi) @ right.flange,
+    )
+    assert er3a.compare(right, turned).verdict == "equal"
+    found = er3a.compare(right.replace(alpha=np.where(np.arange(6) == 3, -1, 1) * right.alpha), turned)
+    assert [each.entries for each in (*found.zero.causes, *found.directions.causes)] == [("alpha4",)]
 
 
 def test_a_twist_of_the_wrong_sign_beside_an_offset_is_one_entry():

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere, CountedFromGround, entry_of
+from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere, CountedFromGround, WrongLimit, entry_of
 from er3a.geometry.transforms import rot_z, translation
-from er3a.references.quantities import MM, Limit, PointCoordinate
+from er3a.references.quantities import MM, Limit, PointCoordinate, PoseOutside
 from er3a.references.reference import Reference
-from er3a.references.subjects import JointLimit, PointAtPose
+from er3a.references.subjects import JointLimit, PointAtPose, PoseExcess
 
 
 def other_conventions(robot: er3a.Robot, seed: int) -> er3a.Robot:
@@ -37,6 +37,45 @@ def test_conventions_are_named_whatever_their_number(name, seed):
     q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, 6))
     stated = er3a.forward(right, q)[:, :3, 3] * MM
     assert np.abs(er3a.forward(best.corrected, q)[:, :3, 3] * MM - stated).max() < 1.0
+
+
+def poses_of(arm: er3a.Robot, count: int) -> list[Reference]:
+    """What a pendant shows: flange positions at random joint values, and nothing of the axes."""
+    stated, random = list[Reference](), np.random.default_rng(7)
+    for k in range(count):
+        pose = tuple(np.degrees(random.uniform(arm.lower, arm.upper)).round(2).tolist())
+        x = er3a.forward(arm.without_tool(), np.radians(pose))[:3, 3] * MM
+        for c, value in zip("xyz", x):
+            about = PointAtPose(f"p{k}", "flange", c), "key_poses", PointCoordinate(pose, "flange", c)
+            stated.append(Reference(*about, round(float(value), 3), 0.05, "pendant", "official", "pendant"))
+    return stated
+
+
+@pytest.mark.long
+def test_conventions_are_named_by_poses_alone():
+    right = er3a.load_robot("er3a_c60")
+    offset = right.offset + np.radians([0, 37, -90, 90, 0, 0])
+    wrong = right.replace(offset=offset, direction=right.direction * np.array([1, 1, -1, 1, 1, 1]))
+    best = er3a.diagnose(wrong, poses_of(right, 12))[0]
+    assert best.explains
+    assert all(isinstance(fault, CONVENTIONS) for fault in best.faults)
+    q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, 6))
+    off = er3a.forward(best.corrected, q)[:, :3, 3] - er3a.forward(right.without_tool(), q)[:, :3, 3]
+    assert np.abs(off).max() * MM < 1.0
+    a = wrong.a + np.array([0, 0.03, 0.02, 0, 0, 0])
+    assert not er3a.diagnose(wrong.replace(a=a), poses_of(right, 12))[0].explains
+
+
+def test_poses_that_are_shown_outside_of_limits_are_a_matter_of_limits():
+    right = er3a.load_robot("er3_600")
+    upper = right.upper.copy()
+    upper[2] -= 1.0
+    shown = (PoseOutside(tuple(np.degrees(right.upper).round(3).tolist())), 0.0, 0.001, "manual", "official", "manual")
+    pose = Reference(PoseExcess("p"), "key_poses", *shown)
+    wrong = other_conventions(right, 0).replace(upper=upper)
+    best = er3a.diagnose(wrong, [*er3a.load_references("er3_600").references, pose])[0]
+    assert best.explains
+    assert {type(each) for each in best.faults if not isinstance(each, CONVENTIONS)} == {WrongLimit}
 
 
 @pytest.mark.parametrize(("column", "rows", "amount"), [("a", [1], 0.03), ("alpha", [1, 3], 0.6), ("d", [3], 0.02)])

@@ -101,6 +101,12 @@ def test_a_limit_that_is_not_given_is_kept_as_not_given():
             ["row 2, column q2_deg", "radians", "Write 45"],
         ),
         (
+            "positions.csv",
+            POSITIONS
+            + "one,flange,0.3,0,0,0,0,0,374,0,699.5,0.1,m,cad\ntwo,flange,-0.9,0.2,1.1,0,0,0,0,400,660,0.1,m,cad\n",
+            ["row 3", "can only be radians", "units_checked"],
+        ),
+        (
             "limits.csv",
             LIMITS + "1,-170,170,0.5,m,official\n2,-2.27,1.57,0.5,m,official\n",
             ["row 3", "radians", "Convert"],
