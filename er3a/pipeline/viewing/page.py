@@ -312,6 +312,7 @@ def render(
 
 
 BRACKETS = re.compile(r"(?<=>)(?<!<code>)([^<>()]{1,40}) \(([^<>()]{1,20})\)(?=</t[hd]>)")
+STOPS = re.compile(r"(</(?:a|code|em|strong)>)\.(?=[\s<])")
 BLANKS = re.compile(
     r"(?<=[，。；：！？、])(?:[ \n]+|&nbsp;)(?=[^\s])"  # behind full-width marks
     r"|(?<=[\u4e00-\u9fff]) +(?=[\u4e00-\u9fff])"  # between two characters
@@ -320,8 +321,8 @@ BLANKS = re.compile(
 
 
 def closed_up(html: str) -> str:
-    """A page without the blanks that Chinese does not write, and with its brackets in the heads of tables."""
-    return BRACKETS.sub(r"\1（\2）", BLANKS.sub("", html))
+    """A page without the blanks that Chinese does not write, and with its own brackets and full stops."""
+    return BRACKETS.sub(r"\1（\2）", BLANKS.sub("", STOPS.sub(r"\1。", html)))
 
 
 def led(text: str) -> tuple[str, str]:
