@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -175,6 +176,21 @@ def test_damped_price_is_the_distance_of_the_tool_it_leads_to(results):
     across = np.linalg.norm(tool - np.outer(tool @ along, along), axis=1)
     assert price.distance.max() > 1e-3
     assert price.distance.max() >= across.max() - 1e-9
+
+
+def test_damping_may_ask_more_of_the_joints_than_the_path_does():
+    """Strategies are timed to need no more than the path; damped joints keep its time law, within what they can do."""
+    robot = load_robot("er3a_c60_article")
+    way = line(forward(robot, np.zeros(6)), transform([0.6, 0.3, 0.5], [0, np.pi, 0]), 5.0)  # begins at the singularity
+    followed = follow(robot, way, np.linspace(0, 5, 400))
+    limits = joint_limits(robot, np.radians([180, 180, 180, 360, 360, 360]), 0.25)
+    own = float((np.abs(followed.rates(followed.t)[1]) / limits.speed).max())
+    assert own < 0.5
+    case = singular_segment(followed, NEAR, replace(limits, speed=own * limits.speed), fixed_start=True, allowed=limits)
+    result = compare(case, "damped")[0]
+    assert not result.reasons
+    assert result.cost.max_joint_speed_ratio < 1.01 * own
+    assert result.cost.distance.max() < 1e-4
 
 
 def test_another_branch_is_clear_from_the_start():

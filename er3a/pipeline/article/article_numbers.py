@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import kendalltau
 
+from er3a.comparison.compare import compare
 from er3a.dynamics.torques import gravity
 from er3a.geometry.transforms import rotation_angle, rpy_of, transform
 from er3a.kinematics.forward import forward, frames, jacobian
@@ -118,6 +119,10 @@ class ArticleNumbers:
     missed_after_mm: float
     literal_rise_mm: float
     shifted_apart_mm: float
+    off_zero_mm: float
+    off_documented_mm: float | None
+    off_anywhere_mm: float | None
+    off_aligned_mm: float | None
     holding_nm: float | None
     holding_loaded_nm: float | None
     reach: ReachCheck | None
@@ -207,6 +212,7 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     trajectory: TrajectorySummary = _summary(results, tables.printed, "trajectory")
     workspace: WorkspaceSummary = _summary(results, tables.printed, "workspace")
     printed, corrected, real = (_table(study, results, name) for name in tables.names)
+    compared = compare(robot, study.robot(tables.real))
     hypothesis = next(found for found in validation.diagnoses if found.reference_set == STATEMENTS).hypotheses[0]
     fault = hypothesis.faults[0]
     literal = _points(robot.replace(convention="modified"), _turned(robot, 0))
@@ -239,6 +245,10 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
         missed_after_mm=hypothesis.residual_after,
         literal_rise_mm=float(1000 * np.ptp(literal[:, 2])),
         shifted_apart_mm=float(1000 * shifted.max()),
+        off_zero_mm=float(np.linalg.norm(np.subtract(printed.tool_mm, real.tool_mm))),
+        off_documented_mm=max((each.described.mismatch_mm for each in validation.sets if each.described), default=None),
+        off_anywhere_mm=compared.as_printed_mm,
+        off_aligned_mm=compared.aligned_mm,
         holding_nm=_holding_nm(study.robot(tables.real), study.seed, None),
         holding_loaded_nm=_holding_nm(study.robot(tables.real), study.seed, Load(PAYLOAD_KG)),
         reach=_reach_check(validation, tables.real),

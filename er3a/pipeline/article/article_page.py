@@ -382,7 +382,7 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
         parts["instead_boundary"] = tr("No drawing of this arm was found, and this study knows no reach of it.")
     else:
         parts |= {"reach_known_mm": reach.known_mm, "reach_printed_mm": reach.printed_mm}
-    parts |= {key: np.nan for key in ("holding_nm", "holding_loaded_nm") if parts[key] is None}
+    parts |= {key: np.nan for key, value in parts.items() if value is None and key.endswith(("_mm", "_nm"))}
     listed = {"gain": numbers.wrist_gain, "wrist_shift": numbers.wrist_shift_mm}
     listed |= {"zyz": numbers.printed.example_zyz_deg, "quaternion": numbers.printed.example_quaternion}
     parts |= {f"{name}_{k}": value for name, values in listed.items() for k, value in enumerate(values)}

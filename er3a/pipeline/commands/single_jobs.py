@@ -15,6 +15,7 @@ from er3a.pipeline.commands.options import (
     DEFAULT_RESULTS,
     DEFAULT_STUDY,
     JOBS,
+    ROBOT_FILES,
     Reports,
     Results,
     RobotName,
@@ -110,7 +111,7 @@ def report(
     write_checksum(page)
 
 
-@app.command(rich_help_panel=JOBS)
+@app.command(rich_help_panel=ROBOT_FILES)
 def teach(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study, or a table or URDF")],
     study: StudyFile = DEFAULT_STUDY,
@@ -175,7 +176,7 @@ def article(
     results: Results = DEFAULT_RESULTS,
     reports: Reports = DEFAULT_REPORTS,
 ):
-    """Write the page on the article of a study that names its tables, in every language, and its numbers."""
+    """Write the page on the article from results; `er3a run --study config/article.yaml` computes these too."""
     from er3a.pipeline.article.article_page import write_article
     from er3a.pipeline.results import write_checksum
 

@@ -9,6 +9,7 @@ from er3a.collision.pairs import (
     BASE,
     TRIED,
     CarriedAndLink,
+    CarriedAndSolid,
     LinkAndSolid,
     LinkPair,
     PairsUnexamined,
@@ -107,12 +108,17 @@ def _(found: LinkPair) -> str:
 
 @say.register
 def _(found: LinkAndSolid) -> str:
-    return say_as(found, link=_link(found.link))
+    return say_as(found, link=_link(found.link), solid=own_title(found.solid))
 
 
 @say.register
 def _(found: CarriedAndLink) -> str:
-    return say_as(found, link=_link(found.link))
+    return say_as(found, link=_link(found.link), carried=own_title(found.carried))
+
+
+@say.register
+def _(found: CarriedAndSolid) -> str:
+    return say_as(found, carried=own_title(found.carried), solid=own_title(found.solid))
 
 
 @say.register

@@ -53,7 +53,7 @@ def headline(found: Comparison) -> str:
     if found.verdict == "equal":
         return text
     return tr(
-        "{verdict} (tool up to {printed:.1f} mm off as printed; after alignment {aligned:.4g} mm)",
+        "{verdict} (at the worst joint angles the tool is {printed:.1f} mm off as printed, {aligned:.4g} mm aligned)",
         verdict=text,
         printed=found.as_printed_mm,
         aligned=found.aligned_mm,

@@ -11,7 +11,7 @@ from er3a.pipeline.messages.say import joined, word
 # Words of the lists in which a reader of the report chooses pages; the workflow's rules use them.
 PAGE, INDEX, ALL_ROBOTS = N_("page"), N_("index"), N_("All robots")
 TEACH_PANEL, COMPARISON = N_("teach panel"), N_("two robots side by side")
-ARTICLE = N_("the article, sentence by sentence")
+ARTICLE = N_("the article, item by item")
 FOUNDATIONS: Mapping[str, str] = {
     "fail": N_("Never use this table: evidence contradicts it. These results hold for the table, not for the robot."),
     "caution": N_("Validation leaves part of this D-H table open: these results are only as good as the table."),
@@ -25,6 +25,21 @@ GRADE_NAMES = {
     "export": N_("export"),
     "claim": N_("claim"),
     "inferred": N_("inferred"),
+}
+GROUP_NAMES = {  # of a robot file
+    "dh": N_("D-H table"),
+    "zero": N_("zero pose and directions"),
+    "limits": N_("limits"),
+    "speeds": N_("joint speeds"),
+    "coupling": N_("coupling"),
+    "base": N_("base"),
+    "flange": N_("flange"),
+    "tool": N_("tool"),
+    "envelopes": N_("shapes of links"),
+    "inertia": N_("masses"),
+    "drives": N_("drives"),
+    "wrist_load": N_("wrist load"),
+    "weight": N_("weight"),
 }
 GLOSSARY = {
     N_("branch"): N_("one choice of shoulder, elbow and wrist among the joint angles that bring the tool to a pose"),

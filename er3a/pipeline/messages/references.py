@@ -127,8 +127,8 @@ TEXTS = texts(
         ),
         "time_joint": "time a long turn of joint {joint} at full speed, to ±{half_width_deg_s:g} deg/s",
         "not_the_robot_described": (
-            "This is not the robot that these describe: {against:; }. Positions differ by up to {mismatch_mm:.0f} mm; "
-            "the best of {tried} corrections at one or two places still leaves {left_mm:.1f} mm."
+            "This is not the robot that these describe: {against:; }. Positions that they give differ by up to "
+            "{mismatch_mm:.0f} mm; the best of {tried} corrections at one or two places still leaves {left_mm:.1f} mm."
         ),
         "measure_angle#offset": (
             "measure the angle {own_entry} of joint {joint} at the zero mark, to ±{half_width:g} deg"

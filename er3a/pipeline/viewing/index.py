@@ -546,7 +546,7 @@ def _places(study: Study, folder: Path) -> Iterator[tuple[str, str, list[str]]]:
         f"{name}/{stage}.html": f"{own_title(study.robot(name).title)}: {tr(PAGES[stage])}" for name, stage in pages
     }
     if study.article:
-        named["article.html"] = tr("The article, sentence by sentence")
+        named["article.html"] = tr("The article, item by item")
     for address, title in named.items():
         if (folder / address).is_file():
             parser = _PlacesOfPage()

@@ -30,7 +30,7 @@ from er3a.files.shipped import INSTALLED, ROOT, view_command
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
-from er3a.pipeline.messages.pages import GRADE_NAMES, Caveat, caveat, glossary
+from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, say, say_all, word
 from er3a.pipeline.results import Provenance, Stored, read_stage, read_status
 from er3a.pipeline.stages.registry import STAGES
@@ -290,6 +290,7 @@ def render(
         "led": led,
         "linked": linked,
         "grade": partial(word, "grade", GRADE_NAMES),
+        "group": partial(word, "group", GROUP_NAMES),
     }
     html = environment.get_template(template.name).render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
@@ -312,6 +313,8 @@ def render(
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
 
 
+BRACKETS = re.compile(r"(?<=>)(?<!<code>)([^<>()]{1,40}) \(([^<>()]{1,20})\)(?=</t[hd]>)")
+STOPS = re.compile(r"(</(?:a|code|em|strong)>)\.(?=[\s<])")
 BLANKS = re.compile(
     r"(?<=[，。；：！？、])(?:[ \n]+|&nbsp;)(?=[^\s])"  # behind full-width marks
     r"|(?<=[\u4e00-\u9fff]) +(?=[\u4e00-\u9fff])"  # between two characters
@@ -320,8 +323,8 @@ BLANKS = re.compile(
 
 
 def closed_up(html: str) -> str:
-    """A page without the blanks that Chinese does not write."""
-    return BLANKS.sub("", html)
+    """A page without the blanks that Chinese does not write, and with its own brackets and full stops."""
+    return BRACKETS.sub(r"\1（\2）", BLANKS.sub("", STOPS.sub(r"\1。", html)))
 
 
 def led(text: str) -> tuple[str, str]:

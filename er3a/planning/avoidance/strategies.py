@@ -67,7 +67,7 @@ Row = tuple[float, float, float, float]
 
 
 def damped(segment: SingularSegment) -> Avoidance | NotPossible:
-    """Follow the path on its own time law, with the least damping that keeps the joints within their limits.
+    """Follow the path on its own time law, with the least damping that keeps the joints within what they can do.
 
     Where no damping bounds the accelerations too, it is the least that bounds the speeds.
     """
@@ -77,7 +77,7 @@ def damped(segment: SingularSegment) -> Avoidance | NotPossible:
     t = np.linspace(0.0, line.duration, STEPS + 1)
     T = line.poses(line.progress(t)[0])
     runs = [_run(segment, t, T, damping) for damping in DAMPINGS]
-    ratios = np.array([motion.ratios(segment.limits) for motion in runs])
+    ratios = np.array([motion.ratios(segment.allowed or segment.limits) for motion in runs])
     held = np.flatnonzero((ratios <= 1.0).all(axis=1))
     if not held.size:
         held = np.flatnonzero(ratios[:, 0] <= 1.0)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion, Weight
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.program_check.program_check_findings import Level, MotionCollides
@@ -26,7 +26,8 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
         for line, level, t0, t1 in stretches(rows):
             told = tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";"))
             events.append(PlayedEvent(t0, t1, told, WEIGHTS[level], touching(program, line)))
-        motions.append(PlayedMotion(program.name, program.title, rows.t_s, np.radians(rows.q_deg), events))
+        q = np.radians(rows.q_deg)
+        motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=own_title(program.title)))
     return motions
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.ticker import MaxNLocator
 
 from er3a.files.hand_eye_file import HandEyeFile, grey_image
@@ -13,7 +14,7 @@ from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.language import N_, tr, with_unit
+from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.messages.vision import (
     DIRECTION_STATUS,
@@ -378,7 +379,8 @@ def _overview(each: ObjectResult) -> list[str]:
     else:
         outcome, success = say(each.refusal), tr("none")
     counts = tr("{poses} poses, {solutions} solutions", poses=each.poses, solutions=each.solutions)
-    return [each.name, _listed(each.xyz_mm), outcome, success, counts]
+    name = Markup("{}<br><small>{}</small>").format(each.name, own_title(each.note)) if each.note else each.name
+    return [name, _listed(each.xyz_mm), outcome, success, counts]
 
 
 def _grasp(each: ObjectResult) -> list[str]:
