@@ -194,8 +194,8 @@ def shortly(value: Any) -> str:
     if isinstance(value, float):
         return ABSENT if math.isnan(value) else f"{round(value, 9) + 0.0:.6g}"
     if is_dataclass(value) and not isinstance(value, type) and hasattr(value, "code"):
-        told = [f"{each.name}={shortly(getattr(value, each.name))}" for each in fields(value) if each.name != "code"]
-        return _cut(value.code + (f" ({', '.join(told)})" if told else ""))
+        values = [f"{each.name}={shortly(getattr(value, each.name))}" for each in fields(value) if each.name != "code"]
+        return _cut(value.code + (f" ({', '.join(values)})" if values else ""))
     if isinstance(value, tuple | list):
         return _cut(", ".join(shortly(each) for each in islice(value, MOST_ROWS)) or ABSENT)
     return _cut(str(value))

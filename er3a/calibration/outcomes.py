@@ -41,7 +41,7 @@ class NotToldApart:
 
 @dataclass(frozen=True)
 class SetsScale:
-    """No length was measured, so that the longest keeps its value, and all others are told beside it."""
+    """No length was measured, so that the longest keeps its value, and all others are given beside it."""
 
     entry: str
     code: Literal["sets_scale"] = "sets_scale"

@@ -110,7 +110,7 @@ class JointErrors(ByValue):
 
     Attributes
     ----------
-    robot : by whose table (the uncorrected one) heights are told
+    robot : by whose table (the uncorrected one) heights are computed
     terms : which; coefficients : (c,) of all, in order
     """
 

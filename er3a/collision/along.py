@@ -201,7 +201,7 @@ def clearance_along(
     at = np.array(sorted(time for time, found in motion.known.items() if not np.isnan(found).any()))
     at = np.union1d(at, shown[~np.isin(shown, at)])
     unknown = np.full(len(every), np.nan)
-    rows = bodies.told(np.array([motion.known.get(time, unknown) for time in at]))
+    rows = bodies.counted(np.array([motion.known.get(time, unknown) for time in at]))
     blind = np.asarray(np.isnan(rows).any(axis=1) | np.isinf(rows).all(axis=1))
     distance = np.where(blind, np.nan, rows.min(axis=1))
     pair = tuple(None if b else bodies.pairs[int(np.argmin(row))] for b, row in zip(blind, rows))
@@ -248,7 +248,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
     bodies = motion.bodies
-    best = min(float(bodies.told(motion.known[times[i]]).min()) for i in known)
+    best = min(float(bodies.counted(motion.known[times[i]]).min()) for i in known)
     waiting = [(a, b, every) for a, b in pairwise(known)]
     while waiting:
         a, b, pairs = waiting.pop()
@@ -263,7 +263,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
         pairs = pairs[~free]
         middle = int(np.clip(np.searchsorted(way[a : b + 1].sum(axis=1), way[[a, b]].sum() / 2) + a, a + 1, b - 1))
         found = motion.measure(times[middle], q[middle], pairs)
-        least = float(np.nanmin(bodies.told(found)))
+        least = float(np.nanmin(bodies.counted(found)))
         if least < best:
             best = least
             motion.measure(times[middle], q[middle], every)

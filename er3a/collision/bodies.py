@@ -113,8 +113,8 @@ class Bodies:
         """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for points of one arm."""
         return self.nearest(ends, pairs)[0]
 
-    def told(self, distances: Reals) -> Reals:
-        """Distances (..., P) as they are told: infinite for joined pairs that don't overlap."""
+    def counted(self, distances: Reals) -> Reals:
+        """Distances (..., P) as they are counted: infinite for joined pairs that don't overlap."""
         return np.where(self.joined & (distances > 0), np.inf, distances)
 
     def nearest(self, ends: Reals, pairs: Integers) -> tuple[Reals, Reals]:
@@ -134,7 +134,7 @@ class Bodies:
         measure(self.layout, q, np.empty((0, 0)), least, pair, deep)
         every = np.arange(len(self.pairs))
         for row in np.flatnonzero(deep):
-            distances = self.told(self.distances(self.ends(q[row]), every))
+            distances = self.counted(self.distances(self.ends(q[row]), every))
             pair[row] = int(distances.argmin())
             least[row] = distances[pair[row]]
         return least, pair

@@ -74,11 +74,11 @@ def deciding_measurement(tables: Tables, robot: Robot) -> NextMeasurement | None
     points = flanges[..., :3, 3] * MM
     apart = np.linalg.norm(points[:, None] - points[None, :], axis=-1)
     pairs = np.triu_indices(len(tables), 1)
-    told = (apart[pairs] > APART_MM).mean(axis=0)
-    best = int(np.lexsort((-apart[pairs].max(axis=0), -told))[0])
-    if told[best] > 0:
+    share = (apart[pairs] > APART_MM).mean(axis=0)
+    best = int(np.lexsort((-apart[pairs].max(axis=0), -share))[0])
+    if share[best] > 0:
         pose = cast(Pose, tuple(poses[best].tolist()))
-        return FlangePositionDecides(pose, float(told[best]), float(apart[pairs][:, best].max()))
+        return FlangePositionDecides(pose, float(share[best]), float(apart[pairs][:, best].max()))
     for side in SIDES:
         column = tables.lower if side == "lower" else tables.upper
         joints = np.flatnonzero(np.ptp(column, axis=0) > APART_RAD)

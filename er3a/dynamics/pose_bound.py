@@ -19,7 +19,7 @@ value over a product of triangles at a corner of it, so nowhere in a box is ther
 The pose of an arm within its limits at which something is greatest, for several objectives at once.
 
 From evenly spread poses the best few are climbed: one joint after another is set to the best of a grid over its whole
-range, which is then refined about it. The outcome is the greatest found: :mod:`er3a.dynamics.pose_bound` tells how much
+range, which is then refined about it. The outcome is the greatest found: :mod:`er3a.dynamics.pose_bound` says how much
 more there can be.
 """
 

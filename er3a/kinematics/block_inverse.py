@@ -179,7 +179,7 @@ def solve_blocks(
     ----------
     joints : direction, offset, lower and upper limits (6,)
     out : fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
-        NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) tells
+        NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) says
         which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
     """
     q, valid, within, rigid, marked = out

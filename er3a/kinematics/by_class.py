@@ -157,7 +157,7 @@ def class_rows(robot: Robot, T: Reals, values: Reals) -> ClassRows:
 
 
 def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, certainty: int) -> Settled:
-    """Solutions of one pose (4, 4) told apart into those alone and self-motions.
+    """Solutions of one pose (4, 4), divided into isolated ones and self-motions.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def slots_of_class(
     settled: dict[int, Settled] = {}
     if not settling:
         return ClassSlots(q, inside, certainty, settled)
-    alone = not solver.chain.parameters  # self-motions of redundant arms are told by `all_motions`
+    alone = not solver.chain.parameters  # self-motions of redundant arms come from `all_motions`
     for n in np.flatnonzero(certainty != CERTAIN).tolist() if alone else ():
         own = q_ref[0 if len(q_ref) == 1 else n]
         rows = unwound(robot, q[n])
@@ -335,7 +335,7 @@ def slots_of_class(
 def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tuple[Reals, Flags, Integers]) -> None:
     """Put references that solve their poses to rounding in a slot where no row is them.
 
-    Next to two singularities a pose does not tell all joints to rounding, and a row that it gives instead of the
+    Next to two singularities a pose does not determine all joints to rounding, and a row that it gives instead of the
     arm's own can lie beyond a limit. The slot is that of the row nearest to the reference if that is near, else one
     that is empty, else the nearest. ``numbers`` (k,) are the poses looked at; ``found`` rows (N, S, n), which of them
     are within the limits (N, S), and certainty (N,).

@@ -76,7 +76,7 @@ def row_values(robot: Robot, q: Reals) -> Reals:
 def moving_tip(links: Reals, sliding: Flags | None = None) -> tuple[int, Reals]:
     """The outermost joint (from 0) that moves the tool point, and the point (3,), m, in that joint's moving frame.
 
-    ``sliding`` (m,) tells the joints that slide, which move every point; None: none does.
+    ``sliding`` (m,) marks prismatic joints, which move every point; None: all are revolute.
     """
     last, tip = len(links) - 2, links[-1, :3, 3]
     while last > 0 and np.hypot(tip[0], tip[1]) <= ON_AXIS and not (sliding is not None and sliding[last]):

@@ -194,7 +194,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
-    """Whether the class has told all solutions of poses (N,) in so far as it is certain of them (N,)."""
+    """Whether the class found all solutions of poses (N,), of which it is so certain (N,)."""
     solver = arm_solver(robot).chain
     closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
     return np.asarray((certainty == CERTAIN) | closed)

@@ -24,7 +24,7 @@ SAME_TURN, COVERS = 1e-6, 1e-6
 class SelfMotionCurve(ByValue, Displayed):
     """A part of a curve of solutions of one pose: joints move with the tool at rest.
 
-    Its members are told by a parameter t (rad), which is the summed length of the joint moves from q0 on.
+    Its members have a parameter t (rad), which is the summed length of the joint moves from q0 on.
 
     Attributes
     ----------

@@ -7,7 +7,7 @@ parallel axes 2, 3 and 4: there the wrist centre is where axes 5 and 6 meet, and
 
 Along a motion any arm is singular where its Jacobian loses rank. Columns of joints that slide, and linear rows, are
 scaled by the arm's length. With six joints the determinant changes sign where the motion crosses the singular set. With
-more, or fewer, rank loss is told by the smallest singular value. Between two samples nothing is missed: turning joint j
+more, or fewer, rank loss is judged by the smallest singular value. Between two samples nothing is missed: turning joint j
 by d changes the scaled Jacobian by at most ``B_j d`` in norm, and no singular value by more [3]_, so an interval whose
 ends have larger ones than its joints' travel can take away is clear; others are halved. Axes are named by the smallest
 set of columns that are dependent there.
@@ -188,7 +188,7 @@ def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
 DEPENDENT = 1e-6  # smallest singular value of columns that count as dependent, relative to that of the event
 SHORTEST, EDGE = 1e-9, 1e-4  # shares of the motion
 MOST_SAMPLES = 200_000
-TRAVEL = 1.5  # joints' travel inside an interval, over what its ends tell, where no speeds are given
+TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,7 @@ def rank_losses(
     joints : joint values (k, n) at times (k,) within reach
     threshold : of the smallest singular value of :func:`scaled_jacobian`
     speed : (n,), greatest joint speeds of the motion, rad/s or m/s, with which nothing between samples is missed; None:
-        as the samples tell, times 1.5
+        as the samples show, times 1.5
     """
     found: list[RankLoss] = []
     for first, last in runs(np.isfinite(q[:, 0])):
@@ -339,7 +339,7 @@ def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals
 def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
     """Numbers (from 1) of the fewest axes whose columns are nearly dependent at joint values (n,).
 
-    Of all sets of as many axes the one with the smallest singular value is told; a larger set only if its value is
+    Of all sets of as many axes the one with the smallest singular value is named; a larger set only if its value is
     clearly smaller. Empty for arms with a single joint.
     """
     J = scaled_jacobian(robot, q)

@@ -254,7 +254,7 @@ Unsolved = SideUnsolved | PoseUnsolved
 class Solutions(ByValue, Displayed):
     """Joint solutions of one pose (``inverse``) or of many (``inverse_batch``, ``solve``).
 
-    What is told of each solution has the leading axes of ``q``: (k,) from ``inverse``; (N, S) from ``inverse_batch``,
+    What is known of each solution has the leading axes of ``q``: (k,) from ``inverse``; (N, S) from ``inverse_batch``,
     one slot for each branch, S by the arm's class; those of the poses from ``solve``, one arm for each.
 
     Attributes

@@ -72,12 +72,12 @@ def lines_of(checked: CheckedFile, verdicts: bool = False) -> list[str]:
     """``file:line: level: message [code]``, one line to a finding, and on request one to each motion."""
     if checked.check is None:
         return [_error_line(checked)]
-    told = [(each.place, _finding_line(each)) for each in checked.check.findings]
+    lines = [(each.place, _finding_line(each)) for each in checked.check.findings]
     if verdicts:
         of_what = " of assumed shapes" if checked.check.shapes else ""
-        told += [(each.place, _verdict_line(each, of_what)) for each in checked.check.verdicts]
-        told.sort(key=lambda pair: (shown(pair[0].file), pair[0].line))
-    return [text for _, text in told]
+        lines += [(each.place, _verdict_line(each, of_what)) for each in checked.check.verdicts]
+        lines.sort(key=lambda pair: (shown(pair[0].file), pair[0].line))
+    return [text for _, text in lines]
 
 
 def _error_line(checked: CheckedFile) -> str:
@@ -255,8 +255,8 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
         lines = each.check.execution.program.lines
         for one in each.check.findings:
             rules.setdefault(one.finding.code, one.level)
-            told = (one.finding.code, one.level, _message(one))
-            results.append(_result(told, one.place, _line_text(one.place, each.file, lines), seen, one.calls))
+            finding = (one.finding.code, one.level, _message(one))
+            results.append(_result(finding, one.place, _line_text(one.place, each.file, lines), seen, one.calls))
     driver = {
         "name": "er3a check-program",
         "version": __version__,
@@ -292,13 +292,13 @@ def _message(one: LocatedFinding) -> str:
 
 
 def _result(
-    told: tuple[str, Level, str],
+    finding: tuple[str, Level, str],
     place: Place,
     line_text: str,
     seen: dict[str, int],
     calls: tuple[Place, ...] = (),
 ) -> dict[str, Any]:
-    code, level, text = told
+    code, level, text = finding
     print_of = hashlib.sha256(
         "\n".join((code, _uri_from_here(place.file), place.element, line_text)).encode()
     ).hexdigest()[:32]

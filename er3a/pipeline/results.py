@@ -259,7 +259,7 @@ class NotComputed:
 
 @dataclass(frozen=True, eq=False)
 class AbsentResults(Results[Summary]):
-    """In place of the results of a stage that was not computed; its verdict is a finding that tells why."""
+    """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 
 
 def write_results(folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any]) -> None:

@@ -308,7 +308,7 @@ class Followed(ByValue, Displayed):
         T = self.line.poses(progress)
         q = self._nearest(solve_slots(robot, T, q_ref)[0], q_ref, self.slot[left], self.slot[right])
         q[~known] = np.nan
-        if parallel_axes_arm(robot) is not None:  # the reference has told what is free
+        if parallel_axes_arm(robot) is not None:  # the reference has chosen what is free
             return q
         factors = determinant_factors(robot, q)
         on_axis = np.abs(factors.shoulder) < FREE_SHOULDER

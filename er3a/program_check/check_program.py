@@ -364,7 +364,7 @@ def _with_joint_moves(
 
 
 def _which(finding: CheckFinding) -> str:
-    """What tells findings of one code at one instruction apart."""
+    """What distinguishes findings of one code at one instruction."""
     names = ("joint", "type", "name", "text", "condition", "kind", "mass_kg")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 

@@ -32,7 +32,7 @@ class TargetNotGiven:
 
 @dataclass(frozen=True)
 class FrameNotGiven:
-    """A tool or base is known by its name alone; ``needed`` if the motion can't be told without it."""
+    """A tool or base is known by its name alone; ``needed`` if the motion can't be placed without it."""
 
     name: str
     frame: Literal["tool", "base"]

@@ -233,7 +233,7 @@ def _branch_not_met(target: PoseTarget, joint: bool) -> CheckFinding:
     return ConfigurationNotMet(shown, "target" if joint else "line")
 
 
-MOST_REASONS = 1000  # targets out of reach for which it is told why
+MOST_REASONS = 1000  # targets out of reach whose reasons are looked for
 
 
 def target_findings(
@@ -248,28 +248,28 @@ def target_findings(
     first: dict[Hashable, int] = {}
     for number in motions:
         first.setdefault(keys[number], number)
-    told: dict[int, tuple[CheckFinding, ...]] = {}
+    findings: dict[int, tuple[CheckFinding, ...]] = {}
     poses: dict[int, list[tuple[int, PlacedMotion]]] = defaultdict(list)
     for number in first.values():
         placed = arms.placed(motions[number])
         target = placed.motion.target
         if isinstance(target, JointTarget):
             known = np.where(np.isnan(target.joints), placed.arm.lower, target.joints)
-            told[number] = limit_findings(placed.arm, known)
+            findings[number] = limit_findings(placed.arm, known)
         elif not isinstance(target, PoseTarget) or placed.base is None or placed.missing:
-            told[number] = goal_of(placed, target, None).findings
+            findings[number] = goal_of(placed, target, None).findings
         elif closed_form_missing(placed.arm) is None and placed.arm.coupling is None:  # others take too long
             poses[id(placed.arm)].append((number, placed))
     for group in poses.values():
-        told |= _of_poses(group)
-    looked = [number for number in motions if first[keys[number]] in told]
-    return len(looked), {number: found for number in looked if (found := told[first[keys[number]]])}
+        findings |= _of_poses(group)
+    looked = [number for number in motions if first[keys[number]] in findings]
+    return len(looked), {number: found for number in looked if (found := findings[first[keys[number]]])}
 
 
 def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[CheckFinding, ...]]:
     """Findings of targets that are poses, of one arm."""
     arm = group[0][1].arm
-    told: dict[int, tuple[CheckFinding, ...]] = {number: () for number, _ in group}
+    findings: dict[int, tuple[CheckFinding, ...]] = {number: () for number, _ in group}
     try:
         found = inverse_batch(arm, np.stack([_pose(placed) for _, placed in group]))
     except PoseError:  # one of them is no pose
@@ -280,12 +280,12 @@ def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[CheckFin
     for i in np.flatnonzero(~inside).tolist():
         number, placed = group[i]
         if found.solved[i].any():
-            told[number] = limit_findings(arm, found.q[i, int(away[i].argmin())])
+            findings[number] = limit_findings(arm, found.q[i, int(away[i].argmin())])
         elif (reasons := reasons + 1) <= MOST_REASONS:
-            told[number] = goal_of(placed, placed.motion.target, None).findings
+            findings[number] = goal_of(placed, placed.motion.target, None).findings
         else:
-            told[number] = (TargetOutOfReach(()),)
-    return told
+            findings[number] = (TargetOutOfReach(()),)
+    return findings
 
 
 def _pose(placed: PlacedMotion) -> Reals:
@@ -505,7 +505,7 @@ def zone_clearance(
         bent, lasting = (bend, bend) if patch is None else patch.bend(at, triangle)
         proven = bool(np.isfinite(bent).all())
         off = per_joint @ bent if proven else np.full(len(every), np.inf)
-        distances = bodies.told(bodies.distances(bodies.ends(middle), every))
+        distances = bodies.counted(bodies.distances(bodies.ends(middle), every))
         measured += 1
         worst = int(np.argmin(distances))
         least = min(least, float(distances[worst]))
@@ -516,7 +516,7 @@ def zone_clearance(
         if not open_.any():
             continue
         if measured >= most or (proven and (open_ & (nearer < np.maximum(per_joint @ lasting, tolerance))).any()):
-            settled = False  # smaller parts would not tell more
+            settled = False  # smaller parts would show no more
             if measured >= most:
                 break
             continue
@@ -792,12 +792,12 @@ class StepChecker:
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, way))
         if any(isinstance(each, WayOutOfReach) for each in way.findings):
             findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
-        told = (*findings, *way.findings)
+        seen = (*findings, *way.findings)
         target = placed.motion.target
         if isinstance(target, PoseTarget) and target.branch is not None and way.end is not None:
             arrived = target.branch.met(way.arm, way.end[None])[0]
-            told += () if arrived else (_branch_not_met(target, joint=False),)
-        return self._measured(CheckedMotion(kind, placed, before, way, way.end, told, moments=way.moments))
+            seen += () if arrived else (_branch_not_met(target, joint=False),)
+        return self._measured(CheckedMotion(kind, placed, before, way, way.end, seen, moments=way.moments))
 
     def _via(self, placed: PlacedMotion, before: Reals) -> Reals | None:
         """The arc's point (3,), m."""
@@ -928,7 +928,7 @@ def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
 
 
 def _as_written(q: Reals) -> Reals:
-    """Joint angles (..., n) in rad, rounded to 0.001 deg, as they are told."""
+    """Joint angles (..., n) in rad, rounded to 0.001 deg, as reports state them."""
     found: Reals = np.radians(np.round(np.degrees(q), 3))
     return found
 

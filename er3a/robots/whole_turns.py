@@ -142,12 +142,12 @@ def nearest_rows(
     """
     turns = whole_turns(robot)
     found, fits = q.copy(), np.zeros(len(q), dtype=bool)
-    told = np.isfinite(q).all(axis=1)
+    solved = np.isfinite(q).all(axis=1)
     beyond = np.full(len(turns.lines), np.inf)
     beyond[: robot.joints] = 0.5 * np.abs(turns.steps).sum(axis=1)
     tries = [(widened, np.zeros(len(beyond))) for widened in (WIDENED if robot.continuous.any() else WIDENED[:1])]
     for widened, away in tries if turns.each else [*tries, (1.0, beyond)]:
-        left = np.flatnonzero(told & ~fits)
+        left = np.flatnonzero(solved & ~fits)
         lower, upper = _windows(robot, q_ref[left], widened)
         if around is not None:
             lower, upper = lower - around[0][left], upper - around[1][left]

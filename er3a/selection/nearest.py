@@ -118,7 +118,7 @@ class NoSolution:
 
 @dataclass(frozen=True)
 class AllOutsideLimits:
-    """All solutions leave the limits; told of the one that does so least."""
+    """All solutions leave the limits; stated of the one that does so least."""
 
     count: int
     branch: int
@@ -129,7 +129,7 @@ class AllOutsideLimits:
 
 @dataclass(frozen=True)
 class AllCollide:
-    """All solutions within the limits collide; told of the one farthest from its limits."""
+    """All solutions within the limits collide; stated of the one with the largest margin to its limits."""
 
     count: int
     overlap: PairOverlaps

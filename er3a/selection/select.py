@@ -271,10 +271,10 @@ def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, .
     refused: list[Refusal | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
     distance, pair = bodies.least_of_turns(solutions.q[inside])
-    told: dict[tuple[int, float], PairOverlaps] = {}  # turns share theirs
+    overlaps: dict[tuple[int, float], PairOverlaps] = {}  # turns share theirs
     for row, depth, number in zip(inside.tolist(), (-distance).tolist(), pair.tolist()):
         if depth > COLLIDES:
-            refused[row] = told.setdefault((number, depth), PairOverlaps(bodies.pairs[number], depth * 1000))
+            refused[row] = overlaps.setdefault((number, depth), PairOverlaps(bodies.pairs[number], depth * 1000))
     return tuple(refused)
 
 

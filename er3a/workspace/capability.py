@@ -115,8 +115,8 @@ def map_capability(robot: Robot, middles: Reals, count: int, asked: AskedOrienta
         values = manipulability_of(robot, q, within).reshape(shape)
         low, high = places_served(robot, q[..., 0])
         out = reachability[part], solutions[part], most[part], best[part]
-        told = low.reshape(shape), high.reshape(shape), frame.width, frame.bar > 0
-        _tally(told, within.reshape(shape), values, out)
+        bounds = low.reshape(shape), high.reshape(shape), frame.width, frame.bar > 0
+        _tally(bounds, within.reshape(shape), values, out)
     return Capability(reachability, solutions, most, best)
 
 

@@ -107,7 +107,7 @@ class Geometry:
 
 @dataclass(frozen=True)
 class OnlySampled:
-    """Only samples tell of the void, so nothing is known of its cause."""
+    """Only samples suggest the void, so nothing is known of its cause."""
 
     code: Literal["void_only_sampled"] = "void_only_sampled"
 

@@ -47,7 +47,7 @@ class GeneralArm(NamedTuple):
     full_turn : whether joint 1 covers a full turn
     bar : m, length of the bars along a joint 1 that slides, 0 where it turns. Then the frame has y along the slide, the
         point stands at x from 0 to ``radii[0]`` and, with the slide at its lower limit, at y from 0 on; places along
-        y are told as angles, ``bar`` being a turn, and so is the range of joint 1 (from 0)
+        y are given as angles, ``bar`` being a turn, and so is the range of joint 1 (from 0)
     """
 
     links: Reals

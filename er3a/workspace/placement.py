@@ -1,7 +1,7 @@
 """Where a box can stand so that the tool reaches every point of it along every required direction, and the proof.
 
 A lattice of points is asked for all directions of a cone, branch by branch. A box fits where all lattice points in it
-are good, which sliding minima tell for all places at once. The lattice only proposes.
+are good, which sliding minima find for all places at once. The lattice only proposes.
 
 Criterion: places where one branch serves the whole box come first, of these proven ones. Then the least manipulability
 over the box and the cone, which keeps away from singularities, and the least distance from the joint limits are

@@ -533,7 +533,7 @@ def _angles_at_limits(k: SphericalConstants, X: list[Reals], lower: Reals, upper
     """Zeros of what vanishes where one of three joints is at a limit; X are parts of ``Rz Rx(a) Rz Rx(-b) Rz``.
 
     With joint 1 known, what is left keeps the angle b of axes 2 and 3: one linear equation. Likewise from behind for
-    joint 3; joint 2 is told by the angle of axes 1 and 3. Straight poses, where a root ends, are listed too.
+    joint 3; joint 2 follows from the angle of axes 1 and 3. Straight poses, where a root ends, are listed too.
     """
     z = np.array([0.0, 0.0, 1.0])
     a, b = np.arctan2(k.sin_12, k.cos_12), np.arctan2(k.sin_23, k.cos_23)

@@ -3,7 +3,7 @@
 Chains are constant links and joints that turn about or slide along z (:mod:`chain`); base, tool, offsets and
 coupling are the caller's. Chains with more than six joints hold one joint after another at a given value until a class
 is met that needs none (six joints) or has its own parameter (arm angle); chains with fewer are completed by joints that
-they lack, and of what those turn it is told.
+they lack, and what those turn about is stated.
 """
 
 from __future__ import annotations
@@ -346,7 +346,7 @@ class ArmClass:
 
 
 def arm_class(links: Reals, sliding: Flags | None = None) -> ArmClass:
-    """The class of a chain with constant links (n + 1, 4, 4); ``sliding`` (n,) tells prismatic joints.
+    """The class of a chain with constant links (n + 1, 4, 4); ``sliding`` (n,) marks prismatic joints.
 
     - ``spherical_wrist``: axes 2 and 3 parallel to 1e-9 rad, axes 4, 5, 6 meet to 1e-9 m;
     - ``three_parallel``: axes 2, 3, 4 parallel, 5 and 6 meet; ``general_six``: any other six revolute joints;

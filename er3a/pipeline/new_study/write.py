@@ -502,8 +502,8 @@ def arm_of(
         problem = f"{' and '.join(given)} each name an arm" if given else "which arm?"
         raise Er3aError(f"{problem} Give one of --urdf FILE, --dh FILE.csv and --robot NAME")
     if name is not None and not re.match(NAME_PATTERN, name):
-        told = "small letters, digits, - and _, a letter or digit first, 64 at most"
-        raise Er3aError(f"--name '{name}' can't be a robot's name: {told}")
+        allowed = "small letters, digits, - and _, a letter or digit first, 64 at most"
+        raise Er3aError(f"--name '{name}' can't be a robot's name: {allowed}")
     if dh is None and (convention, length_unit, angle_unit) != (None, None, None):
         raise Er3aError("--convention, --length-unit and --angle-unit say how a table is meant; give them with --dh")
     if urdf is None and (ends != (None, None) or xacro or split):

@@ -506,10 +506,10 @@ def _no_noise(measure: float) -> float:
 
 def _self_motions(robot: Robot, families: tuple[SelfMotion, ...]) -> list[str]:
     """The nearest self-motions, and how many more there are."""
-    told = [_self_motion(robot, family) for family in families[:MOST_SELF_MOTIONS]]
+    texts = [_self_motion(robot, family) for family in families[:MOST_SELF_MOTIONS]]
     if len(families) > MOST_SELF_MOTIONS:
-        told.append(tr("{count} more in summary.json", count=len(families) - MOST_SELF_MOTIONS))
-    return told
+        texts.append(tr("{count} more in summary.json", count=len(families) - MOST_SELF_MOTIONS))
+    return texts
 
 
 def _self_motion(robot: Robot, family: SelfMotion) -> str:

@@ -54,7 +54,7 @@ def best_text(summary: WorkspaceSummary, placement: PlacementSummary) -> str:
     if not placement.named_places:
         return box_text(summary)
     place = placement.best
-    told = [
+    texts = [
         box_text(summary),
         tr("Collisions are judged at samples.") if place.status == "proven" else "",
         tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
@@ -62,7 +62,7 @@ def best_text(summary: WorkspaceSummary, placement: PlacementSummary) -> str:
         _nearest_bodies(place),
         tr("The box itself does not count as an obstacle."),
     ]
-    return joined(told, " ")
+    return joined(texts, " ")
 
 
 def _nearest_limit(place: PlaceSummary) -> str:

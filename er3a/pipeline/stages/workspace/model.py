@@ -70,7 +70,7 @@ class VoidUnexpected:
 
 @dataclass(frozen=True)
 class VoidUncertain:
-    """An enclosed void away from the shoulder that only samples tell of."""
+    """An enclosed void away from the shoulder that only samples suggest."""
 
     litres: float
     x_mm: float
