@@ -40,9 +40,9 @@ def inverse_batch(
     """All solutions for many poses of the tool, in as many slots as the class of the arm's geometry has.
 
     At a singularity of a wrist-partitioned arm both branches that meet keep their slots: a free joint has its value of
-    ``q_ref`` in one and half a turn more in the other. Next to two singularities, where the pose does not determine joints 4
-    and 6, a ``q_ref`` that solves it to 1e-12 and keeps the limits is in the slot of its branch. Of other arms a
-    self-motion has the member nearest to ``q_ref`` in a slot, and chains for which no class knows all solutions have
+    ``q_ref`` in one and half a turn more in the other. Next to two singularities, where the pose does not determine
+    joints 4 and 6, a ``q_ref`` that solves it to 1e-12 and keeps the limits is in the slot of its branch. Of other arms
+    a self-motion has the member nearest to ``q_ref`` in a slot, and chains for which no class knows all solutions have
     what iteration finds; next to two singularities ``q_ref`` may be missing. The numbers do not depend on
     the number of threads, nor on a pose's place in the batch.
 

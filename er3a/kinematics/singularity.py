@@ -7,10 +7,10 @@ parallel axes 2, 3 and 4: there the wrist centre is where axes 5 and 6 meet, and
 
 Along a motion any arm is singular where its Jacobian loses rank. Columns of joints that slide, and linear rows, are
 scaled by the arm's length. With six joints the determinant changes sign where the motion crosses the singular set. With
-more, or fewer, rank loss is judged by the smallest singular value. Between two samples nothing is missed: turning joint j
-by d changes the scaled Jacobian by at most ``B_j d`` in norm, and no singular value by more [3]_, so an interval whose
-ends have larger ones than its joints' travel can take away is clear; others are halved. Axes are named by the smallest
-set of columns that are dependent there.
+more, or fewer, rank loss is judged by the smallest singular value. Between two samples nothing is missed: turning joint
+j by d changes the scaled Jacobian by at most ``B_j d`` in norm, and no singular value by more [3]_, so an interval
+whose ends have larger ones than its joints' travel can take away is clear; others are halved. Axes are named by the
+smallest set of columns that are dependent there.
 
 References
 ----------

@@ -77,7 +77,8 @@ class Column:
         return "{}" in self.pattern
 
     def names(self, width: int, slides: tuple[bool, ...] = ()) -> list[str]:
-        """Names in the file, of a group with so many columns; ``slides`` marks prismatic joints, whose values are distances."""
+        """Names in the file, of a group with so many columns; ``slides`` marks prismatic joints, whose values are
+        distances."""
         if not self.is_group:
             return [self.pattern]
         if self.parts or not any(slides):
@@ -172,7 +173,8 @@ class Table(ByValue):
             raise ValueError(f"{type(self).__name__}: columns of different lengths: {lengths}")
 
     def of_joints(self, slides: Iterable[bool]) -> Self:
-        """The same table, of an arm whose joints are prismatic where ``slides`` (n,); one without rows gets n columns."""
+        """The same table, of an arm whose joints are prismatic where ``slides`` (n,); one without rows gets n
+        columns."""
         flags = tuple(bool(each) for each in slides)
         groups = {name for name, spec in self.columns().items() if spec.is_group and not spec.parts}
         if len(self) or not groups:

@@ -13,12 +13,12 @@ References
 
 Which arm angle a seven-joint arm takes along a path of the tool: that which keeps most distance from the limits.
 
-The arm angle is a polynomial of degree 2 in the share of the path, given by its values at the start, half way and at the
-end. Margins of all eight solutions on a grid of paths and arm angles show which of many such polynomials keeps most;
-that one is improved by smaller and smaller changes. Where none of these keeps the limits, polynomials of higher degree
-are fitted to a way through the grid: the evenest of those that keep half of the margin that any can keep. Nothing is
-proven by this choice: what the joints then do is judged exactly, as for every other motion, and a path could in
-principle be followed by a law of another form.
+The arm angle is a polynomial of degree 2 in the share of the path, given by its values at the start, half way and at
+the end. Margins of all eight solutions on a grid of paths and arm angles show which of many such polynomials keeps
+most; that one is improved by smaller and smaller changes. Where none of these keeps the limits, polynomials of higher
+degree are fitted to a way through the grid: the evenest of those that keep half of the margin that any can keep.
+Nothing is proven by this choice: what the joints then do is judged exactly, as for every other motion, and a path could
+in principle be followed by a law of another form.
 """
 
 from __future__ import annotations

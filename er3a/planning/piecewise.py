@@ -1,9 +1,9 @@
 """Motions that are polynomials in time, piece by piece: their extremes, roots and bounds, whatever they are sampled at.
 
-Each piece is held as Chebyshev series of angle, velocity and acceleration. Where a series rises or falls is decided by the
-roots of its derivative, the eigenvalues of its colleague matrix [1]_; between two of them it is monotone, so that every
-sign change is one root, and bisected. The sum of the coefficients' sizes bounds a series on its piece, which spares
-most pieces that work.
+Each piece is held as Chebyshev series of angle, velocity and acceleration. Where a series rises or falls is decided by
+the roots of its derivative, the eigenvalues of its colleague matrix [1]_; between two of them it is monotone, so that
+every sign change is one root, and bisected. The sum of the coefficients' sizes bounds a series on its piece, which
+spares most pieces that work.
 
 References
 ----------

@@ -4,8 +4,8 @@ To the twelve numbers of both poses come the table's entries. The samples can't 
 joint's d and offset move the arm as the base's frame does, in which a fixed camera or board stands; the last rows move
 the flange, on which the other of the two is. So the twelve numbers come first, then the entries in the order of
 preference of :mod:`er3a.calibration.parameters`; one whose effect lies in the span of those before it (to 0.1 % of its
-size) keeps its value, and is named with those that act as it does. What is left is estimated by Gauss-Newton steps, with
-the weights and intervals of :mod:`er3a.vision.likelihood`.
+size) keeps its value, and is named with those that act as it does. What is left is estimated by Gauss-Newton steps,
+with the weights and intervals of :mod:`er3a.vision.likelihood`.
 """
 
 from __future__ import annotations

@@ -55,8 +55,8 @@ class SlideReading(NamedTuple):
     """The loop read from a joint that turns on, in one sense.
 
     ``joint`` (6,), ``sense``, ``links`` (6, 4, 4) and ``place`` as in :class:`hidden_joint.Reading`; ``slides`` (6,)
-    determines the sliding places; the polynomial has this ``degree`` if the product is taken times ``rho^(2 power)``, and
-    its largest sample is about ``usual`` times the square of the pose's distance.
+    determines the sliding places; the polynomial has this ``degree`` if the product is taken times ``rho^(2 power)``,
+    and its largest sample is about ``usual`` times the square of the pose's distance.
     """
 
     joint: Integers
@@ -80,7 +80,8 @@ class TwoSlides:
 
 
 def two_slides(links: Reals, sliding: Flags, seed: int = 7) -> TwoSlides | None:
-    """The solver for links (7, 4, 4) of which two joints slide; None if no reading of the loop determines its solutions."""
+    """The solver for links (7, 4, 4) of which two joints slide; None if no reading of the loop determines its
+    solutions."""
     size = size_of(links)
     scaled = np.array(links, float)
     scaled[:, :3, 3] /= size
@@ -162,7 +163,8 @@ def _reach(loops: Reals) -> Reals:
 
 
 def _clear(terms: Reals, peak: Reals) -> Flags:
-    """Whether the terms (N, 20) that would vanish without rounding are small; False where the reading is inconclusive."""
+    """Whether the terms (N, 20) that would vanish without rounding are small; False where the reading is
+    inconclusive."""
     return np.asarray(np.abs(terms[:, 2 * MOST_DEGREE + 1 :]).max(axis=1) < NOISE * peak)
 
 
