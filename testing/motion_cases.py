@@ -21,7 +21,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
-from er3a.planning.tool_proof import Wanted
+from er3a.planning.tool_proof import ProofRequirements
 from testing.dense_contacts import Contacts
 from testing.motion_oracle import GRAZING, GRAZING_JERK, TOUCH, Truth, arm_of, factors, joint_path, truth
 
@@ -144,7 +144,7 @@ def judged(robot, written, samples, limits: JointLimits) -> tuple[Motion, Judgem
     """What the stage says of a path, at so many samples."""
     whole = {"name": "x", "title": "x", "samples": samples, **written}
     entry = parse(PathFile, {"kind": "paths", "paths": [whole]}, None).paths[0]
-    motion = motion_of(robot, entry, CHECKS, CommandSource(None, ""), {}, Wanted(limits.rates, NEAR))
+    motion = motion_of(robot, entry, CHECKS, CommandSource(None, ""), {}, ProofRequirements(limits.rates, NEAR))
     return motion, judge(robot, motion, NEAR, limits)
 
 

@@ -347,5 +347,5 @@ def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
         if the scene is none
     """
     bodies = bodies_of(robot, scene)
-    distance, pair = bodies.least(np.asarray(q, float).reshape(-1, robot.joints))
+    distance, pair = bodies.min_distance(np.asarray(q, float).reshape(-1, robot.joints))
     return Clearance(distance, tuple(bodies.pairs[k] if k >= 0 else None for k in pair))

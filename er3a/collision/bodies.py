@@ -127,7 +127,7 @@ class Bodies:
             found[row] -= self._depth(world, int(pairs[row]))
         return found, near
 
-    def least(self, q: Reals) -> tuple[Reals, Integers]:
+    def min_distance(self, q: Reals) -> tuple[Reals, Integers]:
         """Least distance (N,) in m of arms (N, n), negative by the depth, and the number of its pair (-1: none)."""
         q = np.ascontiguousarray(q, float)
         least, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
@@ -139,12 +139,13 @@ class Bodies:
             least[row] = distances[pair[row]]
         return least, pair
 
-    def least_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
-        """As :meth:`least`, for arms (N, n) many of which are others but for whole turns: those are measured once."""
+    def min_distance_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
+        """As :meth:`min_distance`, for arms (N, n) many of which are others but for whole turns: those are measured
+        once."""
         if self.robot.coupling is not None:
-            return self.least(q)
+            return self.min_distance(q)
         _, first, inverse = np.unique(but_for_turns(self.robot, q), axis=0, return_index=True, return_inverse=True)
-        least, pair = self.least(q[first])
+        least, pair = self.min_distance(q[first])
         return least[inverse.reshape(-1)], pair[inverse.reshape(-1)]
 
     def overlaps(self, q: Reals) -> Flags:

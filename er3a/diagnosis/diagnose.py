@@ -170,7 +170,7 @@ def _noticed_reversed(case: Case, joint: int) -> bool:
     return bool((np.abs(case.difference(turned)) > case.uncertainty * MEETS).any())
 
 
-def told_from(case: Case, ranking: Ranking) -> float | None:
+def distinguishability(case: Case, ranking: Ranking) -> float | None:
     """How many times larger the disagreement would have to be for the references to tell the first set apart.
 
     Each member but the first is refitted to what the first predicts, to first order; what then stays grows with the
@@ -451,7 +451,7 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
         missed = int((relative > MEETS).sum())
         return NoFaultStandsOut(missed, len(relative), float(relative.max()), tried)
     best = hypotheses[0]
-    if best.explains and (factor := told_from(case, ranking)) is not None:
+    if best.explains and (factor := distinguishability(case, ranking)) is not None:
         candidates = (best.faults, *best.indistinguishable_from)
         return TooSmallToTell(candidates, best.residual_before, factor * best.residual_before, best.unit)
     figures = best.residual_before, best.residual_after, best.unit

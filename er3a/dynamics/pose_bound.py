@@ -374,14 +374,14 @@ NO_BETTER = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Greatest:
+class Maxima:
     """The greatest values (k,) found of k objectives, and the poses (k, n) where they are."""
 
     values: Reals
     q: Reals
 
 
-def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Greatest:
+def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Maxima:
     """The greatest of each objective.
 
     Parameters
@@ -404,7 +404,7 @@ def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Greates
         if (reached <= before + NO_BETTER * np.abs(before)).all():
             break
     chosen = reached.reshape(-1, k).argmax(axis=0) * k + np.arange(k)
-    return Greatest(reached[chosen], poses[chosen])
+    return Maxima(reached[chosen], poses[chosen])
 
 
 def _along(

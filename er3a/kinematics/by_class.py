@@ -38,7 +38,7 @@ from er3a.numerics.jit import kernel
 from er3a.numerics.threads import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within
 from er3a.robots.robot import Robot, derived
-from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_way, uncoupling, uncoupling_of_linkage
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_move, uncoupling, uncoupling_of_linkage
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
@@ -257,7 +257,7 @@ def _apart(robot: Robot, rows: Reals) -> Reals:
     """Rows (k, n) without those that stand twice."""
     kept: list[Reals] = []
     for row in rows:
-        if not any(float(np.abs(shortest_way(robot, row - other)).max()) < SAME_ROW for other in kept):
+        if not any(float(np.abs(shortest_move(robot, row - other)).max()) < SAME_ROW for other in kept):
             kept.append(row)
     return np.array(kept).reshape(-1, robot.joints)
 
@@ -271,7 +271,7 @@ def _is_same_root(robot: Robot, x: Reals, others: list[Reals], chain: PoseChain)
     if not others:
         return False
     away = to_joints(robot, np.array([x])) - to_joints(robot, np.array(others))
-    apart = float(np.abs(shortest_way(robot, away)).max(axis=1).min())
+    apart = float(np.abs(shortest_move(robot, away)).max(axis=1).min())
     return apart < SAME_ROW or (apart < MAYBE_SAME and apart * chain.smallest(x) < SPREAD)
 
 
@@ -345,7 +345,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
     own = q_ref[numbers] if len(q_ref) == len(T) else np.broadcast_to(q_ref[0], (len(numbers), robot.joints))
     solves = np.abs(forward(robot, own) - T[numbers]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
     for n, row in zip(numbers[solves].tolist(), own[solves]):
-        away, fits = np.abs(shortest_way(robot, q[n] - row)).max(axis=1), bool(within(robot, row))
+        away, fits = np.abs(shortest_move(robot, q[n] - row)).max(axis=1), bool(within(robot, row))
         away = np.where(np.isnan(away), np.inf, away)
         if away.min() < SAME_ROW and not fits:
             continue
@@ -416,7 +416,7 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
     reference, and what was found besides takes free slots."""
     kept, left = np.full_like(rows, np.nan), []
     for row in settled.alone:
-        away = shortest_way(robot, rows - row)
+        away = shortest_move(robot, rows - row)
         far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
         slot = int(far.argmin())
         if far[slot] < SAME_ROW and np.isnan(kept[slot, 0]):
@@ -436,7 +436,7 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
     """The slot of joint values (n,) that solve a pose (4, 4); 0 if they are none of its class's rows."""
     values = checked_parameters(robot, None, q[None], 1)
     rows = class_rows(robot, T[None], values).q[0]
-    away = shortest_way(robot, rows - q)
+    away = shortest_move(robot, rows - q)
     far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
     return int(far.argmin()) if far.min() < SAME_ROW else 0
 

@@ -44,7 +44,7 @@ from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_thr
 from er3a.planning.profiles import times_at
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_way, take_turns_off, turns_inward, whole_turns
+from er3a.robots.whole_turns import shortest_move, take_turns_off, turns_inward, whole_turns
 
 ANGLES = 72  # of the grid, over a turn
 BEGUN_AT, FEW_CHANGES = 24, 13  # arm angles at the start where none is given; then changes from it
@@ -146,7 +146,7 @@ def _even_way(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
     """
     at = np.arange(margins.shape[1])
     before = (at[None] - STEPS[:, None]) % len(at)  # (steps, angles)
-    moved = [shortest_way(robot, q[k][None] - q[k - 1][before]) for k in range(1, len(q))]
+    moved = [shortest_move(robot, q[k][None] - q[k - 1][before]) for k in range(1, len(q))]
     free = [np.abs(each).max(axis=-1) <= LEAP for each in moved]  # not where there is no row
     widest = margins[0]
     for k, passable in enumerate(free, 1):
@@ -361,7 +361,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
 
 def _turned_to(robot: Robot, q: Reals, near: Reals) -> Reals:
     """Joints (..., n) by the turns nearest to others (n,), within the limits or not."""
-    return near + shortest_way(robot, q - near)
+    return near + shortest_move(robot, q - near)
 
 
 def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:

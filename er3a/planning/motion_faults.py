@@ -657,7 +657,7 @@ class RateCheck:
         return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-class GreatestRates:
+class MaxRates:
     """The greatest speeds and accelerations of the joints, gathered from the parts of a motion."""
 
     def __init__(self, joints: int):

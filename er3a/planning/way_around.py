@@ -149,7 +149,7 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
     for name, q in ends:
         if outside := limits_exceeded(task.robot, q):
             return EndOutsideLimits(name, outside)
-    clear, pairs = task.bodies.least(np.stack([start, end]))
+    clear, pairs = task.bodies.min_distance(np.stack([start, end]))
     for (name, _), distance, pair in zip(ends, clear, pairs):
         if distance <= 0:
             return EndOverlaps(name, PairOverlaps(task.bodies.pairs[pair], -float(distance) * 1000))
@@ -225,7 +225,7 @@ class _Moves:
 
     def clear(self, q: Reals) -> float:
         """Least distance of an arm, m."""
-        return float(self.bodies.least(q[None])[0][0])
+        return float(self.bodies.min_distance(q[None])[0][0])
 
     def free(self, a: Reals, b: Reals) -> bool:
         """Whether the move from a to b (n,) keeps the margin."""

@@ -27,7 +27,7 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
 )
 from er3a.planning.timing import JointLimits, joint_limits
-from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionWay
+from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionPath
 from er3a.program_check.program_check_findings import (
     RANKS,
     BothSidesChecked,
@@ -40,8 +40,8 @@ from er3a.program_check.program_check_findings import (
     MovesBesideProgram,
     NeverReached,
     NotFollowedToEnd,
+    PathNotKnown,
     RestNotChecked,
-    WayNotKnown,
     level_of,
     worst_of,
 )
@@ -252,7 +252,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     found = [NotExamined(place, "motion") for place in moves]
     missed = (MotionNotReached, NeverReached)
     found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
-    found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, WayNotKnown)]
+    found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, PathNotKnown)]
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, NotFollowedToEnd)]
     files = {each.place.file: i for i, each in enumerate(located)}
     order = dict.fromkeys(found)
@@ -529,7 +529,7 @@ def _part(group: list[tuple[int, CheckedMotion]]) -> ProgramPart:
     return ProgramPart("sequence", lines, command, motions[0].placed.motion.load)
 
 
-def _blend(motion: CheckedMotion, way: MotionWay, after: MotionWay) -> float:
+def _blend(motion: CheckedMotion, way: MotionPath, after: MotionPath) -> float:
     zone = motion.placed.motion.zone
     if zone.kind != "distance":
         return 0.0

@@ -54,7 +54,14 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import turned_difference
 from er3a.planning.tool_proof import inverse_and_reach
-from er3a.program_check.motion_checks import CheckRules, MotionWay, is_given, joint_way, limit_findings, tool_way
+from er3a.program_check.motion_checks import (
+    CheckRules,
+    MotionPath,
+    is_given,
+    joint_motion_path,
+    limit_findings,
+    tool_motion_path,
+)
 from er3a.program_check.program_check_findings import (
     ArcGoesOn,
     ArcHasNoCircle,
@@ -70,13 +77,13 @@ from er3a.program_check.program_check_findings import (
     LoopComesBackOtherwise,
     MoreThanFullSpeed,
     MotionCollides,
+    PathNotKnown,
     SpeedNotGiven,
     SplineAsLine,
+    StretchOutOfReach,
     TargetNotGiven,
     TargetOutOfReach,
     TurnNotMet,
-    WayNotKnown,
-    WayOutOfReach,
     ZoneCollides,
     ZoneNotSettled,
     ZoneTooLarge,
@@ -601,7 +608,7 @@ class CheckedMotion(ByValue):
     kind: str
     placed: PlacedMotion
     start: Reals | None
-    way: MotionWay | None
+    way: MotionPath | None
     end: Reals | None
     findings: tuple[CheckFinding, ...]
     clearance: float | None = None
@@ -742,7 +749,7 @@ class StepChecker:
             joint = motion.kind == "joint"
             findings.append(SpeedNotGiven(*((assumed.joint_share, "share") if joint else (assumed.tool_speed, "m/s"))))
         if before is None:
-            findings.append(WayNotKnown())
+            findings.append(PathNotKnown())
             findings += () if goal.joints is None else limit_findings(placed.arm, goal.joints)
             return CheckedMotion(motion.kind, placed, None, None, goal.joints, tuple(findings))
         if motion.kind == "joint":
@@ -755,7 +762,7 @@ class StepChecker:
         findings += [each for each in placed.missing if each not in findings]
         if goal.joints is None:
             return CheckedMotion("joint", placed, before, None, None, tuple(findings))
-        way = joint_way(placed.arm, placed.motion, before, goal.joints, self.rules)
+        way = joint_motion_path(placed.arm, placed.motion, before, goal.joints, self.rules)
         if way is None:
             return CheckedMotion("joint", placed, before, None, goal.joints, tuple(findings), stays=True)
         found = (*findings, *way.findings)
@@ -785,12 +792,12 @@ class StepChecker:
             turns = bool(np.abs(end[:3, :3] - forward(placed.arm, before)[:3, :3]).max() > SAME_JOINTS)
             findings.append(ArcGoesOn(float(np.degrees(placed.motion.angle)), turns))
             given = None
-        way = tool_way(placed.arm, placed.motion, before, (end, given, via), self.rules)
+        way = tool_motion_path(placed.arm, placed.motion, before, (end, given, via), self.rules)
         if way is None:
             return CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True)
-        if not isinstance(way, MotionWay):
+        if not isinstance(way, MotionPath):
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, way))
-        if any(isinstance(each, WayOutOfReach) for each in way.findings):
+        if any(isinstance(each, StretchOutOfReach) for each in way.findings):
             findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
         seen = (*findings, *way.findings)
         target = placed.motion.target
@@ -861,7 +868,7 @@ class StepChecker:
         self.motions[second] = replace(self.motions[second], blended_ends=min(self.motions[second].blended_ends + 1, 2))
 
     def _round_corner(
-        self, way: MotionWay, after: MotionWay, corners: Reals, shares: tuple[float, float]
+        self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float]
     ) -> CheckFinding | None:
         """What stands in a way from joints (3, n) before a corner to behind it, over shares of the two motions."""
         assert self.obstacles is not None
@@ -872,13 +879,13 @@ class StepChecker:
         slack = max(way.sagitta(shares[0]), after.sagitta(shares[1]))
         return zone_clearance(bodies, corners, tolerance, patch=patch_of(way.arm, corners, slack))
 
-    def _rounded(self, way: MotionWay, after: MotionWay, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
+    def _rounded(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
         key = (id(way), id(after))
         if key not in self._corners:
             self._corners[key] = self._zone_findings(way, after, motion)
         return self._corners[key]
 
-    def _zone_findings(self, way: MotionWay, after: MotionWay, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
+    def _zone_findings(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
         shares = [_zone_share(motion.placed.motion, part) for part in (way, after)]
         found: list[CheckFinding] = []
         zone = motion.placed.motion.zone
@@ -897,7 +904,7 @@ class StepChecker:
         return tuple(found)
 
 
-def _bend(way: MotionWay, first: float, last: float) -> Reals:
+def _bend(way: MotionPath, first: float, last: float) -> Reals:
     """By how much joints (n,) leave the straight way between two shares of a motion, rad; 0 in a joint move."""
     if way.tool_path is None:
         return np.zeros(way.q.shape[1])
@@ -905,7 +912,7 @@ def _bend(way: MotionWay, first: float, last: float) -> Reals:
     return bend_of_line(way.arm, q, way.sagitta((last - first) / BEND_PARTS))
 
 
-def _zone_share(motion: ArmMotion, way: MotionWay) -> float:
+def _zone_share(motion: ArmMotion, way: MotionPath) -> float:
     """The share of a way that its zone may take; over one half where the zone is larger than that."""
     zone = motion.zone
     match zone.kind:

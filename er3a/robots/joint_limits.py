@@ -11,7 +11,7 @@ from er3a.errors import Er3aError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_way, turns_in, whole_turns
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_move, turns_in, whole_turns
 
 SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
 MOST_ROWS = 10_000
@@ -160,7 +160,7 @@ def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
 def unwound(robot: Robot, q: Reals) -> Reals:
     """Joint values (..., n) with their whole turns taken off: angles in (-pi, pi], behind a gear those of rows."""
     turns = whole_turns(robot)
-    return np.where(turns.alone, wrap_to_pi(q), q) if turns.each else shortest_way(robot, q)
+    return np.where(turns.alone, wrap_to_pi(q), q) if turns.each else shortest_move(robot, q)
 
 
 def but_for_turns(robot: Robot, q: Reals) -> Reals:

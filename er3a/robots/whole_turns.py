@@ -109,7 +109,7 @@ def turns_in(robot: Robot, move: Reals) -> Reals:
     return np.asarray(np.round(move @ turns.counts.T) @ turns.steps.T)
 
 
-def shortest_way(robot: Robot, move: Reals) -> Reals:
+def shortest_move(robot: Robot, move: Reals) -> Reals:
     """Moves of joints (..., n), less the whole turns of rows in them, each row by its shorter way."""
     return move - turns_in(robot, move)
 

@@ -28,7 +28,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError, ShapeError
-from er3a.geometry.vectors import greatest_move
+from er3a.geometry.vectors import max_joint_move
 from er3a.kinematics.inverse import checked_reference
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.solutions import Solutions
@@ -73,8 +73,8 @@ def joint_weights(robot: Robot) -> Reals:
     return weights
 
 
-def _greatest_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
-    return np.degrees(greatest_move(q, q_ref))
+def _max_joint_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    return np.degrees(max_joint_move(q, q_ref))
 
 
 def _weighted_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
@@ -102,7 +102,7 @@ def _clearance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Rea
 
 
 RULES: dict[RuleName, Rule] = {
-    "nearest": Rule("deg", "least", _greatest_move),
+    "nearest": Rule("deg", "least", _max_joint_move),
     "weighted": Rule("deg", "least", _weighted_move),
     "time": Rule("s", "least", _time),
     "manipulability": Rule("1", "greatest", _manipulability),
@@ -270,7 +270,7 @@ def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, .
     """Why each row is refused: limits that it leaves, or which of the bodies overlap; None for the others."""
     refused: list[Refusal | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
-    distance, pair = bodies.least_of_turns(solutions.q[inside])
+    distance, pair = bodies.min_distance_of_turns(solutions.q[inside])
     overlaps: dict[tuple[int, float], PairOverlaps] = {}  # turns share theirs
     for row, depth, number in zip(inside.tolist(), (-distance).tolist(), pair.tolist()):
         if depth > COLLIDES:
@@ -394,7 +394,7 @@ def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
 def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:
     rows = np.flatnonzero(solutions.within_limits)
     if rows.size:
-        rows = rows[bodies_of(robot, scene).least_of_turns(solutions.q[rows])[0] >= 0]
+        rows = rows[bodies_of(robot, scene).min_distance_of_turns(solutions.q[rows])[0] >= 0]
     if not rows.size:
         raise Er3aError(f"pose {number} of the sequence has no solution within the limits and free of collisions")
     return rows

@@ -146,7 +146,7 @@ class LineUnproven:
 
 
 @dataclass(frozen=True)
-class WayCollides:
+class PathCollides:
     """Something is nearer than asked on a straight line."""
 
     part: Part
@@ -180,7 +180,7 @@ GraspRefusal = (
     | GraspCollides
     | LineLeaves
     | LineUnproven
-    | WayCollides
+    | PathCollides
     | NoTransfer
     | GraspUnlikely
 )
@@ -394,11 +394,11 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
     )
 
 
-def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> WayCollides | None:
+def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> PathCollides | None:
     least = least_clearance(task.bodies, legs) if task.bodies is not None else None
     if least is None or least[0] >= task.needs.clearance:
         return None
-    return WayCollides(part, least[1], 1000 * least[0], 1000 * task.needs.clearance)
+    return PathCollides(part, least[1], 1000 * least[0], 1000 * task.needs.clearance)
 
 
 def _along(task: GraspTask, T_from: Reals, T_to: Reals, q: Reals) -> Reals:

@@ -139,9 +139,11 @@ def test_turns_of_an_arm_are_measured_once(random, monkeypatch):
     arm = load_robot("ur5e")
     bodies, q = Bodies(arm, None), joints_at_random(arm, random, 30)
     turned = np.concatenate([q, q + 2 * np.pi * random.integers(-1, 2, q.shape)])
-    each, measured = bodies.least(turned), []
-    monkeypatch.setattr(bodies, "least", lambda rows: measured.append(len(rows)) or Bodies.least(bodies, rows))
-    once = bodies.least_of_turns(turned)
+    each, measured = bodies.min_distance(turned), []
+    monkeypatch.setattr(
+        bodies, "min_distance", lambda rows: measured.append(len(rows)) or Bodies.min_distance(bodies, rows)
+    )
+    once = bodies.min_distance_of_turns(turned)
     np.testing.assert_allclose(once[0], each[0], atol=1e-9)
     np.testing.assert_array_equal(once[1], each[1])
     assert measured == [30]

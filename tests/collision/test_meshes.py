@@ -217,7 +217,7 @@ def test_hulls_without_margin_that_overlap_are_found_by_every_search():
     q = np.random.default_rng(4).uniform(robot.lower, robot.upper, (50, 2))
     assert bodies.overlaps(q).all()
     assert not bodies.free(q).any()
-    assert (bodies.least(q)[0] < 0).all()
+    assert (bodies.min_distance(q)[0] < 0).all()
     assert [row.state for row in bodies.matrix] == ["watched"]
     assert [row.state for row in collision_matrix(robot.replace(pair_rules=())).rows] == ["joined"]
 
@@ -235,6 +235,6 @@ def test_faces_that_nearly_touch_are_as_far_apart_as_they_are():
         ]
         base = transform(random.normal(size=3), random.uniform(-np.pi, np.pi, 3))
         robot = made_of([("R", 0, 0, 0, -180, 180)]).replace(hulls=tuple(plates), pair_rules=(rule,), base=base)
-        distance = Bodies(robot, None).least(random.uniform(-np.pi, np.pi, (200, 1)))[0]
+        distance = Bodies(robot, None).min_distance(random.uniform(-np.pi, np.pi, (200, 1)))[0]
         assert (distance <= 2e-6 + 1e-9).all()
         assert (distance > -1e-9).all()

@@ -149,7 +149,7 @@ TEXTS = texts(
         "named": "Most likely fault: {hypothesis}.",
         "too_small_to_tell": (
             "The disagreement ({residual} {unit}) is too small to tell which of {count} faults causes it: "
-            "{candidates}. From about {told} {unit} on these references distinguish them, where they can at all."
+            "{candidates}. From about {distinct} {unit} on these references distinguish them, where they can at all."
         ),
         "mostly": "The best hypothesis tried: {hypothesis}, which still exceeds the references' uncertainty.",
         "unexplained": (
@@ -362,7 +362,7 @@ def _(found: TooSmallToTell) -> str:
         residual=shown(found.residual),
         count=len(found.candidates),
         candidates=_candidates(found.candidates),
-        told=shown(found.told_from),
+        distinct=shown(found.distinguishability),
     )
 
 

@@ -50,10 +50,10 @@ from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
-from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, wanted_of
+from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, proof_requirements
 from er3a.planning.commands import CommandSource
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import Wanted
+from er3a.planning.tool_proof import ProofRequirements
 from er3a.robots.joint_limits import limit_margin, shown, within
 from er3a.robots.robot import Convention, Robot, robot_name
 from er3a.selection.nearest import nearest
@@ -224,7 +224,7 @@ class TaskSearch:
     follows_tool: bool = field(init=False)
     near: NearSingular = field(init=False)
     limits: JointLimits = field(init=False)
-    wanted: Wanted = field(init=False)
+    required: ProofRequirements = field(init=False)
     bodies: Bodies = field(init=False)
     middle: Reals = field(init=False)
     fit: Reals = field(init=False)
@@ -234,8 +234,8 @@ class TaskSearch:
 
     def __post_init__(self) -> None:
         self.follows_tool = has_branches(self.robot)
-        self.limits, self.wanted = limits_of(self.robot, self.settings), wanted_of(self.robot, self.settings)
-        self.near, self.bodies = self.wanted.near, Bodies(self.robot, self.scene)
+        self.limits, self.required = limits_of(self.robot, self.settings), proof_requirements(self.robot, self.settings)
+        self.near, self.bodies = self.required.near, Bodies(self.robot, self.scene)
         self.middle = self.reach.q.mean(axis=0)
         q = self.reach.q[:DRAWN]
         roomy, regular, free = self._roomy(q), self._regular(q), self.bodies.free(q)
@@ -416,7 +416,7 @@ class TaskSearch:
         assert not isinstance(entry, ProgramPath)
         try:
             motion = motion_of(
-                self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.wanted
+                self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.required
             )
         except Er3aError:
             return "can't be followed"

@@ -32,8 +32,8 @@ from er3a.pipeline.stages.trajectory.judgement import (
     clearance_rows,
     collisions,
     judge,
-    least_clearance,
     measured,
+    min_clearance,
     verdict_of,
 )
 from er3a.pipeline.stages.trajectory.model import (
@@ -60,7 +60,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectorySummary,
     TriedStrategy,
 )
-from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, wanted_of
+from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, proof_requirements
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
@@ -147,10 +147,10 @@ class AvoidanceTask:
 
     def _no_more_than(self, found: Judgement) -> JointLimits:
         """The limits, or what of them the path needs if that is less."""
-        if found.fast or found.greatest_speed is None or found.greatest_acceleration is None:
+        if found.fast or found.max_speed is None or found.max_acceleration is None:
             return self.limits
-        speed = float((found.greatest_speed / self.limits.speed).max())
-        acceleration = float((found.greatest_acceleration / self.limits.acceleration).max())
+        speed = float((found.max_speed / self.limits.speed).max())
+        acceleration = float((found.max_acceleration / self.limits.acceleration).max())
         speed, acceleration = (min(1.0, max(ratio, LEAST_RATIO)) for ratio in (speed, acceleration))
         return replace(
             self.limits, speed=self.limits.speed * speed, acceleration=self.limits.acceleration * acceleration
@@ -164,7 +164,7 @@ class AvoidanceTask:
         if not isinstance(found, WayAround):
             return [StrategyResult("planned", None, (found,))]
         timed = found.motion
-        path = motion.built.tool or _ToolWay(motion)
+        path = motion.built.tool or _ToolPath(motion)
         distance, angle, _ = deviation(path, forward(self.robot, timed.q))
         cost = StrategyCost(timed, 1.0, distance, angle, *timed.ratios(self.limits), keeps_clear=True)
         return [StrategyResult("planned", cost)]
@@ -200,7 +200,7 @@ class AvoidanceTask:
         along = clearance_along(
             self.surroundings.bodies, curve.joints, curve.rate_bounds, grid, grid, self.surroundings.tolerance
         )
-        least = least_clearance(along)
+        least = min_clearance(along)
         if least is None:
             return None, None
         if along.contacts:
@@ -252,7 +252,7 @@ class AvoidanceTask:
 
 
 @dataclass(frozen=True, eq=False)
-class _ToolWay:
+class _ToolPath:
     """The way of the tool on a move of the joints."""
 
     motion: Motion
@@ -338,15 +338,13 @@ def path_summary(
         jumps=tuple(
             Jump(jump.t, jump.joint, float(np.degrees(jump.angle))) for jump in (followed.jumps if followed else ())
         ),
-        max_joint_speed_deg_s=None
-        if found.greatest_speed is None
-        else tuple(shown(robot, found.greatest_speed).tolist()),
-        max_joint_speed_ratio=_ratio(found.greatest_speed, limits.speed),
-        max_joint_acceleration_ratio=_ratio(found.greatest_acceleration, limits.acceleration),
+        max_joint_speed_deg_s=None if found.max_speed is None else tuple(shown(robot, found.max_speed).tolist()),
+        max_joint_speed_ratio=_ratio(found.max_speed, limits.speed),
+        max_joint_acceleration_ratio=_ratio(found.max_acceleration, limits.acceleration),
         joint_speed_bounded=found.speed_bounded,
         velocity_check_deg_s=float(np.degrees(found.velocity_check)),
         collisions=_stretches(motion, contacts),
-        clearance=least_clearance(along),
+        clearance=min_clearance(along),
         no_way=motion.no_way,
         fastest_s=avoided.fastest_s,
         avoidance=avoided.tried,
@@ -396,8 +394,8 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
     thresholds = NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
-    wanted, limits = wanted_of(robot, settings), limits_of(robot, settings)
-    near, scene_file = wanted.near, study.scene(name, "trajectory")
+    required, limits = proof_requirements(robot, settings), limits_of(robot, settings)
+    near, scene_file = required.near, study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
     surroundings = Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
@@ -411,7 +409,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     paths: list[PathSummary] = []
     programs: list[ProgramFiles] = []
     skipped: list[PathNotFollowed] = []
-    for each in listed_motions(file, planning, wanted, settings.checks_per_sample):
+    for each in listed_motions(file, planning, required, settings.checks_per_sample):
         motion = each.motion
         if motion is None:
             stops = each.ends.t if each.ends else None

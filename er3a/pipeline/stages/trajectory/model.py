@@ -184,7 +184,7 @@ class Stretch(Generic[CauseT]):
 
 
 @dataclass(frozen=True)
-class LeastClearance:
+class MinClearance:
     """Where a path comes nearest to its surroundings or the arm to itself; negative by the depth of an overlap."""
 
     least_mm: float
@@ -302,7 +302,7 @@ class PathSummary:
     joint_speed_bounded: bool
     velocity_check_deg_s: float
     collisions: tuple[Stretch[BodiesOverlap], ...]
-    clearance: LeastClearance | None
+    clearance: MinClearance | None
     no_way: NoWayAround | None
     fastest_s: float | None
     avoidance: tuple[TriedStrategy, ...]

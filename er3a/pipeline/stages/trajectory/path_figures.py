@@ -29,7 +29,7 @@ from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turni
 from er3a.pipeline.stages.trajectory.model import (
     FASTEST,
     AvoidanceRows,
-    LeastClearance,
+    MinClearance,
     NearThresholds,
     PathChecks,
     PathSummary,
@@ -342,7 +342,7 @@ def _legend(path: PathSummary) -> list[Line2D | Patch]:
 CLEARANCE_COLUMNS = 4
 ROW_HEIGHT = 1.5
 
-Measured = tuple[PathSummary, LeastClearance]
+Measured = tuple[PathSummary, MinClearance]
 
 
 @dataclass(frozen=True)
@@ -373,7 +373,7 @@ def clearance_section(results: TrajectoryResults, most: int) -> ClearanceSection
     return ClearanceSection(Picture(_curves(drawn, results), alt, caption), [_row(*measured) for measured in paths])
 
 
-def _row(path: PathSummary, least: LeastClearance) -> list[str]:
+def _row(path: PathSummary, least: MinClearance) -> list[str]:
     return [path.name, fixed(least.least_mm, 1), fixed(least.t_s, 3), say(least.between), str(least.poses_measured)]
 
 

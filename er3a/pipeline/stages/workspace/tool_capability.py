@@ -500,7 +500,7 @@ def _arms_at(within: Robot, free: Free, task: Task, asked: AskedOrientations, pl
 def _with_nearest(place: PlaceSummary, bodies: Bodies, q: Reals) -> PlaceSummary:
     """A place with the least clearance of its arms (m, joints), rad, the pair that has it, and the joint nearest to a
     limit."""
-    least, pair = bodies.least(q)
+    least, pair = bodies.min_distance(q)
     nearest = int(least.argmin()) if len(least) else -1
     if nearest >= 0 and np.isfinite(least[nearest]):
         place = replace(
