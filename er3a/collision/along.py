@@ -5,7 +5,7 @@ d1 at another, and move by M in between, they stay (d0 + d1 - M) / 2 apart [1]_:
 for every pair is free as a whole. Overlap counts as negative distance (the depth), for which the same holds: an
 interval in which a pair overlaps at both ends by more than M in sum overlaps as a whole. Any other one is halved.
 Halving ends where M is twice the ``depth`` asked for, so that no overlap deeper than that is missed, however small or
-thin the obstacle, and the least clearance is found to within it.
+thin the obstacle, and the smallest clearance is found to within it.
 
 M is the longer way of a capsule's two ends (its other points move no farther), in space for a solid, in the frame of
 the other link for two links. The way is bounded on a grid of the motion so fine that no end moves by more than
@@ -108,7 +108,7 @@ class ClearanceAlong:
 
     @property
     def least(self) -> int:
-        """Index of the least clearance; -1 if none is known."""
+        """Index of the smallest clearance; -1 if none is known."""
         return -1 if np.isnan(self.distance).all() else int(np.nanargmin(self.distance))
 
 
@@ -271,7 +271,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
 
 
 def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Contact]:
-    """Stretches of overlap between known points, their ends located where the least distance is 0."""
+    """Stretches of overlap between known points, their ends located where the smallest distance is 0."""
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
     overlap = np.array([bool(np.nanmin(motion.known[times[i]]) <= 0) for i in known])
@@ -320,7 +320,7 @@ def _touch(
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """Least distances of arms.
+    """Smallest distances of arms.
 
     Attributes
     ----------
@@ -339,7 +339,7 @@ def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
 
 
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
-    """Least distance of each arm (N, n) in rad or m from the scene's solids and from itself.
+    """Smallest distance of each arm (N, n) in rad or m from the scene's solids and from itself.
 
     Raises
     ------

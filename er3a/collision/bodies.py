@@ -128,7 +128,7 @@ class Bodies:
         return found, near
 
     def min_distance(self, q: Reals) -> tuple[Reals, Integers]:
-        """Least distance (N,) in m of arms (N, n), negative by the depth, and the number of its pair (-1: none)."""
+        """Smallest distance (N,) in m of arms (N, n), negative by the depth, and the number of its pair (-1: none)."""
         q = np.ascontiguousarray(q, float)
         least, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
         measure(self.layout, q, np.empty((0, 0)), least, pair, deep)

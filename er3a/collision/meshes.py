@@ -197,7 +197,7 @@ def _corners(points: Reals) -> Reals:
 def capsule_around(points: Reals, link: int) -> Envelope:
     """A capsule that holds points (n, 3), m, and so their hull; along one of the cloud's principal axes.
 
-    Its radius is the greatest distance of a point from its line, so that it holds them by construction.
+    Its radius is the largest distance of a point from its line, so that it holds them by construction.
     """
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]

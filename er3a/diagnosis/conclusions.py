@@ -144,7 +144,7 @@ class NoFaultStandsOut:
     Attributes
     ----------
     missed, references : how many are missed, of how many
-    half_widths : greatest difference, in half-widths of its reference
+    half_widths : largest difference, in half-widths of its reference
     tried : hypotheses
     """
 

@@ -225,11 +225,11 @@ class Hypothesis(ByValue, Displayed):
     Attributes
     ----------
     faults : one, or two; of conventions (zeros, directions, base, flange) as many as differ
-    residual_before, residual_after : greatest difference over the references of that unit; coordinates of one point are
+    residual_before, residual_after : largest difference over the references of that unit; coordinates of one point are
         taken together, as a distance
     unit : mm, or deg where all lengths agree before and after
     explains : whether all references are met within their uncertainty
-    half_widths : greatest difference that is left, in half-widths of its reference
+    half_widths : largest difference that is left, in half-widths of its reference
     indistinguishable_from : the faults of other hypotheses that no reference tells from this one; if it explains, all
         others that explain with as few faults
     to_decide : what would distinguish them; None if there is nothing to tell apart
@@ -460,7 +460,7 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
 
 
 def _least_left(ranking: Ranking, unit: Unit) -> float:
-    """The least that any hypothesis leaves of the greatest difference in a unit."""
+    """The least that any hypothesis leaves of the largest difference in a unit."""
     left, _, units = residuals(ranking, ranking.pool.difference)
     return float(left[:, [each == unit for each in units]].max(axis=1).min())
 
@@ -468,7 +468,7 @@ def _least_left(ranking: Ranking, unit: Unit) -> float:
 def residuals(ranking: Ranking, difference: Reals) -> tuple[Reals, Reals, list[Unit]]:
     """Differences (..., n) as lengths of vectors: residual (..., m), uncertainty (m,), and their units.
 
-    The uncertainty of a vector is the greatest of its coordinates'.
+    The uncertainty of a vector is the largest of its coordinates'.
     """
     vectors = vectors_of(ranking.references)
     _, uncertainty = expected_of(ranking.references)

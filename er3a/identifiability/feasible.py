@@ -52,8 +52,8 @@ class OpenTable:
     Attributes
     ----------
     amounts : (k,), added to the table's entries, in their scales; off, slope : (m,), (m, k) there
-    excess : greatest violation there, in half-widths
-    chi2 : least sum of squares of what has a standard deviation
+    excess : largest violation there, in half-widths
+    chi2 : smallest sum of squares of what has a standard deviation
     places : where extremes are attained
     """
 
@@ -114,7 +114,7 @@ class Region:
         return self.asked.slope(self.at(amounts), entries)
 
     def excess(self, off: Reals) -> float:
-        """The greatest violation, in half-widths."""
+        """The largest violation, in half-widths."""
         return float(self.asked.excess(off))
 
     def start(self, amounts: Reals, few_first: bool = True) -> OpenTable:

@@ -265,7 +265,7 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
 
 @kernel
 def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
-    """Least and greatest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
+    """Smallest and largest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
     for n in range(q.shape[0]):
         for j in range(6):
             low = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) * PER_TURN)

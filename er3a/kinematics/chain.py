@@ -1,7 +1,7 @@
 """From a robot's table to the form that all kernels use.
 
 Both D-H conventions are the product ``links[0] J(x_1) links[1] ... J(x_m) links[m]`` with constant ``links``, J a
-rotation about z by x (a joint that turns) or a shift along z by x (one that slides; its fixed theta is in the links):
+rotation about z by x (a revolute joint) or a shift along z by x (a prismatic one; its fixed theta is in the links):
 standard rows put ``Tz(d) Tx(a) Rx(alpha)`` behind their joint [1]_, modified rows put ``Rx(alpha) Tx(a)`` before it and
 ``Tz(d)`` behind [2]_ (Rx and Tx commute). A calibrated table may add ``Ry(beta)`` behind ``Rx(alpha)``, for axes that
 are parallel but for an error [3]_. Joint axes are the z axes of the frames before each joint. Solvers by class take
@@ -61,7 +61,7 @@ def constant_links(robot: Robot, frame: int | None = None) -> Reals:
 
 
 def joint_starts(robot: Robot) -> Reals:
-    """What each row's motion x begins with at u = 0: (m,), the offset of those that turn, 0 of those that slide."""
+    """What each row's motion x begins with at u = 0: (m,), the offset of revolute ones, 0 of prismatic ones."""
     return np.where(robot.sliding, 0.0, robot.offset)
 
 
@@ -108,7 +108,7 @@ def link_parts(robot: Robot) -> Reals:
 
 @derived
 def axes_at_zero_theta(robot: Robot) -> tuple[Reals, Reals, Reals]:
-    """Joint axes with all x at 0 (theta of joints that turn; not the manufacturer's zero pose), in the base frame.
+    """Joint axes with all x at 0 (theta of revolute joints; not the manufacturer's zero pose), in the base frame.
 
     Returns
     -------

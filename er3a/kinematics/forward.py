@@ -27,8 +27,8 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
 
     Parameters
     ----------
-    q : (..., n), rad (m where a joint slides), the manufacturer's joint values. ``er3a.forward`` refuses NaN, and warns
-        (``er3a.InputWarning``) of values that can only be degrees; here NaN in a row gives NaN in its pose
+    q : (..., n), rad (m for a prismatic joint), the manufacturer's joint values. ``er3a.forward`` refuses NaN,
+        and warns (``er3a.InputWarning``) of values that can only be degrees; here NaN in a row gives NaN in its pose
     frame : None for the tool point (``T_base_tool``); 0..m for the frame after that joint in the table's own
         convention, base included, tool not
     out : (..., 4, 4) writeable float64 C-contiguous array to fill and return
@@ -88,7 +88,7 @@ def jacobian(robot: Robot, q: Reals) -> Reals:
 
     Returns
     -------
-    J : (..., 6, n); rows 0-2 linear velocity (m/rad, or m/m for joints that slide), rows 3-5 angular velocity
+    J : (..., 6, n); rows 0-2 linear velocity (m/rad, or m/m for prismatic joints), rows 3-5 angular velocity
     """
     q = checked_joints(robot, q)
     out = np.empty((*q.shape[:-1], 6, robot.rows))
@@ -281,7 +281,7 @@ def _keep_axis(rows: Reals, sign: float, column: Reals) -> None:
 
 @kernel
 def _along(column: Reals) -> None:
-    """The tool point's velocity by a joint that slides: its axis, and no turn."""
+    """The tool point's velocity by a prismatic joint: its axis, and no turn."""
     for i in range(BLOCK):
         for r in range(3):
             column[r * BLOCK + i], column[(3 + r) * BLOCK + i] = column[(3 + r) * BLOCK + i], 0.0

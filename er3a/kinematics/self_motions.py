@@ -31,7 +31,7 @@ class SelfMotionCurve(ByValue, Displayed):
     q0 : (n,), rad or m, the member nearest to the reference (least root of summed squares), within the limits if
         ``within_limits``
     direction : (n,), rad or m per rad of t, at q0
-    range : (2,), least and greatest t up to which all members from q0 on are within the limits; of a curve of which
+    range : (2,), smallest and largest t up to which all members from q0 on are within the limits; of a curve of which
         none is, one lap
     max_margin_member : (n,), the member found farthest from all joint limits; max_margin : its distance from them
     dimension : 1; above it, this curve is one of many on a surface of solutions

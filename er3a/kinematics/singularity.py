@@ -5,7 +5,7 @@ type of singularity: *wrist* (axes 4 and 6 align), *elbow* (arm straight or fold
 in the plane of axis 1 and the direction of axis 2, where turning joint 1 can't move it). So is that of an arm with
 parallel axes 2, 3 and 4: there the wrist centre is where axes 5 and 6 meet, and the forearm ends on axis 4.
 
-Along a motion any arm is singular where its Jacobian loses rank. Columns of joints that slide, and linear rows, are
+Along a motion any arm is singular where its Jacobian loses rank. Columns of prismatic joints, and linear rows, are
 scaled by the arm's length. With six joints the determinant changes sign where the motion crosses the singular set. With
 more, or fewer, rank loss is judged by the smallest singular value. Between two samples nothing is missed: turning joint
 j by d changes the scaled Jacobian by at most ``B_j d`` in norm, and no singular value by more [3]_, so an interval
@@ -100,8 +100,8 @@ def characteristic_length(robot: Robot) -> float:
 def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditioning:
     """Manipulability, condition number and smallest singular value at joint values (..., n) in rad or m.
 
-    Of an arm with fewer than six joints the singular values are those of its n columns. Columns of joints that slide
-    are multiplied by the length too, so that they compare with those of joints that turn.
+    Of an arm with fewer than six joints the singular values are those of its n columns. Columns of prismatic joints
+    are multiplied by the length too, so that they compare with those of revolute joints.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ class RankLoss:
 
 
 def scaled_jacobian(robot: Robot, q: Reals) -> Reals:
-    """Jacobian (..., 6, n) with linear rows in parts of the arm's length, and sliding joints too."""
+    """Jacobian (..., 6, n) with linear rows in parts of the arm's length, and prismatic joints too."""
     length = arm_length(robot)
     J = jacobian(robot, q)
     J[..., :3, :] /= length
@@ -254,7 +254,7 @@ def rank_losses(
     t : (N,), s, rising; q : (N, n), rad or m, NaN where unreachable
     joints : joint values (k, n) at times (k,) within reach
     threshold : of the smallest singular value of :func:`scaled_jacobian`
-    speed : (n,), greatest joint speeds of the motion, rad/s or m/s, with which nothing between samples is missed; None:
+    speed : (n,), maximum joint speeds of the motion, rad/s or m/s, with which nothing between samples is missed; None:
         as the samples show, times 1.5
     """
     found: list[RankLoss] = []

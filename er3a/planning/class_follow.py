@@ -60,7 +60,7 @@ class ArmAngleLaw:
     """An arm angle along a path: values (3,), rad, at the start, half way and at the end, or Chebyshev series (k,) of a
     ``bent`` one over the way.
 
-    ``slot`` is the solution that keeps the least distance ``margin`` (rad, m) from the joint limits.
+    ``slot`` is the solution that keeps the smallest distance ``margin`` (rad, m) from the joint limits.
     """
 
     values: Reals
@@ -137,8 +137,8 @@ def _margins_alone(robot: Robot, q: Reals) -> Reals:
 
 
 def _even_way(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
-    """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the least sum of squared
-    steps that keeps half of the margin that one can keep; None if none keeps the limits.
+    """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the smallest sum of
+    squared steps that keeps half of the margin that one can keep; None if none keeps the limits.
 
     Parameters
     ----------
@@ -195,8 +195,8 @@ class _LawSearch:
         return float(self._margins(q[:, None, self.slots[s : s + 1]], np.zeros((len(q), 1), np.int64))[0, 0])
 
     def _margins(self, q: Reals, place: Integers) -> Reals:
-        """Least distances (L, s) from the limits, rad, of motions through rows (K, A, s, n) at places (K, L) in A: by
-        turns that hold on the whole way. Less than nothing where a joint leaps, -inf where a pose is not reached."""
+        """Smallest distances (L, s) from the limits, rad, of motions through rows (K, A, s, n) at places (K, L) in A:
+        by turns that hold on the whole way. Less than nothing where a joint leaps, -inf where a pose is not reached."""
         robot, count = self.robot, self.robot.joints
         turns = whole_turns(robot)
         near = np.zeros(count) if self.start is None else self.start
@@ -223,8 +223,8 @@ def _quadratic(values: Reals, share: Reals) -> Reals:
 def _ranges(
     q: Reals, place: Integers, near: Reals, turns: tuple[Reals, Reals], lines: Reals
 ) -> tuple[Reals, Reals, Reals]:
-    """Least and greatest values (L, s, m) of lines (m, n) of joints, through rows (K, A, s, n) at places (K, L), made
-    continuous by whole turns (steps (n, r), counts (r, n)) from those nearest to ``near`` (n,) on; and the greatest
+    """Smallest and largest values (L, s, m) of lines (m, n) of joints, through rows (K, A, s, n) at places (K, L), made
+    continuous by whole turns (steps (n, r), counts (r, n)) from those nearest to ``near`` (n,) on; and the largest
     step (L, s) of a joint, infinite where there is no row."""
     poses, _, slots, joints = q.shape
     shape = (place.shape[1], slots, len(lines))
@@ -385,7 +385,7 @@ def _first_within_limits(
     robot: Robot, path: ToolPath, ways: Iterable[tuple[Reals, Callable[[Reals], Reals]]], *, turns_open: bool
 ) -> PiecewiseMotion:
     """The first of the motions from starts (n,), with what tells all rows (N, slots, n) at times, that keeps all
-    limits; else the first that there is. ``turns_open`` tells whether whole turns of the starts may be changed."""
+    limits; else the first one. ``turns_open`` tells whether whole turns of the starts may be changed."""
     found: list[PiecewiseMotion] = []
     ends: list[PathEndsError] = []
     for start, rows_at in ways:

@@ -8,7 +8,7 @@ have turned by little, the inverse of J has grown by little, so that::
     |q''''| <= B (|v'''| + C (4 V Z + 3 A^2 + 6 V^2 A + V^4)),
 
 with b the norm of the inverse at the pose solved, h the way from there, V, A, Z sums over the joints of the sizes of
-q', q'', q''', and C the greatest length of a column of J (turning an earlier joint turns a column, turning a later one
+q', q'', q''', and C the largest length of a column of J (turning an earlier joint turns a column, turning a later one
 turns its lever: no derivative of a column is longer). Under a coupling u = c q, V is the sum of the rows' rates, C is
 of the rows' columns, and the norm of c goes with sqrt(n). Where the bound on q'' that is put in comes out no greater,
 the motion exists over the whole interval, on one branch and without a singular pose [1]_; Taylor's formula then bounds
@@ -411,7 +411,7 @@ def _continued(
 
 
 def inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Reals]:
-    """Norm (k,) of the inverse of the scaled Jacobian, and greatest lever of the tool point over the length."""
+    """Norm (k,) of the inverse of the scaled Jacobian, and largest lever of the tool point over the length."""
     J = jacobian(robot, q)
     J[..., :3, :] /= length
     least = np.linalg.svd(J, compute_uv=False)[..., -1]

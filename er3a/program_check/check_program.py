@@ -209,7 +209,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     Raises
     ------
     ShapeError, PoseError
-        for a start that has not an angle for each joint, and a frame that is no rigid transform
+        for a start that lacks an angle for each joint, and a frame that is no rigid transform
     """
     options = options or CheckOptions()
     execution = execute(program, robot, options.start, options.frames, options.limits, options.keep_on)

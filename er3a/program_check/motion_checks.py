@@ -99,7 +99,7 @@ class AssumedRates:
 
     Attributes
     ----------
-    tool_speed : m/s; tool_acceleration : m/s^2; joint_share : of the joints' greatest speed
+    tool_speed : m/s; tool_acceleration : m/s^2; joint_share : of the joints' maximum speed
     """
 
     tool_speed: float = 0.25
@@ -191,7 +191,7 @@ def limit_moment(law: MotionLaw, side: LimitSide, start: Reals, end: Reals) -> f
 
 
 def speed_moment(law: MotionLaw, share_of_max: float) -> float:
-    """When (s) the speed comes to a share (0 to 1) of its greatest, on the ramp up."""
+    """When (s) the speed comes to a share (0 to 1) of its largest, on the ramp up."""
     return law.ramp * law.duration * share_of_max
 
 
@@ -464,7 +464,7 @@ def _points(length: float, turned: float) -> int:
 def _rate_moments(
     arm: Robot, law: MotionLaw, greatest: tuple[Reals, Reals], limits: JointLimits
 ) -> dict[CheckFinding, float]:
-    """Of a joint move with greatest speeds and accelerations (n,), each with when (s) it gets too great."""
+    """Of a joint move with maximum speeds and accelerations (n,), each with when (s) it gets too great."""
     found: dict[CheckFinding, float] = {}
     speed = greatest[0]
     for j in np.flatnonzero(speed > limits.speed * (1 + SPEED_TOLERANCE)).tolist():

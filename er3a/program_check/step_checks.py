@@ -399,7 +399,7 @@ class _Near:
     inverse : (n, 6), of J0; size : its absolute values
     changes : (n, n, n), sizes of J0^-1 dJ/dq_i, by i
     weights : (n,), by which rows of the table move per joint, in sum
-    reach : greatest lever of the tool point, over ``length`` (m)
+    reach : largest lever of the tool point, over ``length`` (m)
     """
 
     inverse: Reals
@@ -430,7 +430,7 @@ class _Near:
         return np.asarray(np.sqrt((self.inverse**2).sum(axis=1)), np.float64)
 
     def column(self, moved: Reals) -> tuple[Reals, float]:
-        """Greatest length of the columns (n,) of J while joints move by (n,), and by how much rows do in sum."""
+        """Largest length of the columns (n,) of J while joints move by (n,), and by how much rows do in sum."""
         rows = float(self.weights @ moved)
         longest = math.hypot(1.0, self.reach * math.exp(min(rows, 1.0)))
         return longest * self.weights, rows
@@ -681,7 +681,7 @@ class StepChecker:
 
     def joint_moves_instead(self, number: int) -> tuple[Reals, ...]:
         """Joint moves (n,), one or two, that take the tool where a motion does and pass its checks; empty if none was
-        found, and of arms with joints that slide.
+        found, and of arms with prismatic joints.
 
         The first that passes is taken: straight to the solution nearest to the start, or else round by the middle of
         both with some joints turned away. They are checked at the share of full speed that is assumed.

@@ -866,9 +866,9 @@ def execute(
     Raises
     ------
     InputError
-        for an arm that the program's language, or the table, has not the joints of
+        for an arm whose number of joints the program's language, or the table, does not have
     ShapeError, PoseError
-        for a start that has not an angle for each joint, and a frame that is no rigid transform
+        for a start that lacks an angle for each joint, and a frame that is no rigid transform
     """
     if robot is not None and (reason := _not_meant(program, robot)):
         raise InputError(program.file, None, reason, "Give the arm that the program is meant for")

@@ -109,7 +109,7 @@ class SpeedsEstimated:
 
 @dataclass(frozen=True)
 class SpeedsCut:
-    """Speeds above what the joints can do were written as the greatest."""
+    """Speeds above what the joints can do were written as the largest."""
 
     motions: int
     code: Literal["written_speeds_cut"] = "written_speeds_cut"

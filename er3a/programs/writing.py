@@ -546,11 +546,11 @@ def short(value: float, digits: int = 6) -> str:
     return text + "0" if text.endswith(".") else text
 
 
-ASSUMED_JOINT_SPEED = math.radians(100.0)  # rad/s, of a joint whose greatest speed no table gives
+ASSUMED_JOINT_SPEED = math.radians(100.0)  # rad/s, of a joint whose maximum speed no table gives
 
 
 def joint_speeds(robot: Robot | None, joints: int) -> Reals:
-    """Greatest speeds (n,) of the joints, rad/s."""
+    """Maximum speeds (n,) of the joints, rad/s."""
     if robot is None:
         return np.full(joints, ASSUMED_JOINT_SPEED)
     return np.where(np.isnan(robot.speed), ASSUMED_JOINT_SPEED, robot.speed)

@@ -31,7 +31,7 @@ class LimitExceeded:
 
 @dataclass(frozen=True)
 class SlideExceeded:
-    """A joint that slides is beyond its upper or below its lower limit, by the excess."""
+    """A prismatic joint is beyond its upper or below its lower limit, by the excess."""
 
     joint: int
     side: Literal["above", "below"]
@@ -98,7 +98,7 @@ def theta_limits(robot: Robot) -> Reals:
 
 
 def limit_margin(robot: Robot, q: Reals) -> Reals:
-    """Least distance (...,) of joints (..., n) from their limits, rad (m of joints that slide); negative outside.
+    """Smallest distance (...,) of joints (..., n) from their limits, rad (m of prismatic joints); negative outside.
 
     Infinite where all joints are continuous. Limits of sums of joints count too.
     """
@@ -169,7 +169,7 @@ def but_for_turns(robot: Robot, q: Reals) -> Reals:
 
 
 def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
-    """Least and greatest number of turns to add so that each value lies within its limits (least > greatest: none).
+    """Smallest and largest number of turns to add so that each value lies within its limits (smallest > largest: none).
 
     Of a continuous joint the turn it has is given; of one that a turn of its own would move elsewhere 0, or none if it
     is outside.

@@ -129,7 +129,7 @@ def nearest_rows(
     robot: Robot, q: Reals, q_ref: Reals, around: tuple[Reals, Reals] | None = None
 ) -> tuple[Reals, Flags]:
     """The same arms (N, n) as joints (N, n) by the turns that keep all limits and are nearest to q_ref (N, n): by the
-    least greatest move, then the least sum of moves; and whether there are such turns (N,).
+    smallest maximum move, then the smallest sum of moves; and whether there are such turns (N,).
 
     Where there are none, joints are left as they are if steps are whole turns of one joint each; else, of those that
     leave no joint's limit by more than half of what a turn of each row moves it, come the turns that leave limits
@@ -163,7 +163,7 @@ def turns_inward(robot: Robot, low: Reals, high: Reals) -> Reals:
 
     Parameters
     ----------
-    low, high : (N, n + s), rad or m, least and greatest values of joints and sums along each motion
+    low, high : (N, n + s), rad or m, smallest and largest values of joints and sums along each motion
     """
     turns = whole_turns(robot)
     middle = (low + high)[:, : robot.joints] / 2

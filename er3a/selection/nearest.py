@@ -1,6 +1,6 @@
 """Which of several joint solutions is nearest to where the arm comes from, and why it is taken, or why none is.
 
-Of the admissible solutions the one is taken whose greatest joint move from the reference is least
+Of the admissible solutions the one is taken whose maximum joint move from the reference is smallest
 (:func:`er3a.geometry.vectors.max_joint_move`, the measure of *nearest* wherever solutions are ranked): where all joints
 start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the least root of the
 summed squares of all joint moves decides, then the lower branch number.
@@ -81,7 +81,7 @@ class OnlyAdmissible:
 
 @dataclass(frozen=True)
 class MovesLess:
-    """Its greatest joint move is less than the next best solution's, by ``less_deg``."""
+    """Its largest joint move is less than the next best solution's, by ``less_deg``."""
 
     move: MaxJointMove
     less_deg: float
@@ -91,7 +91,7 @@ class MovesLess:
 
 @dataclass(frozen=True)
 class MovesLessTogether:
-    """The greatest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
+    """The largest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
 
     move: MaxJointMove
     less_deg: float
@@ -189,7 +189,7 @@ def nearest(
 
 
 def _first(rows: list[int], distance: Reals, branch: Integers) -> int:
-    """Of rows whose greatest moves are alike."""
+    """Of rows whose largest moves are alike."""
     least = min(distance[row] for row in rows)
     return min((row for row in rows if distance[row] <= least + SAME_MOVE), key=lambda row: (branch[row], row))
 

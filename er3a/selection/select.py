@@ -60,9 +60,9 @@ class Rule:
 
 
 def joint_weights(robot: Robot) -> Reals:
-    """Weights (n,) of joint moves: the greatest lever (m) at which each joint swings the tool, the longest being 1.
+    """Weights (n,) of joint moves: the largest lever (m) at which each joint swings the tool, the longest being 1.
 
-    A joint near the base moves more of the arm; a joint with no lever still counts a tenth. A joint that slides moves
+    A joint near the base moves more of the arm; a joint with no lever still counts a tenth. A prismatic joint moves
     the tool by as much as itself.
     """
     lengths = np.abs(robot.a) + np.abs(robot.d)
@@ -332,7 +332,7 @@ def select_sequence(
     ----------
     poses : the solutions of each pose, in order; rows outside the limits or in collision are left out
     q_ref : (6,), rad, where the arm starts
-    rule : how a move costs: "nearest" (greatest joint move), "weighted" or "time"
+    rule : how a move costs: "nearest" (largest joint move), "weighted" or "time"
     acceleration : (n,), rad/s^2; moves by "time" then run from rest to rest, else at full speed throughout
 
     Raises
@@ -385,7 +385,8 @@ def best_of_sets(
 
 
 def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
-    """Least time (..., n) in s in which joints turn by angles (..., n) from rest to rest, on triangle or trapezoid."""
+    """Smallest time (..., n) in s in which joints turn by angles (..., n) from rest to rest, on triangle or
+    trapezoid."""
     short = angle < speed**2 / acceleration
     time: Reals = np.where(short, 2 * np.sqrt(angle / acceleration), angle / speed + speed / acceleration)
     return time

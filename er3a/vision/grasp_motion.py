@@ -33,7 +33,7 @@ from er3a.robots.robot import Robot
 
 Part = Literal["move", "approach", "retreat"]
 PARTS: tuple[Part, ...] = ("move", "approach", "retreat")
-DEPTH = 2e-4  # m, to within which the least clearance is found
+DEPTH = 2e-4  # m, to within which the smallest clearance is found
 PEAKS = (15 / 8, 10 / np.sqrt(3), 60.0)  # of a quintic from rest to rest: speed, acceleration and jerk, by duration
 SPARE = 1.02  # of the duration, so that bounds settle what samples allow
 LEAST_DURATION = 0.05  # s
@@ -108,7 +108,7 @@ def tool_leg(
     Parameters
     ----------
     waypoints : (k, n), rad, joints along it, from a search
-    speed : m/s, the tool's greatest
+    speed : m/s, the tool's largest
     """
     if parallel_axes_arm(robot) is None and closed_form_missing(robot) is not None:
         return joint_legs(part, waypoints, limits)

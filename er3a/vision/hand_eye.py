@@ -376,7 +376,7 @@ class MethodAnswer(ByValue):
     ----------
     X : (4, 4); None where the method fails
     apart_mm, apart_deg : from the likeliest hand-eye pose
-    beyond : the greatest ratio of a difference in X's six numbers to half its 95 % interval
+    beyond : the largest ratio of a difference in X's six numbers to half its 95 % interval
     """
 
     name: MethodName
@@ -563,7 +563,7 @@ def _shared_covariance(samples: CalibrationSet, refined: Refined) -> Reals:
 
 
 def _check_determined(samples: CalibrationSet) -> tuple[float, float]:
-    """The greatest turn between two samples and how far the rotation axes leave one direction, rad."""
+    """The largest turn between two samples and how far the rotation axes leave one direction, rad."""
     if len(samples) < LEAST_SAMPLES:
         raise HandEyeError(TooFewSamples(len(samples), LEAST_SAMPLES))
     for stream in ("flange", "target"):

@@ -50,8 +50,8 @@ LEAST_FREEDOM = 6
 class NoCorrections:
     """Why no corrections come with a calibration.
 
-    ``joints``: no joint angles were recorded, or the arm has not six; ``few``: too few samples for so many numbers;
-    ``steps``: the search does not end.
+    ``joints``: no joint angles were recorded, or the arm does not have six; ``few``: too few samples for so many
+    numbers; ``steps``: the search does not end.
     """
 
     why: Literal["joints", "few", "steps"]

@@ -50,7 +50,7 @@ class Capability:
     reachability : ratio of the directions [1]_, or of what else is asked, that are reached
     solutions : branches within limits, the mean over reached directions (0 where none is), of the roll that has most
     most_solutions : the most branches that any direction has
-    manipulability : m^3, the greatest ``|det J|`` [2]_ of any reached pose
+    manipulability : m^3, the largest ``|det J|`` [2]_ of any reached pose
     """
 
     reachability: Reals

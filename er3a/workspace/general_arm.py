@@ -36,9 +36,9 @@ class GeneralArm(NamedTuple):
     ----------
     links : (n, 4, 4), from the frame of each row's joint to that of the one before; the first unused
     tip : (3,), m, the tool point in the frame that moves with the last of these joints
-    sliding : (n,), whether the joint slides
+    sliding : (n,), whether the joint is prismatic
     lower, upper : (n,), rad or m, what x is never outside of, turns at most a full one wide
-    levers, radii : (n,), m, the point is never further from each axis; a joint that slides has the lever 1
+    levers, radii : (n,), m, the point is never further from each axis; a prismatic joint has the lever 1
     heights : (n, 2), lowest and highest z of the point along each axis once its joint moved, m
     drive, start : (n, m) and (n,)
     v_lower, v_upper : (m,), limits of v; combined (c, m), least, most (c,): ``least <= combined @ v <= most``.
@@ -306,7 +306,7 @@ def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Re
     Parameters
     ----------
     theta : (n,), rad or m
-    radii : (n,), set to the point's distance from each axis, m; 1 for joints that slide
+    radii : (n,), set to the point's distance from each axis, m; 1 for prismatic joints
     columns : (n, 3), set to the derivative of the point by each value, m
     frame : (3, 4), working memory
 

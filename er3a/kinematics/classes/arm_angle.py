@@ -462,7 +462,7 @@ def feasible_arm_angles(arm: ArmAngleArm, T: Reals, lower: Reals, upper: Reals) 
 
 
 def _margins(q: Reals, lower: Reals, upper: Reals) -> Reals:
-    """Least distance from a limit (...,) of rows (..., 7), each joint in its best turn; -inf without a solution."""
+    """Smallest distance from a limit (...,) of rows (..., 7), each joint in its best turn; -inf without a solution."""
     middle = 0.5 * (lower + upper)
     q = middle + (q - middle) - TURN * np.round((q - middle) / TURN)
     margin = np.minimum(q - lower, upper - q).min(axis=-1)
@@ -470,7 +470,7 @@ def _margins(q: Reals, lower: Reals, upper: Reals) -> Reals:
 
 
 def widest_margin(arm: ArmAngleArm, T: Reals, lower: Reals, upper: Reals) -> tuple[float, int, Reals, float] | None:
-    """Arm angle, slot, joints (7,) and margin (rad) with the greatest distance from all limits; None if none is within.
+    """Arm angle, slot, joints (7,) and margin (rad) with the largest distance from all limits; None if none is within.
 
     Each interval is searched at 64 arm angles, then by thirds around the best; peaks narrower than its 64th part
     could be missed.

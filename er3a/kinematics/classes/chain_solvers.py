@@ -108,7 +108,8 @@ class Unsolved(WithoutParameters):
 
 
 def chain_solver(links: Reals, sliding: Flags) -> ChainSolver:
-    """The solver of a chain with constant links (n + 1, 4, 4), m, whose joints slide where ``sliding`` (n,) says so."""
+    """The solver of a chain with constant links (n + 1, 4, 4), m, whose joints are prismatic where ``sliding`` (n,)
+    says so."""
     links, sliding = np.ascontiguousarray(links, dtype=float), np.asarray(sliding, dtype=bool)
     for recognised_as in CLOSED_FORMS:
         if (solver := recognised_as(links, sliding)) is not None:
@@ -392,6 +393,6 @@ def with_joint_fixed(links: Reals, joint: int, value: float) -> Reals:
 def with_free_roll(links: Reals) -> Reals:
     """Links of the chain with one more revolute joint, about the tool's z axis: for tools that may turn about it.
 
-    Solved for any pose with the wanted tool point and axis, its last joint is the turn that is left over.
+    Solved for any pose with the required tool point and axis, its last joint is the turn that is left over.
     """
     return np.concatenate([links, np.eye(4)[None]])

@@ -275,7 +275,7 @@ class ArmAngle:
 
 @dataclass(frozen=True, eq=False)
 class ThreeSliding(WithoutParameters):
-    """Six joints, three of which slide."""
+    """Six joints, three of them prismatic."""
 
     arm: Gantry
     code: ArmClassCode = "gantry"
@@ -291,7 +291,7 @@ class ThreeSliding(WithoutParameters):
 
 @dataclass(frozen=True, eq=False)
 class PlanarFour(WithoutParameters):
-    """Four joints of one direction, one of them sliding."""
+    """Four joints of one direction, one of them prismatic."""
 
     arm: Scara
     code: ArmClassCode = "scara"

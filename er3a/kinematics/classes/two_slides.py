@@ -1,6 +1,6 @@
-"""Six joints of which two slide, in any order and direction: all solutions, up to eight.
+"""Six joints, two of them prismatic, in any order and direction: all solutions, up to eight.
 
-The four joints that turn must close the orientation alone, ``Rz(x_1) A_1 Rz(x_2) A_2 Rz(x_3) A_3 Rz(x_4) A_4 = 1``:
+The four revolute joints must close the orientation alone, ``Rz(x_1) A_1 Rz(x_2) A_2 Rz(x_3) A_3 Rz(x_4) A_4 = 1``:
 the loop of a spherical four-bar. For each x_1 two angles x_2 do so, and the other two follow from both. The position is
 linear in the slides, so they go out with one determinant [1]_: that of both sliding directions and of where the loop
 ends with both slides at 0. Its product over both angles x_2, times a power of what the roots of x_2 divide by, is a
@@ -80,7 +80,7 @@ class TwoSlides:
 
 
 def two_slides(links: Reals, sliding: Flags, seed: int = 7) -> TwoSlides | None:
-    """The solver for links (7, 4, 4) of which two joints slide; None if no reading of the loop determines its
+    """The solver for links (7, 4, 4) two of whose joints are prismatic; None if no reading of the loop determines its
     solutions."""
     size = size_of(links)
     scaled = np.array(links, float)
@@ -201,7 +201,7 @@ def _zeros(terms: Reals, degree: int) -> Reals:
 
 @inner_kernel
 def _loop_of(reading: SlideReading, pose_link: Reals, links: Reals, A: Reals) -> None:
-    """Fill ``links`` (6, 4, 4) of the loop and the rotations ``A`` (4, 3, 3) behind each joint that turns."""
+    """Fill ``links`` (6, 4, 4) of the loop and the rotations ``A`` (4, 3, 3) behind each revolute joint."""
     for i in range(6):
         links[i] = reading.links[i]
     K = links[reading.place]

@@ -63,11 +63,11 @@ class TableNumbers:
     upper_arm_deg, forearm_deg : from the vertical, all joints at 0
     tool_mm, example_mm, example_rpy_deg : tool point at 0, and the pose of the article's example
     solutions, within_limits : of the article's target; ``nearest_deg`` the one within the limits that is nearest to 0
-    volume_m3 : proven bounds; reach_mm : greatest distance of the tool point from axis 1
+    volume_m3 : proven bounds; reach_mm : largest distance of the tool point from axis 1
     void_litres : proven bounds of the largest enclosed void, None without one; void_mm : its centre
     other_voids : bounds (L) of other enclosed ones, and z (mm) of their centres
     line : of the article's straight line the verdict; None where the study has no such path
-    move_clearance_mm, line_clearance_mm : least clearance on the article's paths
+    move_clearance_mm, line_clearance_mm : smallest clearance on the article's paths
     """
 
     statements: int | None
@@ -394,14 +394,14 @@ def _hidden_percent(robot: Robot) -> float:
 
 
 def _holding_nm(real: Robot, seed: int, load: Load | None) -> float | None:
-    """The greatest torque (N m) that joint 2 holds at rest at random poses; None where no link's mass is known."""
+    """The maximum torque (N m) that joint 2 holds at rest at random poses; None where no link's mass is known."""
     if not real.masses.links:
         return None
     return float(np.abs(gravity(real, random_joints(real, seed, CLOUD), load)[:, 1]).max())
 
 
 def _reach_check(validation: ValidationSummary, real: str) -> ReachCheck | None:
-    """The greatest distance of the wrist centre from axis 1, if the real arm's references know it."""
+    """The largest distance of the wrist centre from axis 1, if the real arm's references know it."""
     wanted = Reach("greatest", "wrist_centre", 1)
     for check in validation.checks:
         if isinstance(check, ReferenceCheck) and check.reference_set == real and check.subject == wanted:

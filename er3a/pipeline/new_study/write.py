@@ -76,7 +76,7 @@ class SampledReach:
     ----------
     q : (N, n) rad or m, drawn within the limits, a tenth of each range away from them
     poses : (N, 4, 4) m
-    radius : m, greatest distance from the base's origin
+    radius : m, largest distance from the base's origin
     side_deg : about the base's z axis, where most of the points lie; one of ``SIDES_DEG``
     stands : whether the arm works above its mounting plane rather than below it
     """

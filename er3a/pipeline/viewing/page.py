@@ -422,7 +422,7 @@ def alternative_table(study: Study, name: str, results: Path) -> str | None:
 
 
 def panel_link(q_deg: Iterable[float], text: str) -> str:
-    """A text that leads to the arm at joint values (deg; mm of joints that slide) in the teach panel."""
+    """A text that leads to the arm at joint values (deg; mm of prismatic joints) in the teach panel."""
     joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
     return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)
 

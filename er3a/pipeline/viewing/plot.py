@@ -31,7 +31,7 @@ def plot(robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] |
     ----------
     q : (n,), rad or m: a figure; (N, n): an animation with the tool's trail, which a notebook plays
     seconds : how long the animation lasts
-    window : (6,), m, what the axes show: least and greatest x, y, z, as ``workspace`` of the Robotics Toolbox; None
+    window : (6,), m, what the axes show: smallest and largest x, y, z, as ``workspace`` of the Robotics Toolbox; None
         for all of the motion
 
     Returns
@@ -43,7 +43,7 @@ def plot(robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] |
     Raises
     ------
     ShapeError
-        if q is neither, or the window has not six numbers
+        if q is neither, or the window does not have six numbers
     """
     edges = None if window is None else as_floats(np.asarray(window), "window")
     if edges is not None and edges.shape != (6,):

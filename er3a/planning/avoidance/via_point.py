@@ -99,7 +99,7 @@ class BentPath:
 
 
 def shifted_via(segment: SingularSegment) -> Avoidance | NotPossible:
-    """Bend the path by the least shift of the tool point, its orientation kept."""
+    """Bend the path by the smallest shift of the tool point, its orientation kept."""
     return _via(segment, "shift")
 
 

@@ -132,7 +132,7 @@ def _mixed(share: float) -> tuple[float, ...]:
 
 
 def clearance_over_time(results: CollisionResults) -> Picture | None:
-    """Least distance over time, path by path."""
+    """Smallest distance over time, path by path."""
     rows = results.paths
     names = [str(name) for name in dict.fromkeys(rows.path) if np.isfinite(rows.clearance_mm[rows.path == name]).any()]
     if not names:

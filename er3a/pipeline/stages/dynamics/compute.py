@@ -178,7 +178,7 @@ class LoadedArm:
 
     Attributes
     ----------
-    unit_payload : 1 kg of the payload whose greatest mass is asked for
+    unit_payload : 1 kg of the payload whose largest mass is asked for
     links_grade, load_grade : of the masses
     limits : joint speeds and accelerations, partly assumed
     """
@@ -221,7 +221,7 @@ class PathTorques:
     ----------
     asked : whether the path is to be run, not to show a fault
     demand, imbalance : None where the arm can't follow it
-    inertia : (n, 2), least and greatest that each joint moves, without rotor
+    inertia : (n, 2), smallest and largest that each joint moves, without rotor
     load : that the program names which the path is from
     """
 
@@ -335,7 +335,7 @@ def _joint_loads(robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, a
 def _margins(
     arm: LoadedArm, parts: TorqueParts, t: Reals, q: Reals, qd: Reals, qdd: Reals
 ) -> tuple[Margin | None, Margin | None]:
-    """Greatest further payload and greatest speed scale under peak and rated torques, and joint speeds."""
+    """Largest further payload and maximum speed scale under peak and rated torques, and joint speeds."""
     drives = drives_of(arm.robot)
     more = arm.with_unit.rigid_torques(q, qd, qdd) - arm.model.rigid_torques(q, qd, qdd)
     viscous = known(drives.viscous) * qd

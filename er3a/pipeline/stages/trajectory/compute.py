@@ -193,8 +193,8 @@ class AvoidanceTask:
         ]
 
     def _meets(self, cost: StrategyCost, margin: float) -> tuple[PairOverlaps | PairTooNear | None, float | None]:
-        """The deepest overlap on a motion, or what comes nearer than a margin (m), and its least clearance in mm (None
-        if nothing can meet)."""
+        """The deepest overlap on a motion, or what comes nearer than a margin (m), and its smallest clearance in mm
+        (None if nothing can meet)."""
         curve = cost.motion.curve
         grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
         along = clearance_along(
@@ -222,7 +222,7 @@ class AvoidanceTask:
             yield self._rows(motion.entry.name, FASTEST, quickest, None)
 
     def _rows(self, path: str, strategy: str, timed: Timed, deviations: tuple[Reals, Reals] | None) -> AvoidanceRows:
-        """At most ROWS rows of a motion, and those of its greatest speed and deviation."""
+        """At most ROWS rows of a motion, and those of its maximum speed and deviation."""
         kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))
         kept = kept if deviations is None else np.union1d(kept, [np.argmax(deviations[0])])
         times = np.union1d(timed.t[kept], [self._fastest_time(timed)])
@@ -245,7 +245,7 @@ class AvoidanceTask:
         )
 
     def _fastest_time(self, timed: Timed) -> float:
-        """When a joint comes nearest to its greatest speed."""
+        """When a joint comes nearest to its maximum speed."""
         curve = timed.curve
         j = int(np.argmax(timed.greatest[0] / self.limits.speed))
         return max(curve.of_joint(curve.velocity, j, sign).peak() for sign in (1.0, -1.0))[1]
@@ -263,7 +263,7 @@ class _ToolPath:
 
 
 def speed_ratio(velocity: Reals, limits: JointLimits) -> Reals:
-    """Greatest ratio of a joint's speed to its limit (N,), of velocities (N, 6) in rad/s; NaN where unknown."""
+    """Largest ratio of a joint's speed to its limit (N,), of velocities (N, 6) in rad/s; NaN where unknown."""
     ratio: Reals = np.abs(velocity / limits.speed).max(axis=1)
     return ratio
 

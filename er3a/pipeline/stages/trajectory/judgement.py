@@ -65,7 +65,7 @@ class Judgement:
     times, q, velocity, acceleration : (N,) s and (N, n) in rad, rad/s, rad/s^2 at all points of the table
     max_speed, max_acceleration : (n,), rad/s and rad/s^2; None where they have no bound
     speed_bounded : False where the exact path needs a joint speed without bound
-    velocity_check : rad/s, greatest difference between velocities through the Jacobian and by differences of angles
+    velocity_check : rad/s, largest difference between velocities through the Jacobian and by differences of angles
     """
 
     verdict: PathVerdict
@@ -86,7 +86,7 @@ class Judgement:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Faults of a motion, and its greatest speeds and accelerations (n,), if any are known."""
+    """Faults of a motion, and its maximum speeds and accelerations (n,), if any are known."""
 
     events: list[SingularEvent]
     limits: list[Interval[LimitCause]]

@@ -168,7 +168,7 @@ class BodiesOverlap:
 
     @property
     def depth_mm(self) -> float:
-        """The greatest overlap of all."""
+        """The largest overlap of all."""
         return max(each.depth_mm for each in self.touches)
 
 
@@ -199,7 +199,7 @@ class ClearUntil:
 
     Attributes
     ----------
-    xyz_mm, rpy_deg : of the tool in the base frame; q_deg : in mm where a joint slides
+    xyz_mm, rpy_deg : of the tool in the base frame; q_deg : in mm for a prismatic joint
     contact_mm : where the first bodies touch, further on
     """
 
@@ -265,8 +265,8 @@ class PathSummary:
     too_fast : where a joint exceeds a limit of speed, acceleration or jerk
     undecided : where the bounds between the poses that are solved leave something open
     max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound; speeds
-        of joints that slide (``sliding``, from 1) in mm/s
-    velocity_check_deg_s : greatest difference of joint velocities by the Jacobian and by differences of angles
+        of prismatic joints (``sliding``, from 1) in mm/s
+    velocity_check_deg_s : largest difference of joint velocities by the Jacobian and by differences of angles
     clearance : None where none could be measured
     no_way : why no motion was planned, of one that is to be
     clear_until : how far it could be used; None where it does not collide, or keeps the margin nowhere

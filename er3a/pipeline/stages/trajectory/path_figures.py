@@ -260,7 +260,7 @@ def _small_measures(ax: Axes, rows: PathChecks) -> None:
 
 
 def _effort(ax: Axes, path: PathSummary, rows: PathChecks, motions: AvoidanceRows) -> None:
-    """The joints' greatest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
+    """The joints' largest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
     ax.plot(rows.t_s / rows.t_s[-1], rows.speed_ratio, color=HIGHLIGHT, label=tr("as programmed"))
     shown = [rows.speed_ratio]
     for name, colour, label in ((path.strategy, MODEL, tr("repaired")), (FASTEST, MUTED, tr("at its fastest"))):
@@ -354,7 +354,7 @@ class ClearanceSection:
 
 
 def clearance_section(results: TrajectoryResults, most: int) -> ClearanceSection:
-    """What the section needs; at most so many paths, those with the least clearance, are drawn."""
+    """What the section needs; at most so many paths, those with the smallest clearance, are drawn."""
     paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
     if not paths:
         return ClearanceSection(None, [])

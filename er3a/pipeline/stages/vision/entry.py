@@ -20,7 +20,7 @@ class VisionSettings(StrictModel):
 
     ``least_singular_value`` : of the Jacobian with lengths divided by the wrist's reach. ``least_success`` : the
     probability of success below which an object is not graspable. ``map_cells`` : cells across the map of errors.
-    ``line_speed_mm_s`` : the tool's greatest speed on approach and retreat. Limits of the joints' rates, and the
+    ``line_speed_mm_s`` : the tool's maximum speed on approach and retreat. Limits of the joints' rates, and the
     languages in which grasps are written as programs, are those of ``trajectory``.
     """
 

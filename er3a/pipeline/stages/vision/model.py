@@ -109,7 +109,7 @@ class MethodResult:
 
     Attributes
     ----------
-    beyond : the greatest difference of its six numbers, in half widths of the 95 % interval
+    beyond : the largest difference of its six numbers, in half widths of the 95 % interval
     """
 
     method: MethodName

@@ -324,7 +324,7 @@ def _draw_arm(axes: Axes, robot: Robot, frame: SectionFrame, origin: Reals) -> N
 
 
 def _raster(points: Reals, steps: list[float], percent: Singles, proven: Flags) -> tuple[list[Reals], Reals, Flags]:
-    """Edges of the raster's columns and rows (m), the greatest value in each of its cells (proven ones first; -1: none
+    """Edges of the raster's columns and rows (m), the largest value in each of its cells (proven ones first; -1: none
     there), and whether one is proven."""
     low = points.min(axis=0)
     index = tuple(np.floor((points - low) / steps + 1e-3).astype(int).T)
