@@ -19,6 +19,7 @@ from er3a.kinematics.singularity import TYPES, NearSingular
 from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
+from er3a.planning.motion_faults import Interval, RateCause, RateCheck, RateLimit
 from er3a.planning.path_verdicts import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.planning.tool_proof import ProofRequirements
@@ -33,6 +34,14 @@ JERK_TIME_S = 0.1  # in which a joint may reach its full acceleration, of paths 
 GRAVITY: tuple[PathVerdict, ...] = ("safe", "near-singular", "undecided", "too fast for the assumed limits", "singular")
 BESIDE = 3  # points of the oracle by which its times may be off
 CHECKS = 4
+
+
+def rate_intervals(polynomials, limit: RateLimit) -> list[Interval[RateCause]]:
+    """Where joints exceed a limit of speed, acceleration or jerk."""
+    check = RateCheck(limit)
+    for part in polynomials.parts():
+        check.add(part)
+    return check.intervals()
 
 
 @dataclass

@@ -586,12 +586,6 @@ def parts_of(evidence: Evidence) -> tuple[PartEvidence, ...]:
     return tuple(found)
 
 
-def settles_tool(evidence: Evidence) -> bool:
-    """Whether everything that moves the tool is settled."""
-    found = (*evidence.entries, *evidence.combinations)
-    return evidence.table_meets and all(each.status in SETTLED for each in found if each.moves_tool)
-
-
 def together(evidence: Evidence, names: list[str]) -> ToolOff:
     """How far the tool is off at most if any of the discrete readings of these entries hold together."""
     readings = [each for each in evidence.readings if set(each.names) <= set(names)]

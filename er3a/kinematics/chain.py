@@ -135,25 +135,6 @@ def arm_length(robot: Robot) -> float:
     return 0.5 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0
 
 
-def links_of_rows(a: Reals, alpha: Reals, d: Reals, offset: Reals | None = None) -> Reals:
-    """Constant links (n + 1, 4, 4) of standard D-H rows (n,) in m and rad; joint angles are theta less ``offset``.
-
-    For a prismatic joint ``d`` is the joint's offset and ``offset`` its fixed theta.
-    """
-    n = len(a)
-    turn = np.zeros(n) if offset is None else np.asarray(offset, float)
-    links = np.tile(np.eye(4), (n + 1, 1, 1))
-    for k in range(n):
-        c, s, ct, st = np.cos(alpha[k]), np.sin(alpha[k]), np.cos(turn[k]), np.sin(turn[k])
-        links[k + 1] = [
-            [ct, -st * c, st * s, ct * a[k]],
-            [st, ct * c, -ct * s, st * a[k]],
-            [0, s, c, d[k]],
-            [0, 0, 0, 1],
-        ]
-    return links
-
-
 def poses_of(links: Reals, q: Reals, prismatic: Flags | None = None) -> Reals:
     """Poses (..., 4, 4) of the last link for joint values (..., n)."""
     q = np.asarray(q, float)

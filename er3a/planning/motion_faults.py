@@ -720,14 +720,6 @@ def limit_intervals(robot: Robot, motion: Polynomials) -> list[Interval[LimitCau
     return check.intervals()
 
 
-def rate_intervals(motion: Polynomials, limit: RateLimit) -> list[Interval[RateCause]]:
-    """Where joints exceed a limit of speed, acceleration or jerk; a step of the acceleration exceeds any of jerk."""
-    check = RateCheck(limit)
-    for part in motion.parts():
-        check.add(part)
-    return check.intervals()
-
-
 @dataclass(eq=False)
 class _Stretch:
     """Nodes of a signed distance, monotone between them, all along a stretch of pieces near its set.

@@ -10,7 +10,7 @@ from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_bodies, arm_shapes, capsule_poses, default_envelopes
+from er3a.collision.shapes import arm_bodies, arm_shapes, default_envelopes, link_frames
 from er3a.dynamics.arm_model import estimated_links
 from er3a.errors import InputError, InputWarning
 from er3a.files.robot_library import ROBOTS, load_robot
@@ -29,6 +29,13 @@ def segment_distances(ends: np.ndarray, points) -> float:
     """Distance of lines sampled finely from a function of points."""
     t = np.linspace(0, 1, 2001)[:, None]
     return min(points(start + t * (end - start)).min() for start, end in ends)
+
+
+def capsule_poses(robot, capsules, q) -> np.ndarray:
+    """End points (..., n, 2, 3) of the capsules' lines, m, at joint values (..., n)."""
+    T = link_frames(robot, q)[..., [each.link for each in capsules], :, :]
+    ends = np.array([(each.start, each.end) for each in capsules])
+    return np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
 
 
 def test_capsules_follow_the_arm(robot, random):

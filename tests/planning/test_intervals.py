@@ -17,7 +17,6 @@ from er3a.planning.motion_faults import (
     TooFast,
     limit_intervals,
     out_of_limits,
-    rate_intervals,
     rates_exceeded,
     unreachable,
 )
@@ -27,6 +26,7 @@ from er3a.planning.timing import joint_limits
 from er3a.planning.tool_proof import ProofRequirements, follow_and_prove
 from er3a.robots.joint_limits import CombinationExceeded
 from er3a.robots.robot import CombinedLimit
+from testing.motion_cases import rate_intervals
 
 GRID = np.linspace(0, 1, 21)
 

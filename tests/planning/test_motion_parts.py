@@ -10,8 +10,9 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.singularity import NearSingular
 from er3a.planning import piecewise
-from er3a.planning.motion_faults import MaxRates, RateLimit, SingularCheck, limit_intervals, rate_intervals
+from er3a.planning.motion_faults import MaxRates, RateLimit, SingularCheck, limit_intervals
 from er3a.planning.piecewise import MotionInParts
+from testing.motion_cases import rate_intervals
 
 BREAKS = np.linspace(0.0, 2.0, 21)  # s
 NEAR = NearSingular(np.radians(5.0), np.radians(5.0), 0.03)

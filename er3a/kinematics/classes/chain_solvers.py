@@ -377,22 +377,3 @@ def _neighbours(links: Reals) -> tuple[AxisPair, ...]:
         miss = np.linalg.norm(np.cross(apart, axes[k])) if sine < PARALLEL else abs(apart @ across) / sine
         found.append(AxisPair(k + 1, float(np.arctan2(sine, abs(axes[k] @ axes[k + 1]))), float(miss)))
     return tuple(found)
-
-
-def with_joint_fixed(links: Reals, joint: int, value: float) -> Reals:
-    """Links (n, 4, 4) of the chain with one revolute joint (number from 0) held at a value in rad.
-
-    With :mod:`six_revolute` this solves any seven-joint arm at one value of the joint that is taken as its redundancy.
-    """
-    c, s = np.cos(value), np.sin(value)
-    turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-    held = np.array(links[joint] @ turn @ links[joint + 1])
-    return np.concatenate([links[:joint], held[None], links[joint + 2 :]])
-
-
-def with_free_roll(links: Reals) -> Reals:
-    """Links of the chain with one more revolute joint, about the tool's z axis: for tools that may turn about it.
-
-    Solved for any pose with the required tool point and axis, its last joint is the turn that is left over.
-    """
-    return np.concatenate([links, np.eye(4)[None]])
