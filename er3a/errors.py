@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from er3a.findings import Finding
+from er3a.by_value import Finding
 
 
 class Er3aError(Exception):

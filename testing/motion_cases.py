@@ -20,7 +20,7 @@ from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.motion_faults import Interval, RateCause, RateCheck, RateLimit
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.planning.tool_proof import ProofRequirements
 from testing.dense_contacts import Contacts

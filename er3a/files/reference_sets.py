@@ -14,8 +14,8 @@ import scipy
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Written, read_csv
+from er3a.files.kept_files import names, own_or_shipped
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.files.shipped import names, own_or_shipped
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import ZERO_POSE, NotOfArm, Pose, Quantity, Rotation3, not_of_arm

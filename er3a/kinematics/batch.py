@@ -19,7 +19,7 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions, slot_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
-from er3a.numerics.threads import parallel_for
+from er3a.numerics.jit import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import whole_turns

@@ -47,8 +47,7 @@ from er3a.kinematics.solutions import (
 )
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import arctan2, cos_sin
-from er3a.numerics.jit import inner_kernel, kernel
-from er3a.numerics.threads import parallel_for
+from er3a.numerics.jit import inner_kernel, kernel, parallel_for
 from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, unwound, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move

@@ -28,7 +28,7 @@ from er3a.pipeline.results import plain
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured
 from er3a.pipeline.stages.trajectory.motion import listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, written
-from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
+from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import ProofRequirements
 from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import (

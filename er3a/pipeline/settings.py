@@ -8,7 +8,7 @@ from pydantic import Field
 
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
-from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.names import StrategyName
 from er3a.programs.syntax import LanguageName
 from er3a.robots.robot import MOST_JOINTS
 

@@ -26,7 +26,7 @@ import numpy as np
 import scipy
 from numpy.polynomial import chebyshev
 
-from er3a.findings import Finding
+from er3a.by_value import Finding
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import (
     TYPES,

@@ -17,10 +17,10 @@ from er3a.pipeline.messages import planning as messages
 from er3a.planning.avoidance import avoidance, strategies, via_point
 from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare, deviation
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
+from er3a.planning.names import StrategyName
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import within
 

@@ -28,7 +28,7 @@ from er3a.pipeline.stages.validation.model import ReferenceCheck, ValidationSumm
 from er3a.pipeline.stages.workspace.model import VoidSummary, VoidUnexpected, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.skeleton import skeleton
-from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.names import StrategyName
 from er3a.planning.profiles import quintic, trapezoid
 from er3a.planning.toolbox import RAMP, quaternion, zyz
 from er3a.references.subjects import Reach

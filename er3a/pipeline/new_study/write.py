@@ -26,14 +26,13 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
-from er3a.files.kept_files import write_atomically
+from er3a.files.kept_files import ROOT, write_atomically
 from er3a.files.path_file import PathFile, ProgramPath
 from er3a.files.reference_sets import FORMATS
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
 from er3a.files.robot_library import read_robot, robot_of, robot_path
 from er3a.files.robot_writer import robot_file, yaml_text
 from er3a.files.scene_file import SceneFile
-from er3a.files.shipped import ROOT
 from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.formats.mesh_file import read_text

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from er3a.kinematics.solutions import TargetOutcome
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.programs.syntax import ProgramOutcome
 from er3a.vision.vision_findings import GraspOutcome
 

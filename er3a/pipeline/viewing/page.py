@@ -25,8 +25,7 @@ from matplotlib.figure import Figure
 
 from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
-from er3a.files.kept_files import write_atomically
-from er3a.files.shipped import INSTALLED, ROOT, view_command
+from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text

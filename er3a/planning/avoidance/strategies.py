@@ -51,9 +51,9 @@ from er3a.planning.avoidance.avoidance import (
     coarse,
     singular_segment,
 )
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.avoidance.via_point import shifted_via, tilted_via
 from er3a.planning.follow import Followed, follow
+from er3a.planning.names import StrategyName
 from er3a.planning.timing import Timed, TimingError, joined, straight, through
 from er3a.planning.way_around import NoWayAround
 from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded, within

@@ -61,7 +61,7 @@ from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measu
 from er3a.pipeline.stages.trajectory.judgement import verdict_of as verdict_of_motion
 from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, limits_of, near_singular, study_motions
 from er3a.pipeline.study import Study
-from er3a.planning.path_verdicts import NOT_TO_BE_RUN, PathVerdict
+from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, no_body, together

@@ -15,7 +15,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, per_joint
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.planning.timing import NoTimeLaw
 from er3a.robots.robot import Grade
 

@@ -65,9 +65,8 @@ from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.motion_faults import Interval, SingularEvent
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, within

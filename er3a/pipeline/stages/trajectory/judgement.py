@@ -41,7 +41,7 @@ from er3a.planning.motion_faults import (
     singular_events,
     unreachable,
 )
-from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
+from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Undecided

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
+from er3a.by_value import Finding
 from er3a.collision.pairs import Pair, PairOverlaps, PairTooNear
-from er3a.findings import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
@@ -19,9 +19,8 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.motion_faults import LimitCause, PathOutOfReach, RateCause
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.tool_proof import Undecided
 from er3a.planning.way_around import NoWayAround
 

@@ -26,7 +26,7 @@ from er3a.planning.class_follow import PathEndsError, follow_by_class
 from er3a.planning.commands import Built, Command, CommandSource, PlanCommand, build
 from er3a.planning.follow import Followed
 from er3a.planning.moves import JointMove
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.sequences import JointSequence
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
