@@ -203,8 +203,8 @@ def wait(segment: SingularSegment) -> Avoidance | NotPossible:
         "er3a/planning/avoidance/strategies.py": (
             ('    "stop": stop,\n', '    "stop": stop,\n    "wait": wait,\n'),
             (
-                "from er3a.planning.avoidance.via_point",
-                "from er3a.planning.avoidance.wait import wait\nfrom er3a.planning.avoidance.via_point",
+                "from er3a.planning.follow import",
+                "from er3a.planning.avoidance.wait import wait\nfrom er3a.planning.follow import",
             ),
         ),
     }

@@ -16,7 +16,7 @@ from scipy.stats import kendalltau
 
 from er3a.dynamics.torques import gravity
 from er3a.geometry.transforms import rotation_angle, rpy_of, transform
-from er3a.kinematics.forward import forward, frames, jacobian
+from er3a.kinematics.forward import forward, frames, jacobian, skeleton
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.singularity import characteristic_length, conditioning
@@ -27,7 +27,6 @@ from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectorySummary
 from er3a.pipeline.stages.validation.model import ReferenceCheck, ValidationSummary
 from er3a.pipeline.stages.workspace.model import VoidSummary, VoidUnexpected, WorkspaceSummary
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.planning.names import StrategyName
 from er3a.planning.profiles import quintic, trapezoid
 from er3a.planning.toolbox import RAMP, quaternion, zyz

@@ -31,7 +31,7 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.pages import GRADE_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, say, say_all, word
-from er3a.pipeline.results import Provenance, Stored, read_stage, read_status
+from er3a.pipeline.results import AbsentResults, Provenance, Stored, read_stage, read_status
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
@@ -430,3 +430,15 @@ def stage_head(folder: Path, stage: Stage) -> Head:
     """The verdict and key figures that a folder holds, in the page's language."""
     words = import_module(stage.messages)
     return head_of(read_stage(folder, stage), words.FIGURES)
+
+
+def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
+    """Write the page of a stage that was not computed: the verdict, and where it comes from."""
+    render(
+        Path(__file__).with_name("absent.html.j2"),
+        output,
+        head=head_of(stored, {}),
+        command=run_command(study, f"{stored.robot}/{stored.stage}.html"),
+        robot=study.robot(stored.robot),
+        robot_pages=study.pages(stored.robot),
+    )

@@ -12,10 +12,9 @@ from matplotlib.animation import FuncAnimation
 from matplotlib.figure import Figure
 
 from er3a.errors import ShapeError
-from er3a.kinematics.forward import forward, frames
+from er3a.kinematics.forward import forward, frames, skeleton
 from er3a.numerics.arrays import Reals, as_floats
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 

@@ -20,6 +20,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from er3a.collision.scene import Scene
+from er3a.kinematics.forward import skeleton
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
@@ -52,7 +53,6 @@ from er3a.pipeline.viewing.palette import (
     VERDICTS,
 )
 from er3a.pipeline.viewing.palette import JOINTS as COLOURS
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 

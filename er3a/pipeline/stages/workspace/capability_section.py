@@ -16,6 +16,7 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.geometry.transforms import rpy_along
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, own_title, tr
@@ -43,7 +44,6 @@ from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
