@@ -1,6 +1,7 @@
 """Hand-eye calibration: the likeliest poses of camera and board, how sure they are, and what speaks against them.
 
-Samples that can't be right: found without any calibration, by angles, and with one, by residuals.
+Outliers, samples that can't be right: found without any calibration, by angles (:func:`check_angles`), and with one,
+by residuals (:func:`worst_sample`).
 
 Between two samples hand and board turn by equal angles, whatever the hand-eye pose, and whichever way round the
 transforms are written [1]_. Samples are taken out, the one in most conflicts first, until all pairs left agree. For
