@@ -546,7 +546,7 @@ def short(value: float, digits: int = 6) -> str:
     return text + "0" if text.endswith(".") else text
 
 
-ASSUMED_JOINT_SPEED = math.radians(100.0)  # rad/s, of a joint whose maximum speed no table gives
+ASSUMED_JOINT_SPEED = math.radians(100.0)  # rad/s, of a joint whose greatest speed no table gives
 
 
 def joint_speeds(robot: Robot | None, joints: int) -> Reals:
