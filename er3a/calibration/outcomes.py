@@ -63,7 +63,7 @@ class MorePositions:
 
     Attributes
     ----------
-    coordinates, poses : that there are
+    coordinates, poses : how many were measured
     determined, determinable : entries of the level that they determine, and that positions of these points ever can
     level : the level that is out of reach
     least : how many more positions it takes

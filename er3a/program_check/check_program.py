@@ -339,7 +339,7 @@ BY_JOINT_MOVES = frozenset(
         *("configuration_changes", "joint_jumps", "whole_turn", "motion_collides", "clear_of_assumed", "undecided"),
     )
 )
-"""Findings of motions that joint moves to another solution, or round by a point, may have not."""
+"""Findings of motions that joint moves to another solution, or round by a point, may be free of."""
 MOST_ADVISED = 20  # motions for which such moves are looked for
 
 

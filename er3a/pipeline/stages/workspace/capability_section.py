@@ -104,7 +104,7 @@ def place_row(name: str, place: PlaceSummary, capability: CapabilitySummary) -> 
         branch = tr("with joints {joints} at several values", joints=numbers(capability.held_joints))
         branch = branch if capability.held_joints else tr("at several arm angles")
     elif place.branch is None:
-        branch = tr("changes within the box") if capability.named_branches else tr("not told: branches have no names")
+        branch = tr("changes within the box") if capability.named_branches else tr("not known: branches have no names")
     elif place.status == place.branch_status:
         branch = branch_word(place.branch)
     else:
