@@ -379,7 +379,7 @@ class ErrorMapRows(Table):
 
 
 @dataclass(frozen=True, eq=False)
-class GraspPathRows(Table):
+class PathRows(Table):
     """Joint angles along the way to each object grasped, and away from it."""
 
     target: Texts = column("name of the object")
@@ -405,7 +405,7 @@ class VisionResults(Results[VisionSummary]):
 
     samples: SampleRows
     error_map: ErrorMapRows
-    ways: GraspPathRows
+    ways: PathRows
     programs: GraspPrograms
     corners: CornerRows
 
