@@ -15,11 +15,12 @@ from eaik.IK_DH import DhRobot
 
 from er3a import Robot, forward, inverse, inverse_batch, jacobian, load_robot
 from er3a.kinematics.by_class import task_mask
-from er3a.kinematics.chain import links_of_rows, poses_of
+from er3a.kinematics.chain import poses_of
 from er3a.kinematics.classes.arm_angle import arm_angle_arm, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import solve_three_parallel
 from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.six_revolute import prepared, solve_six_revolute
+from testing.arms import links_of_rows
 from testing.evidence import sized
 
 POSES = sized(2000, 400)

@@ -12,6 +12,12 @@ How objects show themselves to people in Python: a few lines of text, or a table
 
 What is shown is a :class:`Sheet`; codes and numbers stand in it as they are, since sentences are no business of the
 library. Every sheet is short however much the object holds.
+
+What computation finds: codes with typed parameters, from which sentences are made elsewhere.
+
+A finding is a frozen dataclass whose last field is ``code: Literal["some_code"] = "some_code"``; its other fields are
+the parameters, plain or findings themselves, with the unit in the name. Several kinds of finding in one place are a
+union. Nothing decides by a sentence: code asks for the type or the code.
 """
 
 from __future__ import annotations
@@ -24,7 +30,7 @@ from functools import cached_property
 from html import escape
 from itertools import islice
 from types import MethodType
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -194,8 +200,8 @@ def shortly(value: Any) -> str:
     if isinstance(value, float):
         return ABSENT if math.isnan(value) else f"{round(value, 9) + 0.0:.6g}"
     if is_dataclass(value) and not isinstance(value, type) and hasattr(value, "code"):
-        told = [f"{each.name}={shortly(getattr(value, each.name))}" for each in fields(value) if each.name != "code"]
-        return _cut(value.code + (f" ({', '.join(told)})" if told else ""))
+        values = [f"{each.name}={shortly(getattr(value, each.name))}" for each in fields(value) if each.name != "code"]
+        return _cut(value.code + (f" ({', '.join(values)})" if values else ""))
     if isinstance(value, tuple | list):
         return _cut(", ".join(shortly(each) for each in islice(value, MOST_ROWS)) or ABSENT)
     return _cut(str(value))
@@ -237,3 +243,14 @@ def _left_out(sheet: Sheet) -> tuple[str, ...]:
 def _cut(text: str) -> str:
     text = "".join(letter if letter.isprintable() else " " for letter in text)
     return text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 3] + "..."
+
+
+class Finding(Protocol):
+    """Any finding."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def code(self) -> str:
+        """What was found: the stable identifier that summaries hold."""
+        ...

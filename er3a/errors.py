@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from er3a.findings import Finding
+from er3a.by_value import Finding
 
 
 class Er3aError(Exception):
@@ -32,8 +32,8 @@ class InputError(Er3aError):
         self.problem = _line(problem, 300)
         self.remedy = _line(remedy, 400)
         where = ": ".join(part for part in (self.file, self.field) if part)
-        told = f"{self.problem}. {self.remedy}"
-        super().__init__(f"{where}: {told}" if where else told)
+        message = f"{self.problem}. {self.remedy}"
+        super().__init__(f"{where}: {message}" if where else message)
 
 
 class InputWarning(UserWarning):
@@ -108,9 +108,9 @@ class WriteError(Er3aError):
 
     def __init__(self, file: str | Path, error: OSError):
         self.file = str(file)
-        told = os.strerror(error.errno) if error.errno else str(error)
+        reason = os.strerror(error.errno) if error.errno else str(error)
         remedy = "Free disk space or fix the permissions, then run again"
-        super().__init__(f"{_line(str(file))}: can't be written ({told}). {remedy}")
+        super().__init__(f"{_line(str(file))}: can't be written ({reason}). {remedy}")
 
 
 def _line(text: str, most: int | None = None) -> str:

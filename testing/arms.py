@@ -20,6 +20,25 @@ OTHERS_LONG = pytest.mark.parametrize(
 """For a test of the fixture ``robot`` that takes seconds: one robot in the fast set, the others among the long ones."""
 
 
+def links_of_rows(a: np.ndarray, alpha: np.ndarray, d: np.ndarray, offset: np.ndarray | None = None) -> np.ndarray:
+    """Constant links (n + 1, 4, 4) of standard D-H rows (n,) in m and rad; joint angles are theta less ``offset``.
+
+    For a prismatic joint ``d`` is the joint's offset and ``offset`` its fixed theta.
+    """
+    n = len(a)
+    turn = np.zeros(n) if offset is None else np.asarray(offset, float)
+    links = np.tile(np.eye(4), (n + 1, 1, 1))
+    for k in range(n):
+        c, s, ct, st = np.cos(alpha[k]), np.sin(alpha[k]), np.cos(turn[k]), np.sin(turn[k])
+        links[k + 1] = [
+            [ct, -st * c, st * s, ct * a[k]],
+            [st, ct * c, -ct * s, st * a[k]],
+            [0, s, c, d[k]],
+            [0, 0, 0, 1],
+        ]
+    return links
+
+
 def placement(xyz, rpy) -> np.ndarray:
     """A transform from metres and roll-pitch-yaw, by SciPy."""
     T = np.eye(4)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from er3a.files.shipped import ROOT
+from er3a.files.kept_files import ROOT
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import scaled_jacobian

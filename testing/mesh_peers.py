@@ -121,7 +121,7 @@ def held_against_meshes(path: Path, imported: UrdfImport, poses: int, seed: int)
     robot, peer, found = imported.robot, MeshPeer(path, imported), HeldAgainstMeshes()
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (poses, robot.joints))
     bodies, numbers = Bodies(robot, None), {link_label(k): k for k in range(robot.rows + 1)}
-    clear, free = bodies.least(q)[0], bodies.free(q)
+    clear, free = bodies.min_distance(q)[0], bodies.free(q)
     shapes, overlaps = _shape_distances(robot, q), bodies.overlaps(q)
     watched = Counter((pair.first, pair.second) for pair, joined in zip(bodies.pairs, bodies.joined) if not joined)
     nearest, slack = np.full(poses, np.inf), []

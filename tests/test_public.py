@@ -380,7 +380,7 @@ def test_all_that_public_objects_hold_can_be_compared(shown):
             assert type(each).__eq__ is not object.__eq__, type(each).__name__
             assert (each == pickle.loads(pickle.dumps(each))) is True, type(each).__name__
             left += [getattr(each, part.name) for part in fields(each) if part.compare]
-    assert {type(each).__name__ for each in met} >= {"Robot", "Masses", "Box", "Family", "CheckedMotion", "MotionWay"}
+    assert {type(each).__name__ for each in met} >= {"Robot", "Masses", "Box", "Family", "CheckedMotion", "MotionPath"}
 
 
 def test_copies_are_as_read_only_and_as_useful_as_the_robot(arm, pose):

@@ -152,7 +152,7 @@ def _what_more(
 
 
 def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -> tuple[Pose, ...]:
-    """Poses that add most to what is known: greedily the greatest gain in ln det of the information matrix."""
+    """Poses that add most to what is known: greedily the largest gain in ln det of the information matrix."""
     poses = spread(robot)
     candidates = observations.flange_at(robot, poses)
     blocks = SCALE * jacobian(robot, kept, candidates).reshape(len(poses), 3, len(kept))

@@ -41,7 +41,7 @@ class NotToldApart:
 
 @dataclass(frozen=True)
 class SetsScale:
-    """No length was measured, so that the longest keeps its value, and all others are told beside it."""
+    """No length was measured, so that the longest keeps its value, and all others are given beside it."""
 
     entry: str
     code: Literal["sets_scale"] = "sets_scale"
@@ -63,7 +63,7 @@ class MorePositions:
 
     Attributes
     ----------
-    coordinates, poses : that there are
+    coordinates, poses : how many were measured
     determined, determinable : entries of the level that they determine, and that positions of these points ever can
     level : the level that is out of reach
     least : how many more positions it takes

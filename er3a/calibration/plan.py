@@ -50,7 +50,7 @@ BEYOND = 10.0
 
 @dataclass(frozen=True)
 class Proposal:
-    """A pose to measure next: deg, or mm of joints that slide; what to touch or to use there, if not coordinates."""
+    """A pose to measure next: deg, or mm of prismatic joints; what to touch or to use there, if not coordinates."""
 
     pose: Pose
     kind: TouchKind | None = None

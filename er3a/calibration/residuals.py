@@ -43,7 +43,7 @@ class ResidualStructure:
     shares, probabilities : the same of each joint
     play_joint, play_share, play_probability : the joint whose last move's sign explains most, the share and its
         probability, for all joints; play : by how much it stops short, 1/1000 rad or m
-    worst_row, worst_mm : line of the file with the greatest residual
+    worst_row, worst_mm : line of the file with the largest residual
     """
 
     neighbours: float

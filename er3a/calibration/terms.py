@@ -66,7 +66,7 @@ class JointTerm:
 
 
 def candidates(robot: Robot) -> tuple[JointTerm, ...]:
-    """The terms that are tried beside ripples; joints that slide have no turns."""
+    """The terms that are tried beside ripples; prismatic joints have no turns."""
     return tuple(
         JointTerm(kind, row + 1)
         for kind in KINDS
@@ -110,7 +110,7 @@ class JointErrors(ByValue):
 
     Attributes
     ----------
-    robot : by whose table (the uncorrected one) heights are told
+    robot : by whose table (the uncorrected one) heights are computed
     terms : which; coefficients : (c,) of all, in order
     """
 

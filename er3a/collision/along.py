@@ -5,7 +5,7 @@ d1 at another, and move by M in between, they stay (d0 + d1 - M) / 2 apart [1]_:
 for every pair is free as a whole. Overlap counts as negative distance (the depth), for which the same holds: an
 interval in which a pair overlaps at both ends by more than M in sum overlaps as a whole. Any other one is halved.
 Halving ends where M is twice the ``depth`` asked for, so that no overlap deeper than that is missed, however small or
-thin the obstacle, and the least clearance is found to within it.
+thin the obstacle, and the smallest clearance is found to within it.
 
 M is the longer way of a capsule's two ends (its other points move no farther), in space for a solid, in the frame of
 the other link for two links. The way is bounded on a grid of the motion so fine that no end moves by more than
@@ -108,7 +108,7 @@ class ClearanceAlong:
 
     @property
     def least(self) -> int:
-        """Index of the least clearance; -1 if none is known."""
+        """Index of the smallest clearance; -1 if none is known."""
         return -1 if np.isnan(self.distance).all() else int(np.nanargmin(self.distance))
 
 
@@ -201,7 +201,7 @@ def clearance_along(
     at = np.array(sorted(time for time, found in motion.known.items() if not np.isnan(found).any()))
     at = np.union1d(at, shown[~np.isin(shown, at)])
     unknown = np.full(len(every), np.nan)
-    rows = bodies.told(np.array([motion.known.get(time, unknown) for time in at]))
+    rows = bodies.counted(np.array([motion.known.get(time, unknown) for time in at]))
     blind = np.asarray(np.isnan(rows).any(axis=1) | np.isinf(rows).all(axis=1))
     distance = np.where(blind, np.nan, rows.min(axis=1))
     pair = tuple(None if b else bodies.pairs[int(np.argmin(row))] for b, row in zip(blind, rows))
@@ -248,7 +248,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
     bodies = motion.bodies
-    best = min(float(bodies.told(motion.known[times[i]]).min()) for i in known)
+    best = min(float(bodies.counted(motion.known[times[i]]).min()) for i in known)
     waiting = [(a, b, every) for a, b in pairwise(known)]
     while waiting:
         a, b, pairs = waiting.pop()
@@ -263,7 +263,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
         pairs = pairs[~free]
         middle = int(np.clip(np.searchsorted(way[a : b + 1].sum(axis=1), way[[a, b]].sum() / 2) + a, a + 1, b - 1))
         found = motion.measure(times[middle], q[middle], pairs)
-        least = float(np.nanmin(bodies.told(found)))
+        least = float(np.nanmin(bodies.counted(found)))
         if least < best:
             best = least
             motion.measure(times[middle], q[middle], every)
@@ -271,7 +271,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
 
 
 def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Contact]:
-    """Stretches of overlap between known points, their ends located where the least distance is 0."""
+    """Stretches of overlap between known points, their ends located where the smallest distance is 0."""
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
     overlap = np.array([bool(np.nanmin(motion.known[times[i]]) <= 0) for i in known])
@@ -320,7 +320,7 @@ def _touch(
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """Least distances of arms.
+    """Smallest distances of arms.
 
     Attributes
     ----------
@@ -339,7 +339,7 @@ def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
 
 
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
-    """Least distance of each arm (N, n) in rad or m from the scene's solids and from itself.
+    """Smallest distance of each arm (N, n) in rad or m from the scene's solids and from itself.
 
     Raises
     ------
@@ -347,5 +347,5 @@ def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
         if the scene is none
     """
     bodies = bodies_of(robot, scene)
-    distance, pair = bodies.least(np.asarray(q, float).reshape(-1, robot.joints))
+    distance, pair = bodies.min_distance(np.asarray(q, float).reshape(-1, robot.joints))
     return Clearance(distance, tuple(bodies.pairs[k] if k >= 0 else None for k in pair))

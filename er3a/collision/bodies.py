@@ -113,8 +113,8 @@ class Bodies:
         """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, for points of one arm."""
         return self.nearest(ends, pairs)[0]
 
-    def told(self, distances: Reals) -> Reals:
-        """Distances (..., P) as they are told: infinite for joined pairs that don't overlap."""
+    def counted(self, distances: Reals) -> Reals:
+        """Distances (..., P) as they are counted: infinite for joined pairs that don't overlap."""
         return np.where(self.joined & (distances > 0), np.inf, distances)
 
     def nearest(self, ends: Reals, pairs: Integers) -> tuple[Reals, Reals]:
@@ -127,24 +127,25 @@ class Bodies:
             found[row] -= self._depth(world, int(pairs[row]))
         return found, near
 
-    def least(self, q: Reals) -> tuple[Reals, Integers]:
-        """Least distance (N,) in m of arms (N, n), negative by the depth, and the number of its pair (-1: none)."""
+    def min_distance(self, q: Reals) -> tuple[Reals, Integers]:
+        """Smallest distance (N,) in m of arms (N, n), negative by the depth, and the number of its pair (-1: none)."""
         q = np.ascontiguousarray(q, float)
         least, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
         measure(self.layout, q, np.empty((0, 0)), least, pair, deep)
         every = np.arange(len(self.pairs))
         for row in np.flatnonzero(deep):
-            distances = self.told(self.distances(self.ends(q[row]), every))
+            distances = self.counted(self.distances(self.ends(q[row]), every))
             pair[row] = int(distances.argmin())
             least[row] = distances[pair[row]]
         return least, pair
 
-    def least_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
-        """As :meth:`least`, for arms (N, n) many of which are others but for whole turns: those are measured once."""
+    def min_distance_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
+        """As :meth:`min_distance`, for arms (N, n) many of which are others but for whole turns: those are measured
+        once."""
         if self.robot.coupling is not None:
-            return self.least(q)
+            return self.min_distance(q)
         _, first, inverse = np.unique(but_for_turns(self.robot, q), axis=0, return_index=True, return_inverse=True)
-        least, pair = self.least(q[first])
+        least, pair = self.min_distance(q[first])
         return least[inverse.reshape(-1)], pair[inverse.reshape(-1)]
 
     def overlaps(self, q: Reals) -> Flags:

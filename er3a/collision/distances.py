@@ -10,8 +10,8 @@ A body is a core grown by a radius. The core is the hull of points, a cylinder (
 the radius of its disc) or a half-space (a normal, and how far along it the solid ends). The distance of two bodies is
 that of their cores less both radii. Two lines are measured in closed form [1]_, all else by the Gilbert-Johnson-Keerthi
 iteration [2]_, whose closest points of a simplex are found region by region [1]_. How deep two cores overlap is the
-least shift that parts them: their Minkowski difference holds the origin while they overlap, and its nearest face is the
-nearest way out [3]_.
+smallest shift that parts them: their Minkowski difference holds the origin while they overlap, and its nearest face is
+the nearest way out [3]_.
 
 References
 ----------

@@ -30,7 +30,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 
 Z_95 = 1.959963984540054
 POSES_A_ROUND = 8  # tried in a place in one round
-LEAST_EXTENT_M = 1e-4  # of what a tool point that stays in place is told to reach
+LEAST_EXTENT_M = 1e-4  # of what a tool point that stays in place is reported to reach
 DEPTH = 1e-3  # m; a move in which the arm may overlap by less than this, unproven, joins nothing
 LOOKS = 300  # arms looked at to prove one move
 

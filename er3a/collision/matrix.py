@@ -153,7 +153,7 @@ PairState = Literal["never", "joined", "overlaps", "guessed", "meets", "undecide
 
 BOXES = 50_000
 BOXES_MORE = 500  # for the other bodies of two links that are known to meet
-GOAL = 0.5  # of the least distance sampled, to be proven at first
+GOAL = 0.5  # of the smallest distance sampled, to be proven at first
 COAXIAL = 1e-9  # m
 TOUCH = 2e-3  # m
 MEETING = 0.05  # of the arm's length: axes that pass a point within that meet there

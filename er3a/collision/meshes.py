@@ -21,7 +21,6 @@ from er3a.errors import Er3aError
 from er3a.geometry.open3d_loader import load_open3d
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
-from er3a.robots.robot import Envelope
 
 CONVEX = 1e-6  # share of the volume by which a convex mesh may differ from its hull
 NEARLY_CONVEX = 0.1  # and by which a link's may, whose hull is then the better shape: pieces need a margin
@@ -201,53 +200,3 @@ def _corners(points: Reals) -> Reals:
     except scipy.spatial.QhullError:  # flat
         return points
     return corners
-
-
-def capsule_around(points: Reals, link: int) -> Envelope:
-    """A capsule that holds points (n, 3), m, and so their hull; along one of the cloud's principal axes.
-
-    Its radius is the greatest distance of a point from its line, so that it holds them by construction.
-    """
-    middle = points.mean(axis=0)
-    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
-    best: Envelope | None = None
-    smallest = np.inf
-    for axis in axes:
-        along = (points - middle) @ axis
-        across = points - np.outer(along, axis)
-        centre = _round_centre(across)
-        away = np.linalg.norm(across - centre, axis=1)
-        cap = np.sqrt(np.maximum(away.max() ** 2 - away**2, 0.0))
-        low, high = float((along + cap).min()), float((along - cap).max())
-        if low > high:
-            low = high = (low + high) / 2
-        start, end = centre + low * axis, centre + high * axis
-        radius = float(_from_line(points, start, end).max()) * (1 + 1e-12) + ROUNDING
-        volume = np.pi * radius**2 * (high - low + 4 / 3 * radius)
-        if volume < smallest:
-            smallest = volume
-            best = Envelope(link, _triple(start), _triple(end), radius)
-    assert best is not None
-    return best
-
-
-def _round_centre(points: Reals) -> Reals:
-    """About the centre of the smallest ball around points (n, 3): steps towards the farthest (Badoiu and Clarkson)."""
-    centre: Reals = (points.min(axis=0) + points.max(axis=0)) / 2
-    for step in range(1, 500):
-        farthest = points[np.linalg.norm(points - centre, axis=1).argmax()]
-        centre = centre + (farthest - centre) / (step + 1)
-    return centre
-
-
-def _from_line(points: Reals, start: Reals, end: Reals) -> Reals:
-    """Distances (n,) of points from the line between two points."""
-    along = end - start
-    share = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
-    distance: Reals = np.linalg.norm(points - start - share[:, None] * along, axis=1)
-    return distance
-
-
-def _triple(values: Reals) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z

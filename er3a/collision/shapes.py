@@ -99,14 +99,6 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     return tuple(found)
 
 
-def capsule_poses(robot: Robot, capsules: tuple[Envelope, ...], q: Reals) -> Reals:
-    """End points (..., n, 2, 3) of the capsules' lines in the base's surroundings, m, at joint values (..., n)."""
-    T = link_frames(robot, q)[..., [c.link for c in capsules], :, :]
-    ends = np.array([(c.start, c.end) for c in capsules])
-    placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
-    return placed
-
-
 def link_frames(robot: Robot, q: Reals) -> Reals:
     """Frames (..., m + 1, 4, 4) of the base and the links at joint values (..., n)."""
     T = frames(robot, q)

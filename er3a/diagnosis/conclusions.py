@@ -109,12 +109,13 @@ class TooSmallToTell:
     Attributes
     ----------
     candidates : all that meet them with the fewest faults
-    residual : the disagreement; told_from : the size of it from which on the references would tell most of them apart
+    residual : the disagreement; distinguishability : the size of it from which on the references would tell most of
+    them apart
     """
 
     candidates: tuple[Faults, ...]
     residual: float
-    told_from: float
+    distinguishability: float
     unit: Unit
     code: Literal["too_small_to_tell"] = "too_small_to_tell"
 
@@ -143,7 +144,7 @@ class NoFaultStandsOut:
     Attributes
     ----------
     missed, references : how many are missed, of how many
-    half_widths : greatest difference, in half-widths of its reference
+    half_widths : largest difference, in half-widths of its reference
     tried : hypotheses
     """
 

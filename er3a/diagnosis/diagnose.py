@@ -74,11 +74,11 @@ def deciding_measurement(tables: Tables, robot: Robot) -> NextMeasurement | None
     points = flanges[..., :3, 3] * MM
     apart = np.linalg.norm(points[:, None] - points[None, :], axis=-1)
     pairs = np.triu_indices(len(tables), 1)
-    told = (apart[pairs] > APART_MM).mean(axis=0)
-    best = int(np.lexsort((-apart[pairs].max(axis=0), -told))[0])
-    if told[best] > 0:
+    share = (apart[pairs] > APART_MM).mean(axis=0)
+    best = int(np.lexsort((-apart[pairs].max(axis=0), -share))[0])
+    if share[best] > 0:
         pose = cast(Pose, tuple(poses[best].tolist()))
-        return FlangePositionDecides(pose, float(told[best]), float(apart[pairs][:, best].max()))
+        return FlangePositionDecides(pose, float(share[best]), float(apart[pairs][:, best].max()))
     for side in SIDES:
         column = tables.lower if side == "lower" else tables.upper
         joints = np.flatnonzero(np.ptp(column, axis=0) > APART_RAD)
@@ -170,7 +170,7 @@ def _noticed_reversed(case: Case, joint: int) -> bool:
     return bool((np.abs(case.difference(turned)) > case.uncertainty * MEETS).any())
 
 
-def told_from(case: Case, ranking: Ranking) -> float | None:
+def distinguishability(case: Case, ranking: Ranking) -> float | None:
     """How many times larger the disagreement would have to be for the references to tell the first set apart.
 
     Each member but the first is refitted to what the first predicts, to first order; what then stays grows with the
@@ -225,11 +225,11 @@ class Hypothesis(ByValue, Displayed):
     Attributes
     ----------
     faults : one, or two; of conventions (zeros, directions, base, flange) as many as differ
-    residual_before, residual_after : greatest difference over the references of that unit; coordinates of one point are
+    residual_before, residual_after : largest difference over the references of that unit; coordinates of one point are
         taken together, as a distance
     unit : mm, or deg where all lengths agree before and after
     explains : whether all references are met within their uncertainty
-    half_widths : greatest difference that is left, in half-widths of its reference
+    half_widths : largest difference that is left, in half-widths of its reference
     indistinguishable_from : the faults of other hypotheses that no reference tells from this one; if it explains, all
         others that explain with as few faults
     to_decide : what would distinguish them; None if there is nothing to tell apart
@@ -451,7 +451,7 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
         missed = int((relative > MEETS).sum())
         return NoFaultStandsOut(missed, len(relative), float(relative.max()), tried)
     best = hypotheses[0]
-    if best.explains and (factor := told_from(case, ranking)) is not None:
+    if best.explains and (factor := distinguishability(case, ranking)) is not None:
         candidates = (best.faults, *best.indistinguishable_from)
         return TooSmallToTell(candidates, best.residual_before, factor * best.residual_before, best.unit)
     figures = best.residual_before, best.residual_after, best.unit
@@ -460,7 +460,7 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
 
 
 def _least_left(ranking: Ranking, unit: Unit) -> float:
-    """The least that any hypothesis leaves of the greatest difference in a unit."""
+    """The least that any hypothesis leaves of the largest difference in a unit."""
     left, _, units = residuals(ranking, ranking.pool.difference)
     return float(left[:, [each == unit for each in units]].max(axis=1).min())
 
@@ -468,7 +468,7 @@ def _least_left(ranking: Ranking, unit: Unit) -> float:
 def residuals(ranking: Ranking, difference: Reals) -> tuple[Reals, Reals, list[Unit]]:
     """Differences (..., n) as lengths of vectors: residual (..., m), uncertainty (m,), and their units.
 
-    The uncertainty of a vector is the greatest of its coordinates'.
+    The uncertainty of a vector is the largest of its coordinates'.
     """
     vectors = vectors_of(ranking.references)
     _, uncertainty = expected_of(ranking.references)

@@ -3,7 +3,7 @@
 Residuals are in half-widths of the references. A scan over a grid finds the basins (predictions are trigonometric
 polynomials of low degree in an angle and, but for unsigned coordinates, linear in a length), damped least squares [1]_
 go down to their bottoms, and where the bottom meets not all references, though its sum of squares leaves that open, the
-greatest residual is minimised instead, by Lawson's weights [2]_: a half-width is a bound and no standard deviation.
+largest residual is minimised instead, by Lawson's weights [2]_: a half-width is a bound and no standard deviation.
 
 References
 ----------
@@ -157,7 +157,7 @@ class Fits:
 
     @property
     def greatest(self) -> Reals:
-        """Greatest residual, (B,)."""
+        """Largest residual, (B,)."""
         greatest: Reals = np.abs(self.left).max(axis=1)
         return greatest
 
@@ -189,7 +189,7 @@ class Search:
 
 
 def descend(search: Search, fits: Fits, passes: int) -> Fits:
-    """Least sum of squares from where ``fits`` are; no row gets worse."""
+    """Smallest sum of squares from where ``fits`` are; no row gets worse."""
     damping = np.full(len(fits), DAMPING)
     for _ in range(passes if len(fits) else 0):
         slopes = search.slopes(fits)
@@ -203,7 +203,7 @@ def descend(search: Search, fits: Fits, passes: int) -> Fits:
 
 
 def meet(search: Search, fits: Fits) -> Fits:
-    """Least greatest residual, where some reference is missed although the sum of squares leaves open that none is."""
+    """Minimax residual, where some reference is missed although the sum of squares leaves open that none is."""
     for _ in range(ROUNDS):
         open_rows = np.flatnonzero((fits.greatest > MEETS) & (fits.squares <= CURVED * fits.left.shape[1]))
         if not len(open_rows):
@@ -219,7 +219,7 @@ def meet(search: Search, fits: Fits) -> Fits:
 
 
 def minimise_max(slopes: Reals, left: Reals, enough: float = 1.0) -> Reals:
-    """Steps (B, k) that make the greatest of ``|left + slopes @ step|`` least, or at most ``enough``.
+    """Steps (B, k) that make the largest of ``|left + slopes @ step|`` least, or at most ``enough``.
 
     Parameters
     ----------

@@ -9,8 +9,8 @@ linear in each body's ten parameters p [2]_. A body's mass is off with its centr
 along itself; its centre is off with mass and inertia about it kept. Worst cases add.
 
 The wrist's limits and load diagram are the manufacturer's. A load of mass m whose centre is at distance L from a
-joint's axis asks for the moment ``m g L`` and the inertia ``m L^2`` and its own about that axis [3]_. L is the greatest
-over all positions of the joints behind. Its own inertia counts with its greatest principal moment, but for the last
+joint's axis asks for the moment ``m g L`` and the inertia ``m L^2`` and its own about that axis [3]_. L is the largest
+over all positions of the joints behind. Its own inertia counts with its largest principal moment, but for the last
 axis, which it is fixed to.
 
 References
@@ -58,7 +58,7 @@ class DriveLimits:
 
 @dataclass(frozen=True)
 class Margin:
-    """The greatest value, and what binds; None where nothing does.
+    """The largest value, and what binds; None where nothing does.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Margin:
 
 
 def max_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimits) -> Margin | None:
-    """The greatest payload in kg that keeps peak and effective torques within limits; None where no limit is known.
+    """The maximum payload in kg that keeps peak and effective torques within limits; None where no limit is known.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def max_payload(t: Reals, without: Reals, per_kg: Reals, limits: DriveLimits) ->
 
 
 def max_speed_scale(t: Reals, parts: tuple[Reals, Reals, Reals], velocity: Reals, limits: DriveLimits) -> Margin | None:
-    """The greatest s such that the motion run s times as fast, and any slower, keeps torques and speeds within limits.
+    """The largest s such that the motion run s times as fast, and any slower, keeps torques and speeds within limits.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def levers(robot: Robot, q: Reals, point: Reals) -> Reals:
 
 
 def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals, Reals]:
-    """Greatest distances (r,) in m of a point (3,) of the flange from some rows' axes (from 0): found, and bounds."""
+    """Largest distances (r,) in m of a point (3,) of the flange from some rows' axes (from 0): found, and bounds."""
     climbed = max_over_poses(robot, lambda q: levers(robot, q, point)[:, list(rows)])
     found = [bounded_lever(robot, point, row, q) for row, q in zip(rows, climbed.q)]
     return np.array([each.found for each in found]), np.array([each.bound for each in found])
@@ -311,7 +311,7 @@ class LoadDiagram:
     ----------
     mass : (c,), kg
     along : (s,), m, distance of the centre from the flange along the last axis
-    across : (c, s), m, greatest distance from it; NaN where none is allowed. The load counts as a point
+    across : (c, s), m, largest distance from it; NaN where none is allowed. The load counts as a point
     """
 
     mass: Reals

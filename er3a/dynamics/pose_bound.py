@@ -1,8 +1,8 @@
-"""Upper bounds of what is greatest over all poses within the limits, by branch and bound [1]_.
+"""Upper bounds of what is largest over all poses within the limits, by branch and bound [1]_.
 
 A box of joint values has a bound by the corners of its hulls (:mod:`er3a.dynamics.pose_bound`). Boxes that can't
 hold more than what is found already are dropped, the others halved, the highest bound first. What is left in the end,
-or when the budget is spent, bounds the greatest there is: up to rounding the bound holds whenever it stops.
+or when the budget is spent, bounds the largest there is: up to rounding the bound holds whenever it stops.
 
 References
 ----------
@@ -13,13 +13,13 @@ Holding torques and distances from axes at the corners of hulls around boxes of 
 Both are affine in the cosine and sine of each row's angle (in its shift, where it slides), because no row comes in
 twice: what hangs behind a joint is carried to its axis row by row, gravity from the base likewise. Cosine and sine of
 an arc lie in the triangle of its ends and the point where the tangents there meet; those of an arc of more than 120
-degrees in the triangle around the whole circle. What is affine in each of several points has its greatest absolute
+degrees in the triangle around the whole circle. What is affine in each of several points has its largest absolute
 value over a product of triangles at a corner of it, so nowhere in a box is there more than at the corners.
 
-The pose of an arm within its limits at which something is greatest, for several objectives at once.
+The pose of an arm within its limits at which something is largest, for several objectives at once.
 
 From evenly spread poses the best few are climbed: one joint after another is set to the best of a grid over its whole
-range, which is then refined about it. The outcome is the greatest found: :mod:`er3a.dynamics.pose_bound` tells how much
+range, which is then refined about it. The outcome is the largest found: :mod:`er3a.dynamics.pose_bound` says how much
 more there can be.
 """
 
@@ -201,7 +201,7 @@ Size = Callable[[Reals], Reals]
 
 @dataclass(frozen=True, eq=False)
 class Bounded:
-    """The greatest value found, the pose (n,) where it is, and a bound that no pose exceeds."""
+    """The largest value found, the pose (n,) where it is, and a bound that no pose exceeds."""
 
     found: float
     q: Reals
@@ -209,7 +209,7 @@ class Bounded:
 
 
 def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> Bounded:
-    """The greatest holding torque of a joint (from 0) by its absolute value, at least that of ``start``.
+    """The largest holding torque of a joint (from 0) by its absolute value, at least that of ``start``.
 
     Wherever gravity could point in a joint's frame is a bound that only the joints behind are in, and often reached.
     """
@@ -244,7 +244,7 @@ def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> B
 
 
 def bounded_lever(robot: Robot, point: Reals, row: int, start: Reals) -> Bounded:
-    """The greatest distance (m) of a point (3,) of the flange from a row's axis (from 0); ``start`` is a pose (n,)."""
+    """The largest distance (m) of a point (3,) of the flange from a row's axis (from 0); ``start`` is a pose (n,)."""
     own = point_of(robot, point)
 
     def levers(at: list[Reals]) -> Reals:
@@ -261,7 +261,7 @@ def _ahead(at: list[Reals], row: int) -> int:
 def _bounded_norm(
     robot: Robot, norms: Callable[[list[Reals]], Reals], q: Reals, close: float, useless: float = np.inf
 ) -> Bounded:
-    """The greatest of norms (B, K) of vectors that are affine in the rows' corners.
+    """The largest of norms (B, K) of vectors that are affine in the rows' corners.
 
     ``q`` is a pose to start at; a bound above ``useless`` is of no use, so nothing more is done once one is sure.
     """
@@ -374,15 +374,15 @@ NO_BETTER = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Greatest:
-    """The greatest values (k,) found of k objectives, and the poses (k, n) where they are."""
+class Maxima:
+    """The largest values (k,) found of k objectives, and the poses (k, n) where they are."""
 
     values: Reals
     q: Reals
 
 
-def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Greatest:
-    """The greatest of each objective.
+def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Maxima:
+    """The largest of each objective.
 
     Parameters
     ----------
@@ -404,7 +404,7 @@ def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Greates
         if (reached <= before + NO_BETTER * np.abs(before)).all():
             break
     chosen = reached.reshape(-1, k).argmax(axis=0) * k + np.arange(k)
-    return Greatest(reached[chosen], poses[chosen])
+    return Maxima(reached[chosen], poses[chosen])
 
 
 def _along(

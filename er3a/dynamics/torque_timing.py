@@ -1,7 +1,7 @@
 """The shortest time along a path in joint space under the drives' torques and the joints' speeds, by TOPP-RA [1]_.
 
 Along a path q(s) torques are ``a s'' + b s'^2 + c``, so peak torques bound s'' and s'^2 linearly: the rows are those of
-toppra's own constraint of joint torques. s is the arc length with each joint measured in its greatest speed, which is
+toppra's own constraint of joint torques. s is the arc length with each joint measured in its maximum speed, which is
 smooth wherever the path is; so the time falls as nodes are added, and what more nodes would gain can be seen.
 
 Viscous friction goes with s', the root of s'^2, and is no row. It is enclosed. Let Y be a speed that no motion
@@ -68,8 +68,8 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
 
     Parameters
     ----------
-    speed : (n,), greatest joint speeds, rad/s or m/s
-    peak : (n,), greatest torques, N m or N; NaN where unknown, which bounds nothing
+    speed : (n,), maximum joint speeds, rad/s or m/s
+    peak : (n,), maximum torques, N m or N; NaN where unknown, which bounds nothing
 
     Raises
     ------
@@ -104,9 +104,9 @@ class TorquesAlong:
 
     Attributes
     ----------
-    way : (N,), s at the nodes; spline : the joints (n,) along it; speed : (n,), greatest
-    greatest : (N,), s' under the joints' speeds
-    slow : (N,), s' whose viscous friction takes half of what gravity and dry friction leave, at most ``greatest``
+    way : (N,), s at the nodes; spline : the joints (n,) along it; speed : (n,), largest
+    largest : (N,), s' under the joints' speeds
+    slow : (N,), s' whose viscous friction takes half of what gravity and dry friction leave, at most ``largest``
     """
 
     way: Reals

@@ -1,7 +1,7 @@
 """Torques, mass matrices and gravity loads at the joints, in the manufacturer's signs.
 
 ``tau = M(q) qdd + C(q, qd) qd + g(q) + armature qdd + viscous qd + coulomb sign(qd) - J(q).T wrench``: what the drives
-must give. N m for joints that turn, N for those that slide.
+must give. N m for revolute joints, N for prismatic ones.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = N
 
     Parameters
     ----------
-    q, qd, qdd : (..., n), rad, rad/s, rad/s^2 (m for joints that slide), in the manufacturer's signs
+    q, qd, qdd : (..., n), rad, rad/s, rad/s^2 (m for prismatic joints), in the manufacturer's signs
     load : what hangs on the flange and what the surroundings do to the tool
 
     Returns
     -------
-    tau : (..., n), N m, or N for joints that slide
+    tau : (..., n), N m, or N for prismatic joints
 
     Raises
     ------
@@ -79,7 +79,8 @@ def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = N
 
 
 def mass_matrix(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
-    """Mass matrices (..., n, n) in kg m^2 (kg, kg m where joints slide), rotors included; errors as :func:`torques`."""
+    """Mass matrices (..., n, n) in kg m^2 (kg, kg m for prismatic joints), rotors included; errors as
+    :func:`torques`."""
     (q,), shape = _flat(robot, {"q": q})
     M = arm_model(robot, load).mass_matrix(q) + np.diag(known(drives_of(robot).armature))
     matrices: Reals = M.reshape(*shape, robot.joints)
@@ -171,16 +172,16 @@ POWER_STEP = 2e-5  # s
 
 @dataclass(frozen=True, eq=False)
 class Demand:
-    """Of each joint (n,), over a motion; N m, W, J, rad/s (N, m/s where joints slide).
+    """Of each joint (n,), over a motion; N m, W, J, rad/s (N, m/s for prismatic joints).
 
     Attributes
     ----------
-    peak, peak_at : greatest torque by its absolute value, and the number of its sample
+    peak, peak_at : maximum torque by its absolute value, and the number of its sample
     rms : effective torque, which heats the motor
-    power : greatest power given, 0 where the drive only brakes
-    braking : greatest power taken back, as a positive number
+    power : largest power given, 0 where the drive only brakes
+    braking : largest power taken back, as a positive number
     work, recovered : energy given and taken back
-    speed : greatest
+    speed : largest
     """
 
     peak: Reals
@@ -222,7 +223,7 @@ def time_mean(t: Reals, values: Reals) -> Reals:
 
 
 def power_imbalance(model: ArmModel, parts: TorqueParts, q: Reals, qd: Reals, qdd: Reals) -> float:
-    """Greatest difference of the power into the masses and the change of their energy, of the greatest power.
+    """Largest difference of the power into the masses and the change of their energy, of the largest power.
 
     The energy is ``qd.T M qd / 2 + V`` by CRBA and the masses' heights, its change a difference along the motion's
     own Taylor series over 40 us; the power is by RNEA.
@@ -243,7 +244,7 @@ def power_imbalance(model: ArmModel, parts: TorqueParts, q: Reals, qd: Reals, qd
 
 @dataclass(frozen=True, eq=False)
 class WorstHolding:
-    """Per joint the greatest holding torque found (n,), with the sign that it has in its pose, a row of q (n, n).
+    """Per joint the largest holding torque found (n,), with the sign that it has in its pose, a row of q (n, n).
 
     ``bound`` (n,): the absolute value that no pose within the limits exceeds.
     """
@@ -254,7 +255,7 @@ class WorstHolding:
 
 
 def worst_holding(model: ArmModel) -> WorstHolding:
-    """The greatest by its absolute value at each joint."""
+    """The largest by its absolute value at each joint."""
 
     def size(q: Reals) -> Reals:
         return np.abs(holding_torques(model, q))

@@ -59,7 +59,7 @@ APART_DEVIATIONS = 8.0
 
 
 def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Measurement, ...]:
-    """Read measured positions: joint values ``q1_deg`` ... (``q3_mm`` of a joint that slides), ``point`` (flange or
+    """Read measured positions: joint values ``q1_deg`` ... (``q3_mm`` of a prismatic joint), ``point`` (flange or
     tool), ``x_mm``, ``y_mm``, ``z_mm``, and, if it is known, ``standard_deviation_mm``. In place of coordinates
     ``place`` or ``plane`` names a fixed point or a plane, of which nobody knows where it is, that was touched there;
     ``pair`` two rows whose points are ``length_mm`` apart, ``bar`` a ball bar whose other end is in a fixed socket.

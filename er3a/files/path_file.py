@@ -27,8 +27,8 @@ from pydantic import Field, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.kept_files import given_file
 from er3a.files.robot_file import Name, Text
-from er3a.files.shipped import given_file
 from er3a.files.target_file import FORMS, POSITION, Orientation
 from er3a.files.units import JointsDeg, PositionMm, Triple, check_degrees, check_millimetres, joint_rates, joint_values
 from er3a.files.yaml_file import StrictModel, load, read_yaml
@@ -48,7 +48,7 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
     ToolTableCommand,
 )
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.robots.joint_limits import joint_columns
 from er3a.robots.robot import MOST_JOINTS, Robot

@@ -14,8 +14,8 @@ import scipy
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, Written, read_csv
+from er3a.files.kept_files import names, own_or_shipped
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.files.shipped import names, own_or_shipped
 from er3a.files.units import LEAST_SPAN_MM, WIDEST_IN_RADIANS, suspect
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import ZERO_POSE, NotOfArm, Pose, Quantity, Rotation3, not_of_arm
@@ -70,7 +70,7 @@ class Format:
     ----------
     columns : without source, grade, origin and what its uncertainties are, which every table has
     digits, sliding_digits : where a line gives no uncertainty, it is half the last digit of these columns; the latter
-        of a joint that slides
+        of a prismatic joint
     gather : from a line's fields to those of the row
     faults : what is wrong with a line
     coarse : the uncertainty where a line gives none, of tables without digits
@@ -210,7 +210,7 @@ def _reach_faults(fields: Fields) -> Iterator[Fault]:
 
 
 def _slides(fields: Fields) -> bool:
-    """Whether a row gives a limit or a speed of a joint that slides."""
+    """Whether a row gives a limit or a speed of a prismatic joint."""
     return any(fields[name] is not None for name in ("lower_mm", "upper_mm", "speed_mm_s") if name in fields)
 
 

@@ -129,7 +129,7 @@ class InertiaFields(StrictModel):
 
 
 class DriveRow(StrictModel):
-    """A joint's drive, at the joint: leave out what is unknown. Newton in place of newton metres where a joint slides.
+    """A joint's drive, at the joint: leave out what is unknown. Newton in place of newton metres for a prismatic joint.
 
     ``armature_kg_m2`` is the rotor's inertia times the gear ratio squared.
     """
@@ -345,7 +345,7 @@ class ZeroRow(OfOneJoint):
 
 
 class JointLimitRow(OfOneJoint):
-    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a joint that turns without end."""
+    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a revolute joint without end."""
 
     lower_deg: float | None = None
     upper_deg: float | None = None
@@ -547,7 +547,7 @@ class CollisionPairs(StrictModel):
         )
 
     def check(self, known: Collection[str]) -> None:
-        """Refuse names that there are not, and a pair that is decided twice: ``ValueError``."""
+        """Refuse unknown names, and a pair that is decided twice: ``ValueError``."""
         seen: set[frozenset[str]] = set()
         for key in ("allow", "watch"):
             for i, entry in enumerate(getattr(self, key)):

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals, wrapped
 from er3a.errors import InputError, InputWarning
 from er3a.files.dh_table import read_dh_table
+from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import (
     HEAVIEST_PAYLOAD_KG,
@@ -27,7 +28,6 @@ from er3a.files.robot_file import (
     coupling_matrix,
     masses_of,
 )
-from er3a.files.shipped import ROOT, names, own_or_shipped
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import rot_x, rot_y, transform, translation

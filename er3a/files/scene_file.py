@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from er3a.collision import scene as library
+from er3a.files.kept_files import own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_file import CollisionPairs, DecidedPair, Name, PiecesPath, Text
-from er3a.files.shipped import own_or_shipped
 from er3a.files.units import FARTHEST_MM, PositionMm, RpyDeg, Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import transform

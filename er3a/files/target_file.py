@@ -3,7 +3,7 @@
 Targets as a CSV table: one row each, position in mm and the orientation in one of the four named forms.
 
 Columns: ``name``, ``x_mm``, ``y_mm``, ``z_mm``; the columns of one form (``FORMS``); optionally ``note``,
-``expect`` (may stay empty) and ``q1_ref_deg`` .. ``qn_ref_deg`` (of joints that slide in mm).
+``expect`` (may stay empty) and ``q1_ref_deg`` .. ``qn_ref_deg`` (of prismatic joints in mm).
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ class TargetEntry(Orientation):
 
     Attributes
     ----------
-    q_deg, q_ref_deg : joint values in degrees, of joints that slide in mm; the latter those that the arm comes from
+    q_deg, q_ref_deg : joint values in degrees, of prismatic joints in mm; the latter those that the arm comes from
     expect : what is to come out; anything else then counts as a fault, and this does not
     """
 

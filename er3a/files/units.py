@@ -48,7 +48,7 @@ def check_degrees(values: Sequence[float], otherwise: str, slides: bool = False)
     Parameters
     ----------
     otherwise : how to write such small angles if degrees are meant
-    slides : whether some can be mm of joints that slide; :func:`joint_values` knows which
+    slides : whether some can be mm of prismatic joints; :func:`joint_values` knows which
     """
     largest = max(abs(value) for value in values)
     shown = ", ".join(f"{value:g}" for value in values)

@@ -36,7 +36,7 @@ def write_urdf_references(
     """Write axes, flange poses with orientation, limits and speeds as a URDF has them, with their document.
 
     The flange is the tip; half-widths follow from the digits that the URDF prints. What it does not state is left out:
-    limits of continuous joints, and those of joints that slide, which references don't know.
+    limits of continuous joints, and those of prismatic joints, which references don't know.
 
     Parameters
     ----------

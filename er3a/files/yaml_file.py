@@ -134,15 +134,15 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> Model:
     """Validate ``data`` as ``model``; the first fault found is raised as :class:`InputError`.
 
-    What only looks like a slip is told as an :class:`InputWarning` that names the file.
+    What only looks like a slip is an :class:`InputWarning` that names the file.
     """
     try:
         with warnings.catch_warnings(record=True) as seen:
             warnings.simplefilter("always")
             valid = model.model_validate(data)
-        for told in seen:
-            text = f"{path}: {told.message}" if path and told.category is InputWarning else told.message
-            warnings.warn(text, told.category, stacklevel=3)
+        for warning in seen:
+            text = f"{path}: {warning.message}" if path and warning.category is InputWarning else warning.message
+            warnings.warn(text, warning.category, stacklevel=3)
         return valid
     except ValidationError as error:
         faults = error.errors()

@@ -1,4 +1,4 @@
-"""URDF in and out, SRDF out: serial chains of joints that turn or slide.
+"""URDF in and out, SRDF out: serial chains of revolute and prismatic joints.
 
 Reference: the ROS URDF specification (joint origin, axis, limit, mimic; rpy is fixed-axis roll-pitch-yaw, the same
 matrix as R = Rz(yaw) Ry(pitch) Rx(roll)).
@@ -70,7 +70,7 @@ TIE = 1e-9
 class AxisTable:
     """A standard table with ``theta = direction * q + offset`` and what stands before and behind it.
 
-    For a joint that slides the same table holds with theta at ``offset`` and ``d + direction * q``.
+    For a prismatic joint the same table holds with theta at ``offset`` and ``d + direction * q``.
 
     Attributes
     ----------
@@ -227,7 +227,7 @@ class UrdfImport(ByValue, Displayed):
     Attributes
     ----------
     notes : what was assumed or changed on the way, in words
-    misfit_m : greatest distance between the table's flange and the URDF's over random joint values, m
+    misfit_m : largest distance between the table's flange and the URDF's over random joint values, m
     joints : names in the URDF of the joints in q; base, tip : its links at the ends of the chain
     """
 

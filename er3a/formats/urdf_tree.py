@@ -371,8 +371,10 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     if mimic is not None:
         if not mimic.get("joint"):
             raise InputError(path, where, "its <mimic> names no joint", "Add joint=... to it")
-        told = (_numbers(path, where, mimic, key, (value,))[0] for key, value in (("multiplier", 1.0), ("offset", 0.0)))
-        follows = Mimic(mimic.get("joint", ""), *told)
+        factors = (
+            _numbers(path, where, mimic, key, (value,))[0] for key, value in (("multiplier", 1.0), ("offset", 0.0))
+        )
+        follows = Mimic(mimic.get("joint", ""), *factors)
     parent, child = _link(path, element, "parent"), _link(path, element, "child")
     placed, axis_of = transform(xyz, rpy), direction / (np.linalg.norm(direction) or 1.0)
     return UrdfJoint(name, kind, parent, child, placed, axis_of, lower, upper, speed, follows, tuple(notes))

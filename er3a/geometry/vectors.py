@@ -89,7 +89,7 @@ def unsigned_angle(a: Vector, b: Vector) -> float:
 TURN = 2 * np.pi
 
 
-def greatest_move(q: Reals, q_ref: Reals) -> Reals:
+def max_joint_move(q: Reals, q_ref: Reals) -> Reals:
     """How far (...,), rad, the joint turns that turns farthest from joint angles ``q_ref`` to ``q`` (..., 6).
 
     By this the arm's next joint angles are *near* wherever solutions are ranked or ordered.

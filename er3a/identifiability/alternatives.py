@@ -104,7 +104,7 @@ def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:
 
 def sets_of(flips: Sequence[Flip]) -> Iterator[list[tuple[int, ...]]]:
     """Combinations to try, by how many flips are in them: all up to four; of directions and half turns of offsets, for
-    arms of up to six joints, all that there are."""
+    arms of up to six joints, all of them."""
     basic = [i for i, flip in enumerate(flips) if not flip.about_deg and flip.entry is not None]
     turning = [i for i in basic if flips[i].entry.column in ("direction", "offset")]  # type: ignore[union-attr]
     most = len(turning) if len(turning) <= 2 * PATTERNS_UP_TO else MOST_TOGETHER

@@ -35,7 +35,7 @@ from er3a.identifiability.feasible import (
     OpenTable,
     Reached,
     Region,
-    farthest,
+    largest_length,
 )
 from er3a.identifiability.requirements import Asked
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
@@ -181,7 +181,7 @@ def challenges_to(region: Region, start: OpenTable, matters: Mapping[int, float]
     search = _ManyStarts(region, start, matters)
     search.try_from(*_spread(region, start))
     for _ in range(ROUNDS):
-        places = search.farthest()[:PUSHED_FROM]
+        places = search.farthest_tables()[:PUSHED_FROM]
         before = search.reach.copy()
         search.try_from(*_pushed(region, start, places, matters))
         if (search.reach - before).max() < FAR:
@@ -252,7 +252,7 @@ class _ManyStarts:
             for k in np.flatnonzero(sign * apart > self.reach[way] + FAR / 2).tolist():
                 self.reach[way, k], self.best[way, k] = sign * apart[k], place
 
-    def farthest(self) -> list[tuple[Reals, Reals]]:
+    def farthest_tables(self) -> list[tuple[Reals, Reals]]:
         """Different tables found, those first that lie farthest along most entries."""
         counted: dict[bytes, list[tuple[Reals, Reals]]] = {}
         for place in self.best.values():
@@ -262,7 +262,7 @@ class _ManyStarts:
     def found(self) -> list[Elsewhere]:
         """Tables found, as points of the regions with their directions; those that extremes allow as well."""
         region, found = self.region, list[Elsewhere]()
-        for direction, amounts in self.farthest()[:MOST_KEPT]:
+        for direction, amounts in self.farthest_tables()[:MOST_KEPT]:
             table = region.table.with_column("direction", slice(None), direction[None])
             other = Region(region.asked, table, region.entries, region.gauge)
             point = other.restarted(amounts, self.start.chi2)
@@ -488,7 +488,7 @@ class Extents:
         return Extent(value - self._widest(entry), value + self._widest(entry), off, False)
 
     def _widest(self, entry: TableNumber) -> float:
-        return farthest(self.table) if entry.unit == "mm" else WIDEST_DEG
+        return largest_length(self.table) if entry.unit == "mm" else WIDEST_DEG
 
     def _found(self, factors: Reals) -> tuple[float, float, bool, bool]:
         """How low and how high a combination was found, in its scale; whether 0 is excluded; whether there may be

@@ -134,7 +134,7 @@ class Gauge:
 
 
 def gauge_of(robot: Robot, entries: Sequence[TableNumber]) -> Gauge:
-    """Which combinations of entries the tool's pose can't tell from the table as it is."""
+    """Which combinations of entries leave the tool's pose as the table has it."""
     k = len(entries)
     scale = np.array([entry.scale for entry in entries])
     q = quasi_random_points(np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper), POSES)

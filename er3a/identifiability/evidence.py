@@ -50,14 +50,14 @@ FIRST_STEP, HALVINGS = 0.05, 12
 
 
 def judge_limit(
-    robot: Robot, entry: TableNumber, independent: Sequence[Reference], told: bool
+    robot: Robot, entry: TableNumber, independent: Sequence[Reference], reacts: bool
 ) -> tuple[LimitStatus, tuple[float, float]]:
     """Status of a limit or speed, and what independent references leave open for it, in its unit.
 
     Parameters
     ----------
     independent : references that react to it and rest on other documents than it does
-    told : whether any reference reacts to it
+    reacts : whether any reference reacts to it
     """
     value = entry.value(robot)
     direct = [r for r in independent if isinstance(r.quantity, Limit | Speed)]
@@ -69,7 +69,7 @@ def judge_limit(
         return status, hull
     low, high = value - WIDEST, value + WIDEST
     if not independent:
-        return ("consistent" if told else "open"), (low, high)
+        return ("consistent" if reacts else "open"), (low, high)
     low, high = _past_poses(entry, independent, low, high)
     if entry.column != "speed":
         low, high = _by_extremes(robot, entry, independent, low, high)
@@ -584,12 +584,6 @@ def parts_of(evidence: Evidence) -> tuple[PartEvidence, ...]:
             off = off.worse(together(evidence, [each.entry for each in unsettled]))
         found.append(PartEvidence(status, unsettled, off, part))
     return tuple(found)
-
-
-def settles_tool(evidence: Evidence) -> bool:
-    """Whether everything that moves the tool is settled."""
-    found = (*evidence.entries, *evidence.combinations)
-    return evidence.table_meets and all(each.status in SETTLED for each in found if each.moves_tool)
 
 
 def together(evidence: Evidence, names: list[str]) -> ToolOff:

@@ -52,8 +52,8 @@ class OpenTable:
     Attributes
     ----------
     amounts : (k,), added to the table's entries, in their scales; off, slope : (m,), (m, k) there
-    excess : greatest violation there, in half-widths
-    chi2 : least sum of squares of what has a standard deviation
+    excess : largest violation there, in half-widths
+    chi2 : smallest sum of squares of what has a standard deviation
     places : where extremes are attained
     """
 
@@ -79,7 +79,7 @@ class Reached:
     amounts: Reals
 
 
-def farthest(table: Tables) -> float:
+def largest_length(table: Tables) -> float:
     """How far in mm a length is looked for from the table's: all its lengths together, a metre at least."""
     return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()) * 1000.0, LEAST_MM)
 
@@ -95,7 +95,7 @@ class Region:
     def __init__(self, asked: Asked, table: Tables, entries: Sequence[TableNumber], gauge: Reals):
         self.asked, self.table, self.entries, self.gauge = asked, table, tuple(entries), gauge
         self.scale = np.array([entry.scale for entry in entries])
-        widest = np.array([farthest(table) if entry.unit == "mm" else WIDEST_DEG for entry in entries])
+        widest = np.array([largest_length(table) if entry.unit == "mm" else WIDEST_DEG for entry in entries])
         self.widest = widest / np.array([entry.in_unit for entry in entries]) / self.scale
         self.basis = np.linalg.svd(gauge, full_matrices=True)[2][len(gauge) :].T if len(gauge) else np.eye(len(entries))
         self._kinked: Flags | None = None
@@ -114,7 +114,7 @@ class Region:
         return self.asked.slope(self.at(amounts), entries)
 
     def excess(self, off: Reals) -> float:
-        """The greatest violation, in half-widths."""
+        """The largest violation, in half-widths."""
         return float(self.asked.excess(off))
 
     def start(self, amounts: Reals, few_first: bool = True) -> OpenTable:

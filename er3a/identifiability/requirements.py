@@ -8,12 +8,12 @@ the table is that at the maximiser (envelope theorem).
 How far many tables are off what references state, component by component: as each quantity says it
 (:meth:`~er3a.references.quantities.Quantity.off`), those of one kind at once.
 
-Kernels that climb to the greatest or least value of a measure of one arm, from where it was attained before.
+Kernels that climb to the largest or smallest value of a measure of one arm, from where it was attained before.
 
 Newton's method with Levenberg's damping within the joint limits; bounds that are in the way are held. Derivatives are
 central differences.
 
-The greatest value of a smooth function over a box of joint angles.
+The largest value of a smooth function over a box of joint angles.
 
 Points spread evenly over the box and its corners are looked at in one batch; from the best of them Newton's method with
 the bounds that are in the way held, its Hessian made definite by the absolute values of its eigenvalues. Nothing is
@@ -240,7 +240,7 @@ def climber(table: Tables, robot: Robot, code: tuple[int, int, int], sign: float
     Parameters
     ----------
     robot : whose base and flange the table has
-    sign : 1 for the greatest, -1 for the least value
+    sign : 1 for the largest, -1 for the smallest value
     joints : (d,), those that are turned
 
     Returns
@@ -427,7 +427,7 @@ def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
 
 
 def peak(function: Function, lower: Reals, upper: Reals, points: Reals | None = None) -> tuple[Reals, float]:
-    """Where a function is greatest, and its value there.
+    """Where a function is largest, and its value there.
 
     Parameters
     ----------
@@ -464,7 +464,7 @@ def climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Rea
 
 
 def best_apart(points: Reals, values: Reals, count: int) -> list[int]:
-    """Places of up to ``count`` points (P, d) with the greatest values (P,), none near a better one."""
+    """Places of up to ``count`` points (P, d) with the largest values (P,), none near a better one."""
     order = np.argsort(-values, kind="stable")
     chosen: list[int] = []
     for i in order:

@@ -34,7 +34,7 @@ class NotTheRobotDescribed:
     Attributes
     ----------
     against : titles of these documents
-    mismatch_mm : the greatest difference to them in a position, as the table is
+    mismatch_mm : the largest difference to them in a position, as the table is
     left_mm : what the best of one or two corrections leaves of it
     tried : how many were
     """

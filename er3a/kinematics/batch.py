@@ -19,7 +19,7 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions, slot_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
-from er3a.numerics.threads import parallel_for
+from er3a.numerics.jit import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import whole_turns
@@ -40,9 +40,9 @@ def inverse_batch(
     """All solutions for many poses of the tool, in as many slots as the class of the arm's geometry has.
 
     At a singularity of a wrist-partitioned arm both branches that meet keep their slots: a free joint has its value of
-    ``q_ref`` in one and half a turn more in the other. Next to two singularities, where the pose does not tell joints 4
-    and 6, a ``q_ref`` that solves it to 1e-12 and keeps the limits is in the slot of its branch. Of other arms a
-    self-motion has the member nearest to ``q_ref`` in a slot, and chains for which no class knows all solutions have
+    ``q_ref`` in one and half a turn more in the other. Next to two singularities, where the pose does not determine
+    joints 4 and 6, a ``q_ref`` that solves it to 1e-12 and keeps the limits is in the slot of its branch. Of other arms
+    a self-motion has the member nearest to ``q_ref`` in a slot, and chains for which no class knows all solutions have
     what iteration finds; next to two singularities ``q_ref`` may be missing. The numbers do not depend on
     the number of threads, nor on a pose's place in the batch.
 
@@ -50,7 +50,7 @@ def inverse_batch(
     ----------
     T : (N, 4, 4), T_base_tool, m
     q_ref : (n,) or (N, n), rad or m, what turns and free joints are chosen by; None means zeros
-    turns : also tell in how many turns each joint can stand
+    turns : also return in how many turns each joint can stand
     threads : how many to use
     redundancy : (k,) or (N, k), for arms with more than six joints, as :func:`er3a.kinematics.inverse.inverse` takes it
 
@@ -134,8 +134,8 @@ def _by_class(
         method = ByClass(solver.code, bool(certain.all()), bool(slot_labels(robot)))
     valid = np.isfinite(q[..., 0])
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)
-    told = _turn_range(robot, q) if turns else None
-    return Solutions(robot, q, valid, inside, branch, method, turn_range=told, certain=certain)
+    turn_range = _turn_range(robot, q) if turns else None
+    return Solutions(robot, q, valid, inside, branch, method, turn_range=turn_range, certain=certain)
 
 
 def _found_by_starts(robot: Robot, T: Reals, q_ref: Reals) -> Reals:

@@ -179,7 +179,7 @@ def solve_blocks(
     ----------
     joints : direction, offset, lower and upper limits (6,)
     out : fills ``q`` (N, 8, 6), by the turns within the limits that are nearest to ``q_ref`` (N or 1, 6), rad,
-        NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) tells
+        NaN where a slot has no solution, and per slot ``valid`` and ``within`` the limits (N, 8). ``rigid`` (N,) says
         which poses are rigid transforms, ``marked`` (N,) which are left to the careful solver.
     """
     q, valid, within, rigid, marked = out
@@ -265,7 +265,7 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
 
 @kernel
 def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
-    """Least and greatest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
+    """Smallest and largest number of turns (n, 6, 2) to add to angles (n, 6) within the limits; 0 and -1 for NaN."""
     for n in range(q.shape[0]):
         for j in range(6):
             low = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) * PER_TURN)

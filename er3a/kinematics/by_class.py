@@ -34,11 +34,10 @@ from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
 from er3a.kinematics.forward import forward
 from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
-from er3a.numerics.jit import kernel
-from er3a.numerics.threads import parallel_for
+from er3a.numerics.jit import kernel, parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within
 from er3a.robots.robot import Robot, derived
-from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_way, uncoupling, uncoupling_of_linkage
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_move, uncoupling, uncoupling_of_linkage
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 SOLVES = 1e-9
@@ -157,7 +156,7 @@ def class_rows(robot: Robot, T: Reals, values: Reals) -> ClassRows:
 
 
 def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, certainty: int) -> Settled:
-    """Solutions of one pose (4, 4) told apart into those alone and self-motions.
+    """Solutions of one pose (4, 4), divided into isolated ones and self-motions.
 
     Parameters
     ----------
@@ -257,7 +256,7 @@ def _apart(robot: Robot, rows: Reals) -> Reals:
     """Rows (k, n) without those that stand twice."""
     kept: list[Reals] = []
     for row in rows:
-        if not any(float(np.abs(shortest_way(robot, row - other)).max()) < SAME_ROW for other in kept):
+        if not any(float(np.abs(shortest_move(robot, row - other)).max()) < SAME_ROW for other in kept):
             kept.append(row)
     return np.array(kept).reshape(-1, robot.joints)
 
@@ -271,7 +270,7 @@ def _is_same_root(robot: Robot, x: Reals, others: list[Reals], chain: PoseChain)
     if not others:
         return False
     away = to_joints(robot, np.array([x])) - to_joints(robot, np.array(others))
-    apart = float(np.abs(shortest_way(robot, away)).max(axis=1).min())
+    apart = float(np.abs(shortest_move(robot, away)).max(axis=1).min())
     return apart < SAME_ROW or (apart < MAYBE_SAME and apart * chain.smallest(x) < SPREAD)
 
 
@@ -319,7 +318,7 @@ def slots_of_class(
     settled: dict[int, Settled] = {}
     if not settling:
         return ClassSlots(q, inside, certainty, settled)
-    alone = not solver.chain.parameters  # self-motions of redundant arms are told by `all_motions`
+    alone = not solver.chain.parameters  # self-motions of redundant arms come from `all_motions`
     for n in np.flatnonzero(certainty != CERTAIN).tolist() if alone else ():
         own = q_ref[0 if len(q_ref) == 1 else n]
         rows = unwound(robot, q[n])
@@ -335,7 +334,7 @@ def slots_of_class(
 def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tuple[Reals, Flags, Integers]) -> None:
     """Put references that solve their poses to rounding in a slot where no row is them.
 
-    Next to two singularities a pose does not tell all joints to rounding, and a row that it gives instead of the
+    Next to two singularities a pose does not determine all joints to rounding, and a row that it gives instead of the
     arm's own can lie beyond a limit. The slot is that of the row nearest to the reference if that is near, else one
     that is empty, else the nearest. ``numbers`` (k,) are the poses looked at; ``found`` rows (N, S, n), which of them
     are within the limits (N, S), and certainty (N,).
@@ -345,7 +344,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
     own = q_ref[numbers] if len(q_ref) == len(T) else np.broadcast_to(q_ref[0], (len(numbers), robot.joints))
     solves = np.abs(forward(robot, own) - T[numbers]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
     for n, row in zip(numbers[solves].tolist(), own[solves]):
-        away, fits = np.abs(shortest_way(robot, q[n] - row)).max(axis=1), bool(within(robot, row))
+        away, fits = np.abs(shortest_move(robot, q[n] - row)).max(axis=1), bool(within(robot, row))
         away = np.where(np.isnan(away), np.inf, away)
         if away.min() < SAME_ROW and not fits:
             continue
@@ -416,7 +415,7 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
     reference, and what was found besides takes free slots."""
     kept, left = np.full_like(rows, np.nan), []
     for row in settled.alone:
-        away = shortest_way(robot, rows - row)
+        away = shortest_move(robot, rows - row)
         far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
         slot = int(far.argmin())
         if far[slot] < SAME_ROW and np.isnan(kept[slot, 0]):
@@ -436,7 +435,7 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
     """The slot of joint values (n,) that solve a pose (4, 4); 0 if they are none of its class's rows."""
     values = checked_parameters(robot, None, q[None], 1)
     rows = class_rows(robot, T[None], values).q[0]
-    away = shortest_way(robot, rows - q)
+    away = shortest_move(robot, rows - q)
     far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
     return int(far.argmin()) if far.min() < SAME_ROW else 0
 

@@ -1,7 +1,7 @@
 """From a robot's table to the form that all kernels use.
 
 Both D-H conventions are the product ``links[0] J(x_1) links[1] ... J(x_m) links[m]`` with constant ``links``, J a
-rotation about z by x (a joint that turns) or a shift along z by x (one that slides; its fixed theta is in the links):
+rotation about z by x (a revolute joint) or a shift along z by x (a prismatic one; its fixed theta is in the links):
 standard rows put ``Tz(d) Tx(a) Rx(alpha)`` behind their joint [1]_, modified rows put ``Rx(alpha) Tx(a)`` before it and
 ``Tz(d)`` behind [2]_ (Rx and Tx commute). A calibrated table may add ``Ry(beta)`` behind ``Rx(alpha)``, for axes that
 are parallel but for an error [3]_. Joint axes are the z axes of the frames before each joint. Solvers by class take
@@ -61,7 +61,7 @@ def constant_links(robot: Robot, frame: int | None = None) -> Reals:
 
 
 def joint_starts(robot: Robot) -> Reals:
-    """What each row's motion x begins with at u = 0: (m,), the offset of those that turn, 0 of those that slide."""
+    """What each row's motion x begins with at u = 0: (m,), the offset of revolute ones, 0 of prismatic ones."""
     return np.where(robot.sliding, 0.0, robot.offset)
 
 
@@ -76,7 +76,7 @@ def row_values(robot: Robot, q: Reals) -> Reals:
 def moving_tip(links: Reals, sliding: Flags | None = None) -> tuple[int, Reals]:
     """The outermost joint (from 0) that moves the tool point, and the point (3,), m, in that joint's moving frame.
 
-    ``sliding`` (m,) tells the joints that slide, which move every point; None: none does.
+    ``sliding`` (m,) marks prismatic joints, which move every point; None: all are revolute.
     """
     last, tip = len(links) - 2, links[-1, :3, 3]
     while last > 0 and np.hypot(tip[0], tip[1]) <= ON_AXIS and not (sliding is not None and sliding[last]):
@@ -108,7 +108,7 @@ def link_parts(robot: Robot) -> Reals:
 
 @derived
 def axes_at_zero_theta(robot: Robot) -> tuple[Reals, Reals, Reals]:
-    """Joint axes with all x at 0 (theta of joints that turn; not the manufacturer's zero pose), in the base frame.
+    """Joint axes with all x at 0 (theta of revolute joints; not the manufacturer's zero pose), in the base frame.
 
     Returns
     -------
@@ -133,25 +133,6 @@ def arm_length(robot: Robot) -> float:
     """Half the distance along all links (m), which makes position and rotation errors comparable."""
     points = axes_at_zero_theta(robot)[1]
     return 0.5 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0
-
-
-def links_of_rows(a: Reals, alpha: Reals, d: Reals, offset: Reals | None = None) -> Reals:
-    """Constant links (n + 1, 4, 4) of standard D-H rows (n,) in m and rad; joint angles are theta less ``offset``.
-
-    For a prismatic joint ``d`` is the joint's offset and ``offset`` its fixed theta.
-    """
-    n = len(a)
-    turn = np.zeros(n) if offset is None else np.asarray(offset, float)
-    links = np.tile(np.eye(4), (n + 1, 1, 1))
-    for k in range(n):
-        c, s, ct, st = np.cos(alpha[k]), np.sin(alpha[k]), np.cos(turn[k]), np.sin(turn[k])
-        links[k + 1] = [
-            [ct, -st * c, st * s, ct * a[k]],
-            [st, ct * c, -ct * s, st * a[k]],
-            [0, s, c, d[k]],
-            [0, 0, 0, 1],
-        ]
-    return links
 
 
 def poses_of(links: Reals, q: Reals, prismatic: Flags | None = None) -> Reals:

@@ -165,7 +165,7 @@ class Family(ByValue, Displayed):
     kind : wrist, shoulder or elbow
     q0 : (6,), rad, the member nearest to the reference (least root of summed squares), within the limits if any is
     direction : (6,), rad per rad of t
-    range : (2,), rad, least and greatest t whose members stay within the limits, all between them too; a full circle
+    range : (2,), rad, smallest and largest t whose members stay within the limits, all between them too; a full circle
         if no member is within them
     within_limits : whether any member is
     branches : slots that the family belongs to

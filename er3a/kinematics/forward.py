@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.errors import ArgumentError, ShapeError
-from er3a.kinematics.chain import constant_links, joint_starts, row_values
+from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts, row_values
 from er3a.numerics.arrays import Flags, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel
@@ -27,8 +27,8 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
 
     Parameters
     ----------
-    q : (..., n), rad (m where a joint slides), the manufacturer's joint values. ``er3a.forward`` refuses NaN, and warns
-        (``er3a.InputWarning``) of values that can only be degrees; here NaN in a row gives NaN in its pose
+    q : (..., n), rad (m for a prismatic joint), the manufacturer's joint values. ``er3a.forward`` refuses NaN,
+        and warns (``er3a.InputWarning``) of values that can only be degrees; here NaN in a row gives NaN in its pose
     frame : None for the tool point (``T_base_tool``); 0..m for the frame after that joint in the table's own
         convention, base included, tool not
     out : (..., 4, 4) writeable float64 C-contiguous array to fill and return
@@ -88,7 +88,7 @@ def jacobian(robot: Robot, q: Reals) -> Reals:
 
     Returns
     -------
-    J : (..., 6, n); rows 0-2 linear velocity (m/rad, or m/m for joints that slide), rows 3-5 angular velocity
+    J : (..., 6, n); rows 0-2 linear velocity (m/rad, or m/m for prismatic joints), rows 3-5 angular velocity
     """
     q = checked_joints(robot, q)
     out = np.empty((*q.shape[:-1], 6, robot.rows))
@@ -281,7 +281,7 @@ def _keep_axis(rows: Reals, sign: float, column: Reals) -> None:
 
 @kernel
 def _along(column: Reals) -> None:
-    """The tool point's velocity by a joint that slides: its axis, and no turn."""
+    """The tool point's velocity by a prismatic joint: its axis, and no turn."""
     for i in range(BLOCK):
         for r in range(3):
             column[r * BLOCK + i], column[(3 + r) * BLOCK + i] = column[(3 + r) * BLOCK + i], 0.0
@@ -295,3 +295,28 @@ def _lever(rows: Reals, column: Reals) -> None:
         x, y, z = x - column[i], y - column[BLOCK + i], z - column[2 * BLOCK + i]
         wx, wy, wz = column[3 * BLOCK + i], column[4 * BLOCK + i], column[5 * BLOCK + i]
         column[i], column[BLOCK + i], column[2 * BLOCK + i] = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x
+
+
+def skeleton(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Corner points of the links from base to tool, for side views.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+
+    Returns
+    -------
+    points : (n, 3), m, base frame, without repeated points
+    """
+    T, parts = frames(robot, q), link_parts(robot)
+    points = [robot.base[:3, 3]]
+    for k in range(robot.rows):
+        along = parts[k + 1, ALONG_Z, :3, 3]
+        for local in (np.zeros(3), along, along + parts[k + 1, TO_NEXT_AXIS, :3, 3]):
+            points.append(T[k, :3, :3] @ local + T[k, :3, 3])
+    points += [forward(robot, q, frame=robot.rows)[:3, 3], T[-1, :3, 3]]
+    kept = [points[0]]
+    for point in points[1:]:
+        if np.linalg.norm(point - kept[-1]) > 1e-9:
+            kept.append(point)
+    return np.array(kept)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
 from er3a.geometry.transforms import check_poses
-from er3a.geometry.vectors import greatest_move, wrap_to_pi
+from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics.by_class import (
     LazySelfMotions,
     arm_solver,
@@ -50,7 +50,7 @@ from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_mis
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import equivalents_within, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_way
+from er3a.robots.whole_turns import shortest_move
 
 SAME_JOINTS = 1e-9
 SAME_MEMBER = 1e-6
@@ -106,7 +106,7 @@ def inverse(
             slots.append(slot)
     rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
     for family in continua:
-        if family.within_limits and greatest_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
+        if family.within_limits and max_joint_move(np.concatenate(rows), family.q0).min() > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
     _with_own(robot, T, q_ref, q, slots, rows)
@@ -125,7 +125,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, q: Reals, slots: list[int], 
     if not slots or not within(robot, q_ref) or np.abs(forward(robot, q_ref) - T).max() > SOLVES:
         return
     listed = np.concatenate(rows)
-    near = greatest_move(listed, q_ref)
+    near = max_joint_move(listed, q_ref)
     if (within(robot, listed) & (near < SAME_MEMBER)).any():
         return
     away = np.abs(wrap_to_pi(q - q_ref)).max(axis=1)
@@ -152,25 +152,25 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         traced = LazySelfMotions(robot, T, q_ref, values)
         motions = tuple(traced) if self_motion_rows or not filled.size else ()
     if solver.parameters:  # where two branches meet one stands; other arms' poses of that kind are settled
-        apart = np.abs(shortest_way(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
+        apart = np.abs(shortest_move(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
         filled = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)]
     branches: list[int] = filled.tolist()
     rows = [_rows_of_branch(robot, slots[0, slot], q_ref) for slot in branches]
     for motion in motions:
-        for member in (motion.q0, motion.roomiest) if solver.parameters else (motion.q0,):
+        for member in (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,):
             listed = np.concatenate([np.empty((0, robot.joints)), *rows])
-            if motion.within_limits and greatest_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
+            if motion.within_limits and max_joint_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
                 branches.append(slot_of(robot, T, member))
                 rows.append(member[None])
     certain = bool(is_complete(robot, found.certainty)[0])
     if not certain and isinstance(solver, LinkedRows):  # the rows found may be members that the linkage can't make
         for row in all_found(robot, T, STARTS):
-            if greatest_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
+            if max_joint_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
                 branches.append(slot_of(robot, T, row))
                 rows.append(_rows_of_branch(robot, row, q_ref))
     if redundancy is None and within(robot, q_ref) and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
         listed = np.concatenate([np.empty((0, robot.joints)), *rows])
-        if greatest_move(listed, q_ref).min(initial=np.inf) > MISSED:  # a double root that rounding takes off the axis
+        if max_joint_move(listed, q_ref).min(initial=np.inf) > MISSED:  # a double root that rounding takes off the axis
             branches.append(slot_of(robot, T, q_ref))
             rows.append(q_ref[None])
             certain = False
@@ -194,7 +194,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
-    """Whether the class has told all solutions of poses (N,) in so far as it is certain of them (N,)."""
+    """Whether the class found all solutions of poses (N,), of which it is so certain (N,)."""
     solver = arm_solver(robot).chain
     closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
     return np.asarray((certainty == CERTAIN) | closed)
@@ -223,7 +223,7 @@ def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[i
 def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
     arms = all_found(robot, T, starts_of(robot))
     solves = np.abs(forward(robot, q_ref) - T).max() <= SOLVES
-    if solves and not (len(arms) and greatest_move(np.asarray(arms), q_ref).min() < SAME_MEMBER):
+    if solves and not (len(arms) and max_joint_move(np.asarray(arms), q_ref).min() < SAME_MEMBER):
         arms = np.concatenate([np.reshape(arms, (-1, robot.joints)), q_ref[None]])  # random starts miss singular arms
     q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     inside = within(robot, q)
@@ -274,7 +274,7 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 
 def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     rows = equivalents_within(robot, q, q_ref)
-    return rows[np.argsort(greatest_move(rows, q_ref), kind="stable")]
+    return rows[np.argsort(max_joint_move(rows, q_ref), kind="stable")]
 
 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[SideUnsolved, ...]:

@@ -35,15 +35,15 @@ Usable = Callable[[Reals], Flags]
 class Neighbours:
     """Poses near a refused one that have a solution within the limits.
 
-    The least turn is searched about ``DIRECTIONS`` evenly spread axes, the least shift over a grid that spans the arm
-    and is refined around its best point, so both are upper bounds.
+    The smallest turn is searched about ``DIRECTIONS`` evenly spread axes, the smallest shift over a grid that spans the
+    arm and is refined around its best point, so both are upper bounds.
 
     Attributes
     ----------
     orientation_ratio : part of 4000 random tool orientations at the target's position that have a solution
     least_turn : rad, least rotation of the tool found that has one, position kept; None if none has
     turned_to : (3,), rad, roll, pitch and yaw where that turn ends; None if none has
-    least_shift : m, least shift of the tool found that has one, orientation kept; None if none has
+    least_shift : m, smallest shift of the tool found that has one, orientation kept; None if none has
     shifted_to : (3,), m, where that shift ends; None if none has
     """
 

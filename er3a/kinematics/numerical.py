@@ -47,11 +47,10 @@ from er3a.kinematics.solutions import (
 )
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import arctan2, cos_sin
-from er3a.numerics.jit import inner_kernel, kernel
-from er3a.numerics.threads import parallel_for
+from er3a.numerics.jit import inner_kernel, kernel, parallel_for
 from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, unwound, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_way
+from er3a.robots.whole_turns import shortest_move
 
 LANES = 32
 LEAST_PIVOT = 1e-15
@@ -580,7 +579,7 @@ def all_found(robot: Robot, T: Reals, starts: int, seed: int = 0) -> Reals:
     distinct: list[Reals] = []
     for row in q[used > 0]:
         away = row - np.reshape(distinct, (-1, robot.joints))
-        if not (np.abs(shortest_way(robot, away)).max(axis=1) <= SAME_ARM).any():
+        if not (np.abs(shortest_move(robot, away)).max(axis=1) <= SAME_ARM).any():
             distinct.append(row)
     return np.array(distinct).reshape(-1, robot.joints)
 

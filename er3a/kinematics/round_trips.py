@@ -19,7 +19,7 @@ from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.numerics.arrays import Flags, Integers
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_way
+from er3a.robots.whole_turns import shortest_move
 
 SAME_JOINTS_RAD = 1e-6
 NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
@@ -39,7 +39,7 @@ class BatchRoundTrips:
     solutions : number of solutions, all poses together
     worst_position : m; worst_orientation : rad, of any solution put back through forward kinematics
     own_found : number of poses whose own joint angles are among the solutions (to 1e-6 rad, turns apart)
-    worst_own : rad, greatest joint difference between any pose's own angles and the nearest solution
+    worst_own : rad, largest joint difference between any pose's own angles and the nearest solution
     counts_within_limits : (S + 1,) int, number of poses with 0 .. S solutions within the limits, S slots of the class
     """
 
@@ -84,7 +84,7 @@ def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> 
     back = forward(robot, q[valid])
     asked = np.repeat(T, valid.sum(axis=1), axis=0)
     away = q - own[:, None]
-    difference = np.abs(shortest_way(robot, away)).max(axis=2)
+    difference = np.abs(shortest_move(robot, away)).max(axis=2)
     difference = np.where(valid, difference, np.inf).min(axis=1)
     turned = rotation_angle(back[:, :3, :3], asked[:, :3, :3])
     if not task_mask(robot).all():  # the arm's task leaves orientation open

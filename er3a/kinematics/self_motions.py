@@ -24,16 +24,16 @@ SAME_TURN, COVERS = 1e-6, 1e-6
 class SelfMotionCurve(ByValue, Displayed):
     """A part of a curve of solutions of one pose: joints move with the tool at rest.
 
-    Its members are told by a parameter t (rad), which is the summed length of the joint moves from q0 on.
+    Its members have a parameter t (rad), which is the summed length of the joint moves from q0 on.
 
     Attributes
     ----------
     q0 : (n,), rad or m, the member nearest to the reference (least root of summed squares), within the limits if
         ``within_limits``
     direction : (n,), rad or m per rad of t, at q0
-    range : (2,), least and greatest t up to which all members from q0 on are within the limits; of a curve of which
+    range : (2,), smallest and largest t up to which all members from q0 on are within the limits; of a curve of which
         none is, one lap
-    roomiest : (n,), the member found farthest from all joint limits; roomiest_margin : its distance from them
+    max_margin_member : (n,), the member found farthest from all joint limits; max_margin : its distance from them
     dimension : 1; above it, this curve is one of many on a surface of solutions
     branches : numbers of the solutions that lie on it
     """
@@ -43,8 +43,8 @@ class SelfMotionCurve(ByValue, Displayed):
     direction: Reals
     range: Reals
     within_limits: bool
-    roomiest: Reals
-    roomiest_margin: float
+    max_margin_member: Reals
+    max_margin: float
     dimension: int
     branches: tuple[int, ...]
     robot: Robot
@@ -101,7 +101,7 @@ def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: TracedCurve,
         if any(_reaches(motion, lengths[part]) for motion in made):
             continue
         best = int(part[np.linalg.norm(near[part] - q_ref, axis=1).argmin()])
-        roomiest = int(part[limit_margin(robot, near[part]).argmax()])
+        widest = int(part[limit_margin(robot, near[part]).argmax()])
         made.append(
             _part(
                 robot,
@@ -112,7 +112,7 @@ def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: TracedCurve,
                 q_ref=q_ref,
                 any_inside=bool(inside.any()),
                 best=(best, near[best] - q[best]),
-                roomiest=(roomiest, near[roomiest] - q[roomiest]),
+                max_margin_member=(widest, near[widest] - q[widest]),
             )
         )
     return made
@@ -150,7 +150,7 @@ def _part(
     q_ref: Reals,
     any_inside: bool,
     best: tuple[int, Reals],
-    roomiest: tuple[int, Reals],
+    max_margin_member: tuple[int, Reals],
 ) -> SelfMotionCurve:
     def at(t: Reals) -> Reals:
         return _joints(robot, chain.members(curve, _place_of(lengths, np.atleast_1d(t), curve.closed)))
@@ -161,7 +161,7 @@ def _part(
         return np.where(within(robot, q) | ~np.bool_(any_inside), cost, np.inf)
 
     def narrowness(t: Reals) -> Reals:
-        return -limit_margin(robot, at(t) + roomiest[1])
+        return -limit_margin(robot, at(t) + max_margin_member[1])
 
     start = _least(distance, lengths, best[0], curve.closed)
     q0 = (at(np.array([start])) + best[1])[0]
@@ -171,8 +171,8 @@ def _part(
     shift = q0 - at(np.array([start]))[0]
     step = 1e-4
     direction = (at(np.array([start + step])) - at(np.array([start - step])))[0] / (2 * step)
-    widest = _least(narrowness, lengths, roomiest[0], curve.closed)
-    room = (at(np.array([widest])) + roomiest[1])[0]
+    widest = _least(narrowness, lengths, max_margin_member[0], curve.closed)
+    room = (at(np.array([widest])) + max_margin_member[1])[0]
     span = np.array([-0.5, 0.5]) * lengths[-1] if curve.closed else np.array([0.0, lengths[-1]]) - start
     motion = SelfMotionCurve(
         "curve", q0, direction, span, any_inside, room, float(limit_margin(robot, room)), curve.dimension, (), robot, T,

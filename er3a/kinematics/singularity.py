@@ -5,12 +5,12 @@ type of singularity: *wrist* (axes 4 and 6 align), *elbow* (arm straight or fold
 in the plane of axis 1 and the direction of axis 2, where turning joint 1 can't move it). So is that of an arm with
 parallel axes 2, 3 and 4: there the wrist centre is where axes 5 and 6 meet, and the forearm ends on axis 4.
 
-Along a motion any arm is singular where its Jacobian loses rank. Columns of joints that slide, and linear rows, are
+Along a motion any arm is singular where its Jacobian loses rank. Columns of prismatic joints, and linear rows, are
 scaled by the arm's length. With six joints the determinant changes sign where the motion crosses the singular set. With
-more, or fewer, rank loss is told by the smallest singular value. Between two samples nothing is missed: turning joint j
-by d changes the scaled Jacobian by at most ``B_j d`` in norm, and no singular value by more [3]_, so an interval whose
-ends have larger ones than its joints' travel can take away is clear; others are halved. Axes are named by the smallest
-set of columns that are dependent there.
+more, or fewer, rank loss is judged by the smallest singular value. Between two samples nothing is missed: turning joint
+j by d changes the scaled Jacobian by at most ``B_j d`` in norm, and no singular value by more [3]_, so an interval
+whose ends have larger ones than its joints' travel can take away is clear; others are halved. Axes are named by the
+smallest set of columns that are dependent there.
 
 References
 ----------
@@ -100,8 +100,8 @@ def characteristic_length(robot: Robot) -> float:
 def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditioning:
     """Manipulability, condition number and smallest singular value at joint values (..., n) in rad or m.
 
-    Of an arm with fewer than six joints the singular values are those of its n columns. Columns of joints that slide
-    are multiplied by the length too, so that they compare with those of joints that turn.
+    Of an arm with fewer than six joints the singular values are those of its n columns. Columns of prismatic joints
+    are multiplied by the length too, so that they compare with those of revolute joints.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def _angle_short_of_line(a: Vector, b: Vector, axis: Vector) -> float:
 DEPENDENT = 1e-6  # smallest singular value of columns that count as dependent, relative to that of the event
 SHORTEST, EDGE = 1e-9, 1e-4  # shares of the motion
 MOST_SAMPLES = 200_000
-TRAVEL = 1.5  # joints' travel inside an interval, over what its ends tell, where no speeds are given
+TRAVEL = 1.5  # joints' travel inside an interval, over what its ends show, where no speeds are given
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ class RankLoss:
 
 
 def scaled_jacobian(robot: Robot, q: Reals) -> Reals:
-    """Jacobian (..., 6, n) with linear rows in parts of the arm's length, and sliding joints too."""
+    """Jacobian (..., 6, n) with linear rows in parts of the arm's length, and prismatic joints too."""
     length = arm_length(robot)
     J = jacobian(robot, q)
     J[..., :3, :] /= length
@@ -254,8 +254,8 @@ def rank_losses(
     t : (N,), s, rising; q : (N, n), rad or m, NaN where unreachable
     joints : joint values (k, n) at times (k,) within reach
     threshold : of the smallest singular value of :func:`scaled_jacobian`
-    speed : (n,), greatest joint speeds of the motion, rad/s or m/s, with which nothing between samples is missed; None:
-        as the samples tell, times 1.5
+    speed : (n,), maximum joint speeds of the motion, rad/s or m/s, with which nothing between samples is missed; None:
+        as the samples show, times 1.5
     """
     found: list[RankLoss] = []
     for first, last in runs(np.isfinite(q[:, 0])):
@@ -339,7 +339,7 @@ def _stretches(robot: Robot, t: Reals, q: Reals, joints: Callable[[Reals], Reals
 def dependent_axes(robot: Robot, q: Reals) -> tuple[int, ...]:
     """Numbers (from 1) of the fewest axes whose columns are nearly dependent at joint values (n,).
 
-    Of all sets of as many axes the one with the smallest singular value is told; a larger set only if its value is
+    Of all sets of as many axes the one with the smallest singular value is named; a larger set only if its value is
     clearly smaller. Empty for arms with a single joint.
     """
     J = scaled_jacobian(robot, q)

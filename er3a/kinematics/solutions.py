@@ -254,7 +254,7 @@ Unsolved = SideUnsolved | PoseUnsolved
 class Solutions(ByValue, Displayed):
     """Joint solutions of one pose (``inverse``) or of many (``inverse_batch``, ``solve``).
 
-    What is told of each solution has the leading axes of ``q``: (k,) from ``inverse``; (N, S) from ``inverse_batch``,
+    What is known of each solution has the leading axes of ``q``: (k,) from ``inverse``; (N, S) from ``inverse_batch``,
     one slot for each branch, S by the arm's class; those of the poses from ``solve``, one arm for each.
 
     Attributes
@@ -270,8 +270,8 @@ class Solutions(ByValue, Displayed):
         ``solve``: per pose without solution, why
     families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest; of arms with more
         than six joints traced when they are first looked at
-    turn_range : (..., 6, 2) int8, least and greatest number of whole turns that can be added to each joint within its
-        limits (least above greatest: none); None unless ``inverse_batch`` was asked for it
+    turn_range : (..., 6, 2) int8, smallest and largest number of whole turns that can be added to each joint within its
+        limits (smallest above largest: none); None unless ``inverse_batch`` was asked for it
     position_error, rotation_error : (...,), m and rad, of the degrees of freedom that ``solve`` was asked for
     starts : (...,) int, starts that ``solve`` used; 0 where none succeeded
     certain : of ``inverse_batch`` for other classes (N,): whether the solver left no doubt that these are all
@@ -293,7 +293,7 @@ class Solutions(ByValue, Displayed):
 
     @cached_property
     def turn(self) -> Integers:
-        """(..., n), full turns added to the angle in (-pi, pi]; 0 in empty slots and of joints that slide."""
+        """(..., n), full turns added to the angle in (-pi, pi]; 0 in empty slots and of prismatic joints."""
         turns = np.nan_to_num(np.round((self.q - wrap_to_pi(self.q)) / TURN)).astype(int)
         return np.where(self.robot.slides, 0, turns)
 
@@ -405,7 +405,7 @@ class Target(ByValue, Displayed):
     Attributes
     ----------
     T : (4, 4), T_base_tool, m, in the frame that the robot's base is placed in
-    q_ref_deg : n, the joint values that the arm comes from, as they are written (mm of joints that slide)
+    q_ref_deg : n, the joint values that the arm comes from, as they are written (mm of prismatic joints)
     joints_before : (n,), the same in rad or m; None where all joints turn
     expect : what is to come out, where the target says so
     """
@@ -419,7 +419,7 @@ class Target(ByValue, Displayed):
 
     @property
     def q_ref(self) -> Reals:
-        """``q_ref_deg`` in rad, or m of joints that slide, (n,)."""
+        """``q_ref_deg`` in rad, or m of prismatic joints, (n,)."""
         return np.radians(self.q_ref_deg) if self.joints_before is None else self.joints_before
 
     def sheet(self) -> Sheet:

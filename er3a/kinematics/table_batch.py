@@ -21,7 +21,7 @@ class Tables(ByValue):
     Attributes
     ----------
     modified : (H,) bool, whether the rows are read as modified (Craig) ones
-    a, d : (H, m), m; alpha, beta, offset, lower, upper : (H, m), rad (limits of joints that slide in m);
+    a, d : (H, m), m; alpha, beta, offset, lower, upper : (H, m), rad (limits of prismatic joints in m);
         direction : (H, m), +1 or -1; sliding : (H, m) bool
     """
 

@@ -134,7 +134,7 @@ class WristPartitionedArm:
 
     @property
     def wrist_reach(self) -> float:
-        """Greatest distance of the wrist centre from axis 2 across it, m."""
+        """Largest distance of the wrist centre from axis 2 across it, m."""
         return self.upper_arm_length + self.forearm_length
 
 
@@ -203,7 +203,7 @@ def _couples_the_arm_alone(coupling: Reals) -> bool:
 
 
 def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
-    """Point nearest to all lines by least squares, and its greatest distance from a line (m)."""
+    """Point nearest to all lines by least squares, and its largest distance from a line (m)."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     found = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[:, :, None]).reshape(-1), rcond=None)[0]
     meeting = found.astype(float)

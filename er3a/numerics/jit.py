@@ -1,4 +1,4 @@
-"""The one way this package compiles kernels.
+"""The one way this package compiles kernels, and shares the rows of a batch out to threads.
 
 numba does not notice when a kernel in one file calls one in another file that changed, so a plain ``cache=True`` can
 serve stale machine code. Each kernel is therefore kept in a folder named by a digest of its file and of all files with
@@ -7,7 +7,8 @@ edit compiles again what depends on it. Nothing of numba's own settings is touch
 
 Compiling is what a first run on a machine waits for, so three things are spared: kernels that only kernels call get no
 entry for Python (a quarter of the time), integer constants in a call make no version of their own, and processes that
-need a kernel at once compile it once: one holds its lock, the others wait and load.
+need a kernel at once compile it once: one holds its lock, the others wait and load. Kernels release the interpreter's
+lock.
 """
 
 from __future__ import annotations
@@ -17,15 +18,21 @@ import hashlib
 import os
 import re
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache
+from itertools import pairwise
+from numbers import Integral
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.registry import CPUDispatcher
+
+from er3a.errors import Er3aError
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _KERNEL = b"kernel\ndef "  # @kernel or @inner_kernel
@@ -162,3 +169,40 @@ def _kernel_files(path: Path) -> tuple[Path, ...]:
         files = [_PACKAGE.joinpath(*part.split(".")).with_suffix(".py") for part in parts]
         found += [file for file in files if file.is_file() and _KERNEL in file.read_bytes()]
     return tuple(found)
+
+
+PARTS_PER_THREAD = 8
+
+
+def parallel_for(count: int, threads: int, smallest: int, work: Callable[[slice], None]) -> None:
+    """Call ``work`` on parts of ``count`` rows, each at least ``smallest``, in so many threads, the caller's included.
+
+    Threads take the next part as they are ready, so that one on a busy processor holds up nothing.
+
+    Raises
+    ------
+    Er3aError
+        if ``threads`` is no whole number of at least 1
+    """
+    if not (isinstance(threads, Integral) and threads >= 1):
+        raise Er3aError(f"threads is {threads!r}; expected a whole number of at least 1")
+    parts = min(threads * PARTS_PER_THREAD, count // smallest) if threads > 1 else 1
+    if parts < 2:
+        work(slice(0, count))
+        return
+    waiting: SimpleQueue[slice] = SimpleQueue()
+    for start, end in pairwise(count * k // parts for k in range(parts + 1)):
+        waiting.put(slice(start, end))
+
+    def take_parts() -> None:
+        try:
+            while True:
+                work(waiting.get_nowait())
+        except Empty:
+            return
+
+    with ThreadPoolExecutor(threads - 1) as pool:
+        others = [pool.submit(take_parts) for _ in range(threads - 1)]
+        take_parts()
+        for other in others:
+            other.result()

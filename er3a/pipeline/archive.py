@@ -13,8 +13,7 @@ from rocrate.model.person import Person
 from rocrate.rocrate import ROCrate
 
 from er3a.errors import ResultError
-from er3a.files.kept_files import write_atomically
-from er3a.files.shipped import ROOT
+from er3a.files.kept_files import ROOT, write_atomically
 from er3a.pipeline.results import OVERALL, check_results
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study

@@ -75,7 +75,7 @@ def _imports(path: Path) -> tuple[str, ...]:
 
 @cache
 def _public() -> dict[str, str]:
-    """The public names of er3a, and their modules, as its ``__init__`` tells them."""
+    """The public names of er3a, and their modules, as its ``__init__`` lists them."""
     tree = ast.parse((_PACKAGE / "__init__.py").read_bytes())
     for node in tree.body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_PUBLIC":

@@ -28,8 +28,8 @@ from er3a.pipeline.results import plain
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured
 from er3a.pipeline.stages.trajectory.motion import listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, written
-from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
-from er3a.planning.tool_proof import Wanted
+from er3a.planning.names import PATH_VERDICTS, PathVerdict
+from er3a.planning.tool_proof import ProofRequirements
 from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import (
     NEAR,
@@ -72,12 +72,12 @@ def lines_of(checked: CheckedFile, verdicts: bool = False) -> list[str]:
     """``file:line: level: message [code]``, one line to a finding, and on request one to each motion."""
     if checked.check is None:
         return [_error_line(checked)]
-    told = [(each.place, _finding_line(each)) for each in checked.check.findings]
+    lines = [(each.place, _finding_line(each)) for each in checked.check.findings]
     if verdicts:
         of_what = " of assumed shapes" if checked.check.shapes else ""
-        told += [(each.place, _verdict_line(each, of_what)) for each in checked.check.verdicts]
-        told.sort(key=lambda pair: (shown(pair[0].file), pair[0].line))
-    return [text for _, text in told]
+        lines += [(each.place, _verdict_line(each, of_what)) for each in checked.check.verdicts]
+        lines.sort(key=lambda pair: (shown(pair[0].file), pair[0].line))
+    return [text for _, text in lines]
 
 
 def _error_line(checked: CheckedFile) -> str:
@@ -255,8 +255,8 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
         lines = each.check.execution.program.lines
         for one in each.check.findings:
             rules.setdefault(one.finding.code, one.level)
-            told = (one.finding.code, one.level, _message(one))
-            results.append(_result(told, one.place, _line_text(one.place, each.file, lines), seen, one.calls))
+            finding = (one.finding.code, one.level, _message(one))
+            results.append(_result(finding, one.place, _line_text(one.place, each.file, lines), seen, one.calls))
     driver = {
         "name": "er3a check-program",
         "version": __version__,
@@ -292,13 +292,13 @@ def _message(one: LocatedFinding) -> str:
 
 
 def _result(
-    told: tuple[str, Level, str],
+    finding: tuple[str, Level, str],
     place: Place,
     line_text: str,
     seen: dict[str, int],
     calls: tuple[Place, ...] = (),
 ) -> dict[str, Any]:
-    code, level, text = told
+    code, level, text = finding
     print_of = hashlib.sha256(
         "\n".join((code, _uri_from_here(place.file), place.element, line_text)).encode()
     ).hexdigest()[:32]
@@ -378,7 +378,7 @@ def programs_of(
     missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)
     if missing is not None:
         raise InputError(file, "paths", f"there is no path '{missing}'", f"Known: {', '.join(e.name for e in listed)}")
-    for each in listed_motions(file, task, Wanted(task.limits.rates, NEAR), CHECKS_PER_SAMPLE):
+    for each in listed_motions(file, task, ProofRequirements(task.limits.rates, NEAR), CHECKS_PER_SAMPLE):
         if only and each.listed not in only:
             continue
         if each.motion is None:

@@ -28,12 +28,11 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Finding
 from er3a.collision.pairs import Pair, PairsUnexamined, ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
-from er3a.findings import Finding
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import table_types
@@ -259,7 +258,7 @@ class NotComputed:
 
 @dataclass(frozen=True, eq=False)
 class AbsentResults(Results[Summary]):
-    """In place of the results of a stage that was not computed; its verdict is a finding that tells why."""
+    """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 
 
 def write_results(folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any]) -> None:

@@ -36,8 +36,7 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 from er3a.errors import Er3aError, ResultError
-from er3a.files.kept_files import half_written, read_checked
-from er3a.files.shipped import ROOT
+from er3a.files.kept_files import ROOT, half_written, read_checked
 from er3a.pipeline import job_server
 from er3a.pipeline.check import check_study
 from er3a.pipeline.results import OVERALL, check_checksum, check_results

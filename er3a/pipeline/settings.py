@@ -8,7 +8,7 @@ from pydantic import Field
 
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
-from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.names import StrategyName
 from er3a.programs.syntax import LanguageName
 from er3a.robots.robot import MOST_JOINTS
 
@@ -18,7 +18,7 @@ class TrajectorySettings(StrictModel):
 
     ``avoidance`` chooses the avoidance strategy, or compares all of them. Joints of unknown speed are taken to do
     ``assumed_speed_deg_s`` (those beyond its end the last of it), those that slide ``assumed_speed_mm_s``; all joints
-    to reach full speed in ``acceleration_time_s``, unless their greatest accelerations are given
+    to reach full speed in ``acceleration_time_s``, unless their maximum accelerations are given
     (``acceleration_deg_s2``, one for each joint). ``jerk_deg_s3`` bounds the jerk; left out, nothing does.
     ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between
     points. Where no document gives the shapes of the arm's links, a verdict within ``assumed_margin_mm`` of them is a

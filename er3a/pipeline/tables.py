@@ -9,7 +9,7 @@ A table is a frozen dataclass of equally long arrays::
         q_deg: Reals = per_joint("joint angle")
         point_mm: Reals = vector("{}_mm", "tool point in the base frame")
 
-``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg`` (of joints that slide ``q3_mm``, in mm), ``point_mm``
+``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg`` (of prismatic joints ``q3_mm``, in mm), ``point_mm``
 (rows, 3) as ``x_mm, y_mm, z_mm``. Unit and meaning go into the file; the unit is the name's ending
 (:mod:`er3a.numerics.si_units`) unless a column states another, and the annotation says what kind of numbers it holds. A
 column of findings is written as JSON texts, with each finding's code and parameters.
@@ -77,7 +77,8 @@ class Column:
         return "{}" in self.pattern
 
     def names(self, width: int, slides: tuple[bool, ...] = ()) -> list[str]:
-        """Names in the file, of a group with so many columns; ``slides`` tells which joints are distances."""
+        """Names in the file, of a group with so many columns; ``slides`` marks prismatic joints, whose values are
+        distances."""
         if not self.is_group:
             return [self.pattern]
         if self.parts or not any(slides):
@@ -172,7 +173,8 @@ class Table(ByValue):
             raise ValueError(f"{type(self).__name__}: columns of different lengths: {lengths}")
 
     def of_joints(self, slides: Iterable[bool]) -> Self:
-        """The same table, of an arm whose joints slide where ``slides`` (n,) tells; one without rows gets n columns."""
+        """The same table, of an arm whose joints are prismatic where ``slides`` (n,); one without rows gets n
+        columns."""
         flags = tuple(bool(each) for each in slides)
         groups = {name for name, spec in self.columns().items() if spec.is_group and not spec.parts}
         if len(self) or not groups:

@@ -13,12 +13,12 @@ References
 
 Which arm angle a seven-joint arm takes along a path of the tool: that which keeps most distance from the limits.
 
-The arm angle is a polynomial of degree 2 in the share of the way, told by its values at the start, half way and at the
-end. Margins of all eight solutions on a grid of ways and arm angles tell which of many such polynomials keeps most;
-that one is improved by smaller and smaller changes. Where none of these keeps the limits, polynomials of higher degree
-are fitted to a way through the grid: the evenest of those that keep half of the margin that any can keep. Nothing is
-proven by this choice: what the joints then do is judged exactly, as for every other motion, and a path could in
-principle be followed by a law of another form.
+The arm angle is a polynomial of degree 2 in the share of the path, given by its values at the start, half way and at
+the end. Margins of all eight solutions on a grid of paths and arm angles show which of many such polynomials keeps
+most; that one is improved by smaller and smaller changes. Where none of these keeps the limits, polynomials of higher
+degree are fitted to a way through the grid: the evenest of those that keep half of the margin that any can keep.
+Nothing is proven by this choice: what the joints then do is judged exactly, as for every other motion, and a path could
+in principle be followed by a law of another form.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_thr
 from er3a.planning.profiles import times_at
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_way, take_turns_off, turns_inward, whole_turns
+from er3a.robots.whole_turns import shortest_move, take_turns_off, turns_inward, whole_turns
 
 ANGLES = 72  # of the grid, over a turn
 BEGUN_AT, FEW_CHANGES = 24, 13  # arm angles at the start where none is given; then changes from it
@@ -60,7 +60,7 @@ class ArmAngleLaw:
     """An arm angle along a path: values (3,), rad, at the start, half way and at the end, or Chebyshev series (k,) of a
     ``bent`` one over the way.
 
-    ``slot`` is the solution that keeps the least distance ``margin`` (rad, m) from the joint limits.
+    ``slot`` is the solution that keeps the smallest distance ``margin`` (rad, m) from the joint limits.
     """
 
     values: Reals
@@ -137,8 +137,8 @@ def _margins_alone(robot: Robot, q: Reals) -> Reals:
 
 
 def _even_way(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
-    """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the least sum of squared
-    steps that keeps half of the margin that one can keep; None if none keeps the limits.
+    """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the smallest sum of
+    squared steps that keeps half of the margin that one can keep; None if none keeps the limits.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _even_way(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
     """
     at = np.arange(margins.shape[1])
     before = (at[None] - STEPS[:, None]) % len(at)  # (steps, angles)
-    moved = [shortest_way(robot, q[k][None] - q[k - 1][before]) for k in range(1, len(q))]
+    moved = [shortest_move(robot, q[k][None] - q[k - 1][before]) for k in range(1, len(q))]
     free = [np.abs(each).max(axis=-1) <= LEAP for each in moved]  # not where there is no row
     widest = margins[0]
     for k, passable in enumerate(free, 1):
@@ -195,8 +195,8 @@ class _LawSearch:
         return float(self._margins(q[:, None, self.slots[s : s + 1]], np.zeros((len(q), 1), np.int64))[0, 0])
 
     def _margins(self, q: Reals, place: Integers) -> Reals:
-        """Least distances (L, s) from the limits, rad, of motions through rows (K, A, s, n) at places (K, L) in A: by
-        turns that hold on the whole way. Less than nothing where a joint leaps, -inf where a pose is not reached."""
+        """Smallest distances (L, s) from the limits, rad, of motions through rows (K, A, s, n) at places (K, L) in A:
+        by turns that hold on the whole way. Less than nothing where a joint leaps, -inf where a pose is not reached."""
         robot, count = self.robot, self.robot.joints
         turns = whole_turns(robot)
         near = np.zeros(count) if self.start is None else self.start
@@ -223,8 +223,8 @@ def _quadratic(values: Reals, share: Reals) -> Reals:
 def _ranges(
     q: Reals, place: Integers, near: Reals, turns: tuple[Reals, Reals], lines: Reals
 ) -> tuple[Reals, Reals, Reals]:
-    """Least and greatest values (L, s, m) of lines (m, n) of joints, through rows (K, A, s, n) at places (K, L), made
-    continuous by whole turns (steps (n, r), counts (r, n)) from those nearest to ``near`` (n,) on; and the greatest
+    """Smallest and largest values (L, s, m) of lines (m, n) of joints, through rows (K, A, s, n) at places (K, L), made
+    continuous by whole turns (steps (n, r), counts (r, n)) from those nearest to ``near`` (n,) on; and the largest
     step (L, s) of a joint, infinite where there is no row."""
     poses, _, slots, joints = q.shape
     shape = (place.shape[1], slots, len(lines))
@@ -361,7 +361,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
 
 def _turned_to(robot: Robot, q: Reals, near: Reals) -> Reals:
     """Joints (..., n) by the turns nearest to others (n,), within the limits or not."""
-    return near + shortest_way(robot, q - near)
+    return near + shortest_move(robot, q - near)
 
 
 def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
@@ -385,7 +385,7 @@ def _first_within_limits(
     robot: Robot, path: ToolPath, ways: Iterable[tuple[Reals, Callable[[Reals], Reals]]], *, turns_open: bool
 ) -> PiecewiseMotion:
     """The first of the motions from starts (n,), with what tells all rows (N, slots, n) at times, that keeps all
-    limits; else the first that there is. ``turns_open`` tells whether whole turns of the starts may be changed."""
+    limits; else the first one. ``turns_open`` tells whether whole turns of the starts may be changed."""
     found: list[PiecewiseMotion] = []
     ends: list[PathEndsError] = []
     for start, rows_at in ways:

@@ -213,7 +213,7 @@ def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
     Raises
     ------
     InputError
-        for a start branch that this robot has not, a half-turn axis that can't choose, points that fix no circle, a
+        for a start branch that this robot lacks, a half-turn axis that can't choose, points that fix no circle, a
         corner that can't be rounded so far, an earlier path without end
     """
     match command:

@@ -2,7 +2,7 @@
 
 On the grid of :mod:`er3a.planning.follow`, dynamic programming [1]_ finds for each branch at the start the
 best way to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time),
-least time outside the limits, of joints and of sums of joints, least joint travel, and among equals the greatest
+least time outside the limits, of joints and of sums of joints, least joint travel, and among equals the largest
 distance from the limits. Whole turns cost no states of their own: along a continuous sequence they are fixed by the
 first angle, so each joint's turn is chosen once per stretch, by least time outside the limits, then nearest to the
 joints before. Among the branches at the start, the best whole sequence wins; given start joints admit only the branches
@@ -308,7 +308,7 @@ class Followed(ByValue, Displayed):
         T = self.line.poses(progress)
         q = self._nearest(solve_slots(robot, T, q_ref)[0], q_ref, self.slot[left], self.slot[right])
         q[~known] = np.nan
-        if parallel_axes_arm(robot) is not None:  # the reference has told what is free
+        if parallel_axes_arm(robot) is not None:  # the reference has chosen what is free
             return q
         factors = determinant_factors(robot, q)
         on_axis = np.abs(factors.shoulder) < FREE_SHOULDER

@@ -26,7 +26,7 @@ import numpy as np
 import scipy
 from numpy.polynomial import chebyshev
 
-from er3a.findings import Finding
+from er3a.by_value import Finding
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import (
     TYPES,
@@ -244,7 +244,7 @@ class TooFast:
 
 @dataclass(frozen=True)
 class TooFastIfAssumed:
-    """A joint (from 1), whose greatest speed is assumed, would have to move faster; in mm if it ``slides``."""
+    """A joint (from 1), whose maximum speed is assumed, would have to move faster; in mm if it ``slides``."""
 
     joint: int
     needed_deg_s: float
@@ -276,7 +276,7 @@ class AccelerationTooGreat:
 
 @dataclass(frozen=True)
 class AccelerationTooGreatIfAssumed:
-    """A joint (from 1), whose greatest acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
+    """A joint (from 1), whose maximum acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
 
     joint: int
     needed_deg_s2: float
@@ -340,7 +340,7 @@ class RateLimit:
     most : (n,), rad/s, rad/s^2 or rad/s^3; NaN where there is none
     assumed : (n,) bool, whether it is assumed
     step_allowed : (n,), rad/s^2, by which an acceleration may step all the same; for jerk
-    sliding : (n,) bool, whether the joint slides: m instead of rad; None for no joint
+    sliding : (n,) bool, whether the joint is prismatic: m instead of rad; None for no joint
     """
 
     order: Literal[1, 2, 3]
@@ -356,7 +356,7 @@ class RateLimit:
 
 
 def rate_interval(limit: RateLimit, joint: int, start: float, end: float, most: float) -> Interval[RateCause]:
-    """A stretch on which a joint (from 0) exceeds a limit, by its greatest value there."""
+    """A stretch on which a joint (from 0) exceeds a limit, by its largest value there."""
     slides = limit.sliding is not None and bool(limit.sliding[joint])
     needed, allowed = (np.array([most, limit.most[joint]]) * (1000.0 if slides else np.degrees(1.0))).tolist()
     cause: RateCause
@@ -395,7 +395,7 @@ class LimitSide:
         return value
 
     def cause(self, most: float) -> LimitCause:
-        """What is to be said where it gets beyond: its greatest :meth:`of`."""
+        """What is to be said where it gets beyond: its largest :meth:`of`."""
         used = np.flatnonzero(self.factors)
         side: Literal["above", "below"] = "above" if self.sign > 0 else "below"
         slides = bool(self.robot.slides[used].all())
@@ -496,7 +496,7 @@ def unreachable(robot: Robot, followed: Followed) -> list[Interval[PathOutOfReac
 
 
 def _where_positive(t: Reals, values: Reals, function: Callable[[float], float]) -> list[tuple[float, float, float]]:
-    """Stretches of positive values, those between two grid points too: start, end (roots), and the greatest value."""
+    """Stretches of positive values, those between two grid points too: start, end (roots), and the largest value."""
     found = []
     for first, last in runs(values > 0):
         start = _root(function, t, values, first - 1, first) if first > 0 else t[0]
@@ -566,7 +566,7 @@ class FactorForms:
 
     @property
     def shoulder_slopes(self) -> tuple[float, float]:
-        """Greatest slopes, m per rad, of the shoulder factor in q2 and in q2 + sense q3."""
+        """Largest slopes, m per rad, of the shoulder factor in q2 and in q2 + sense q3."""
         return float(np.hypot(*self.shoulder[1:3])), float(np.hypot(*self.shoulder[3:5]))
 
 
@@ -657,8 +657,8 @@ class RateCheck:
         return sorted(found, key=lambda interval: (interval.start, interval.cause.joint))
 
 
-class GreatestRates:
-    """The greatest speeds and accelerations of the joints, gathered from the parts of a motion."""
+class MaxRates:
+    """The maximum speeds and accelerations of the joints, gathered from the parts of a motion."""
 
     def __init__(self, joints: int):
         self._peaks = np.full((2, joints, 2), -np.inf)
@@ -715,14 +715,6 @@ class SingularCheck:
 def limit_intervals(robot: Robot, motion: Polynomials) -> list[Interval[LimitCause]]:
     """Where joints, or sums of joints, leave their limits, one interval per limit, side and stretch."""
     check = LimitCheck(robot)
-    for part in motion.parts():
-        check.add(part)
-    return check.intervals()
-
-
-def rate_intervals(motion: Polynomials, limit: RateLimit) -> list[Interval[RateCause]]:
-    """Where joints exceed a limit of speed, acceleration or jerk; a step of the acceleration exceeds any of jerk."""
-    check = RateCheck(limit)
     for part in motion.parts():
         check.add(part)
     return check.intervals()

@@ -1,9 +1,9 @@
 """Motions that are polynomials in time, piece by piece: their extremes, roots and bounds, whatever they are sampled at.
 
-Each piece is held as Chebyshev series of angle, velocity and acceleration. Where a series rises or falls is told by the
-roots of its derivative, the eigenvalues of its colleague matrix [1]_; between two of them it is monotone, so that every
-sign change is one root, and bisected. The sum of the coefficients' sizes bounds a series on its piece, which spares
-most pieces that work.
+Each piece is held as Chebyshev series of angle, velocity and acceleration. Where a series rises or falls is decided by
+the roots of its derivative, the eigenvalues of its colleague matrix [1]_; between two of them it is monotone, so that
+every sign change is one root, and bisected. The sum of the coefficients' sizes bounds a series on its piece, which
+spares most pieces that work.
 
 References
 ----------
@@ -26,7 +26,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.planning.profiles import Rates
 
 NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split; more break points do no harm
-TRIMMED = 1e-15  # of the greatest coefficient
+TRIMMED = 1e-15  # of the largest coefficient
 SAME_TIME = 1e-13  # share of the duration
 LOCATED = 1e-14  # share of the duration
 PIECES_AT_ONCE = 4096
@@ -77,7 +77,7 @@ class Pieces:
         )
 
     def above(self, level: float, found: list[Stretch] | None = None) -> list[Stretch]:
-        """Stretches on which the function is greater than a level: start, end, and its greatest value there.
+        """Stretches on which the function is greater than a level: start, end, and its largest value there.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class Pieces:
         return found
 
     def peak(self) -> tuple[float, float]:
-        """The greatest value, and a time at which it is met."""
+        """The largest value, and a time at which it is met."""
         ends = np.stack([chebyshev.chebval(x, self.series.T) for x in (-1.0, 1.0)])
         side, piece = np.unravel_index(int(ends.argmax()), ends.shape)
         most, at = float(ends.max()), float(self.times[piece + side])
@@ -110,7 +110,7 @@ class Pieces:
         return most, at
 
     def greatest(self, before: float = -np.inf) -> float:
-        """The greatest value, or ``before`` if that is greater."""
+        """The largest value, or ``before`` if that is greater."""
         most = max(before, *(float(chebyshev.chebval(x, self.series.T).max()) for x in (-1.0, 1.0)))
         bounds = self.range[1]
         above = np.flatnonzero(bounds > most)
@@ -193,7 +193,7 @@ class PiecewiseMotion(ByValue):
         return Pieces(self.times, sign * series[:, :, j])
 
     def greatest(self, series: Reals) -> Reals:
-        """Greatest size (n,) of angle, velocity, acceleration or jerk of each joint."""
+        """Largest size (n,) of angle, velocity, acceleration or jerk of each joint."""
         joints = range(series.shape[2])
         return np.array([max(self.of_joint(series, j, sign).greatest() for sign in (1.0, -1.0)) for j in joints])
 
@@ -317,7 +317,7 @@ def turning_points(series: Reals) -> Reals:
 
 
 def max_between(values: Reals, first: Integers, last: Integers) -> Reals:
-    """Greatest of rows first..last (both included) of values (m, n), for ranges (k,); (k, n)."""
+    """Largest of rows first..last (both included) of values (m, n), for ranges (k,); (k, n)."""
     found = np.maximum(values[first], values[last])
     for k in np.flatnonzero(last > first + 1):
         found[k] = values[first[k] : last[k] + 1].max(axis=0)

@@ -231,7 +231,7 @@ def _coefficients(x: Reals) -> tuple[Reals, Reals, Reals, Reals]:
 TURN_LENGTH = 0.1  # m per rad
 NO_WAY = 1e-12  # m; shorter segments are left out
 SIX_POINTS = 2.0  # Lebesgue constant of the six points of extreme value, 1.99: polynomials up to degree 5 exceed
-# their greatest size at these points by no more
+# their largest size at these points by no more
 RUNS_ON = 1e-9  # relative difference of twists below which a corner is none
 
 
@@ -389,7 +389,7 @@ class JointSequence:
         return MotionInParts(self.joints, *self._pieces())
 
     def _pieces(self) -> tuple[Reals, int]:
-        """When the polynomials begin and end, s, and their greatest degree."""
+        """When the polynomials begin and end, s, and their largest degree."""
         breaks = np.unique(np.concatenate([self.law.breaks, times_at(self.law, self.curve.edges[1:-1])]))
         return breaks, self.law.degree * (POWERS - 1)
 

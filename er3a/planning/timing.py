@@ -1,9 +1,9 @@
 """How fast an arm can run along a way in joint space: time laws under speed and acceleration limits of the joints.
 
-A way is a chain of joint vectors, parametrised by the least time in which its steps could be done at full joint speed.
-In that parameter no joint's slope exceeds its speed limit, however fast a joint has to turn per millimetre of the tool
-near a singularity. The time law is the fastest one under the limits, by TOPP-RA [1]_ (the toppra library); a programme
-may cap it, so that the way is run as programmed and slower only where the joints demand it.
+A way is a chain of joint vectors, parametrised by the smallest time in which its steps could be done at full joint
+speed. In that parameter no joint's slope exceeds its speed limit, however fast a joint has to turn per millimetre of
+the tool near a singularity. The time law is the fastest one under the limits, by TOPP-RA [1]_ (the toppra library); a
+programme may cap it, so that the way is run as programmed and slower only where the joints demand it.
 
 References
 ----------
@@ -77,11 +77,11 @@ class JointLimits(ByValue):
 
     Attributes
     ----------
-    speed, acceleration : greatest, rad/s and rad/s^2
-    jerk : greatest, rad/s^3, where one is given
+    speed, acceleration : largest, rad/s and rad/s^2
+    jerk : largest, rad/s^3, where one is given
     speed_assumed : (n,) bool, whether the speed is assumed; None for no joint
     acceleration_assumed : whether the accelerations are
-    sliding : (n,) bool, joints that slide: m instead of rad; None for none
+    sliding : (n,) bool, prismatic joints: m instead of rad; None for none
     """
 
     speed: Reals
@@ -146,13 +146,13 @@ class Timed:
         return self.curve.duration
 
     def ratios(self, limits: JointLimits) -> tuple[float, float]:
-        """Greatest ratio of a joint's speed to its limit, and of its acceleration to its limit, on the whole curve."""
+        """Largest ratio of a joint's speed to its limit, and of its acceleration to its limit, on the whole curve."""
         speed, acceleration = self.greatest
         return float((speed / limits.speed).max()), float((acceleration / limits.acceleration).max())
 
     @cached_property
     def greatest(self) -> tuple[Reals, Reals]:
-        """Greatest speed (n,) in rad/s and acceleration (n,) in rad/s^2 of each joint."""
+        """Maximum speed (n,) in rad/s and acceleration (n,) in rad/s^2 of each joint."""
         return self.curve.greatest(self.curve.velocity), self.curve.greatest(self.curve.acceleration)
 
 

@@ -8,7 +8,7 @@ have turned by little, the inverse of J has grown by little, so that::
     |q''''| <= B (|v'''| + C (4 V Z + 3 A^2 + 6 V^2 A + V^4)),
 
 with b the norm of the inverse at the pose solved, h the way from there, V, A, Z sums over the joints of the sizes of
-q', q'', q''', and C the greatest length of a column of J (turning an earlier joint turns a column, turning a later one
+q', q'', q''', and C the largest length of a column of J (turning an earlier joint turns a column, turning a later one
 turns its lever: no derivative of a column is longer). Under a coupling u = c q, V is the sum of the rows' rates, C is
 of the rows' columns, and the norm of c goes with sqrt(n). Where the bound on q'' that is put in comes out no greater,
 the motion exists over the whole interval, on one branch and without a singular pose [1]_; Taylor's formula then bounds
@@ -115,7 +115,7 @@ class ToolProof(ByValue):
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
+class ProofRequirements:
     """What is to be settled: limits of rates, and the distances of near passes."""
 
     rates: tuple[RateLimit, ...]
@@ -159,7 +159,12 @@ class _Settled:
 
 
 def follow_and_prove(
-    robot: Robot, line: ToolPath, t: Reals, wanted: Wanted, q_start: Reals | None = None, start_slot: int | None = None
+    robot: Robot,
+    line: ToolPath,
+    t: Reals,
+    required: ProofRequirements,
+    q_start: Reals | None = None,
+    start_slot: int | None = None,
 ) -> tuple[Followed, ToolProof]:
     """Follow a path (:func:`er3a.planning.follow.follow`), and settle it.
 
@@ -167,14 +172,14 @@ def follow_and_prove(
     """
     for _ in range(MOST_ROUNDS):
         followed = follow(robot, line, t, q_start, start_slot)
-        events = singular_events(robot, followed.t, followed.q, followed.joints, wanted.near)
+        events = singular_events(robot, followed.t, followed.q, followed.joints, required.near)
         beyond = np.flatnonzero(np.diff(np.isnan(followed.q[:, 0])))
         known = [
             [time for event in events if event.crossing for time in (event.t, event.until)],
             [jump.t for jump in followed.jumps],
             followed.t[beyond],
         ]
-        proof = prove(followed, wanted, np.unique(np.concatenate([np.asarray(part, float) for part in known])))
+        proof = prove(followed, required, np.unique(np.concatenate([np.asarray(part, float) for part in known])))
         lost = np.isnan(proof.q[:, 0])
         after = np.clip(np.searchsorted(followed.t, proof.t), 1, len(followed.t) - 1)
         reached = np.isfinite(followed.q[:, 0])
@@ -185,7 +190,7 @@ def follow_and_prove(
     return followed, proof
 
 
-def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
+def prove(followed: Followed, required: ProofRequirements, singular: Reals) -> ToolProof:
     """Settle a followed path.
 
     Parameters
@@ -202,10 +207,10 @@ def prove(followed: Followed, wanted: Wanted, singular: Reals) -> ToolProof:
     start, end = edges[:-1], edges[1:]
     done: list[_Settled] = []
     count, broken = 0, np.zeros(len(QUANTITIES), bool)
-    asks_jerk = any(limit.order == 3 for limit in wanted.rates)
+    asks_jerk = any(limit.order == 3 for limit in required.rates)
     while len(start):
         by_means = asks_jerk or count > MANY_INTERVALS
-        found = _settle(followed, wanted, (progress, by_means), start, end)
+        found = _settle(followed, required, (progress, by_means), start, end)
         count += len(start)
         broken |= found.broken.any(axis=0)
         least = np.where(broken, SETTLED_ELSEWHERE, SHORTEST) * duration
@@ -290,7 +295,7 @@ def _proof(followed: Followed, done: list[_Settled], singular: Reals) -> ToolPro
 
 
 def _settle(
-    followed: Followed, wanted: Wanted, how: tuple[PiecewiseMotion, bool], start: Reals, end: Reals
+    followed: Followed, required: ProofRequirements, how: tuple[PiecewiseMotion, bool], start: Reals, end: Reals
 ) -> _Settled:
     """What the bounds say of intervals (k,); ``how``: the law of time, and whether means of jerks narrow them."""
     progress, by_means = how
@@ -319,12 +324,12 @@ def _settle(
     outside = _outside(robot, np.stack([q_start, q, q_end])).any(axis=0)
     sure = ~_outside(robot, q, bounds.change)
     open_[:, 1], broken[:, 1] = known & ~np.all(sure | outside, axis=1), np.any(outside, axis=1)
-    for limit in wanted.rates:
+    for limit in required.rates:
         k = 1 + limit.order
         over = np.abs((velocity, acceleration, jerk)[limit.order - 1]) > limit.allowed + (blur if k == 4 else 0.0)
         sure = (highest[limit.order] <= limit.allowed) | ~np.isfinite(limit.most)
         open_[:, k], broken[:, k] = known & ~(sure | over).all(axis=1), over.any(axis=1)
-    open_[known, 5] = _near_open(robot, wanted.near, q[known], bounds.change[known])
+    open_[known, 5] = _near_open(robot, required.near, q[known], bounds.change[known])
     return _Settled(
         start=start,
         end=end,
@@ -406,7 +411,7 @@ def _continued(
 
 
 def inverse_and_reach(robot: Robot, q: Reals, length: float) -> tuple[Reals, Reals]:
-    """Norm (k,) of the inverse of the scaled Jacobian, and greatest lever of the tool point over the length."""
+    """Norm (k,) of the inverse of the scaled Jacobian, and largest lever of the tool point over the length."""
     J = jacobian(robot, q)
     J[..., :3, :] /= length
     least = np.linalg.svd(J, compute_uv=False)[..., -1]

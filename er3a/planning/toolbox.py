@@ -129,7 +129,7 @@ def jtraj(
 
     Returns
     -------
-    q, qd, qdd : (N, n), in rad, rad/s and rad/s^2 (m where joints slide)
+    q, qd, qdd : (N, n), in rad, rad/s and rad/s^2 (m for prismatic joints)
 
     Raises
     ------

@@ -3,8 +3,8 @@
 RRT-Connect [1]_ of OMPL [2]_ joins the ends by straight moves in joint space. A move is tried by conservative
 advancement: from an arm that is d clear no body can be met before the joints' turns, each times the longest lever that
 it swings, add up to d. Random short cuts follow, then corners are rounded as far as they stay clear, and the rounded
-way is timed. What is handed out is proven as it is run: on the timed curve itself, along which the least clearance is
-found to within a depth (:mod:`er3a.collision.along`) and exceeds that depth, so that nothing touches at any time.
+way is timed. What is handed out is proven as it is run: on the timed curve itself, along which the smallest clearance
+is found to within a depth (:mod:`er3a.collision.along`) and exceeds that depth, so that nothing touches at any time.
 
 The search ends after a number of rounds, not of seconds, and draws from its own seed alone: equal tasks, equal motions.
 
@@ -149,7 +149,7 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
     for name, q in ends:
         if outside := limits_exceeded(task.robot, q):
             return EndOutsideLimits(name, outside)
-    clear, pairs = task.bodies.least(np.stack([start, end]))
+    clear, pairs = task.bodies.min_distance(np.stack([start, end]))
     for (name, _), distance, pair in zip(ends, clear, pairs):
         if distance <= 0:
             return EndOverlaps(name, PairOverlaps(task.bodies.pairs[pair], -float(distance) * 1000))
@@ -224,8 +224,8 @@ class _Moves:
         self.levers = reach + np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
 
     def clear(self, q: Reals) -> float:
-        """Least distance of an arm, m."""
-        return float(self.bodies.least(q[None])[0][0])
+        """Smallest distance of an arm, m."""
+        return float(self.bodies.min_distance(q[None])[0][0])
 
     def free(self, a: Reals, b: Reals) -> bool:
         """Whether the move from a to b (n,) keeps the margin."""

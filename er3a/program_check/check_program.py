@@ -27,7 +27,7 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
 )
 from er3a.planning.timing import JointLimits, joint_limits
-from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionWay
+from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionPath
 from er3a.program_check.program_check_findings import (
     RANKS,
     BothSidesChecked,
@@ -40,8 +40,8 @@ from er3a.program_check.program_check_findings import (
     MovesBesideProgram,
     NeverReached,
     NotFollowedToEnd,
+    PathNotKnown,
     RestNotChecked,
-    WayNotKnown,
     level_of,
     worst_of,
 )
@@ -209,7 +209,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     Raises
     ------
     ShapeError, PoseError
-        for a start that has not an angle for each joint, and a frame that is no rigid transform
+        for a start that lacks an angle for each joint, and a frame that is no rigid transform
     """
     options = options or CheckOptions()
     execution = execute(program, robot, options.start, options.frames, options.limits, options.keep_on)
@@ -252,7 +252,7 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     found = [NotExamined(place, "motion") for place in moves]
     missed = (MotionNotReached, NeverReached)
     found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
-    found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, WayNotKnown)]
+    found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, PathNotKnown)]
     found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, NotFollowedToEnd)]
     files = {each.place.file: i for i, each in enumerate(located)}
     order = dict.fromkeys(found)
@@ -339,7 +339,7 @@ BY_JOINT_MOVES = frozenset(
         *("configuration_changes", "joint_jumps", "whole_turn", "motion_collides", "clear_of_assumed", "undecided"),
     )
 )
-"""Findings of motions that joint moves to another solution, or round by a point, may have not."""
+"""Findings of motions that joint moves to another solution, or round by a point, may be free of."""
 MOST_ADVISED = 20  # motions for which such moves are looked for
 
 
@@ -364,7 +364,7 @@ def _with_joint_moves(
 
 
 def _which(finding: CheckFinding) -> str:
-    """What tells findings of one code at one instruction apart."""
+    """What distinguishes findings of one code at one instruction."""
     names = ("joint", "type", "name", "text", "condition", "kind", "mass_kg")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
@@ -529,7 +529,7 @@ def _part(group: list[tuple[int, CheckedMotion]]) -> ProgramPart:
     return ProgramPart("sequence", lines, command, motions[0].placed.motion.load)
 
 
-def _blend(motion: CheckedMotion, way: MotionWay, after: MotionWay) -> float:
+def _blend(motion: CheckedMotion, way: MotionPath, after: MotionPath) -> float:
     zone = motion.placed.motion.zone
     if zone.kind != "distance":
         return 0.0

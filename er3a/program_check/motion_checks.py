@@ -44,7 +44,7 @@ from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.profiles import trapezoid
 from er3a.planning.sequences import TURN_LENGTH, Arc, arc
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
+from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
 from er3a.program_check.program_check_findings import (
     AcceleratesMoreThanAssumed,
     ArcHasNoCircle,
@@ -57,8 +57,8 @@ from er3a.program_check.program_check_findings import (
     LineNotChecked,
     MeetsSingularity,
     PassesSingularity,
+    StretchOutOfReach,
     TurnsAtStart,
-    WayOutOfReach,
     WholeTurn,
 )
 from er3a.programs.instructions import ArmMotion, Rate
@@ -99,7 +99,7 @@ class AssumedRates:
 
     Attributes
     ----------
-    tool_speed : m/s; tool_acceleration : m/s^2; joint_share : of the joints' greatest speed
+    tool_speed : m/s; tool_acceleration : m/s^2; joint_share : of the joints' maximum speed
     """
 
     tool_speed: float = 0.25
@@ -191,7 +191,7 @@ def limit_moment(law: MotionLaw, side: LimitSide, start: Reals, end: Reals) -> f
 
 
 def speed_moment(law: MotionLaw, share_of_max: float) -> float:
-    """When (s) the speed comes to a share (0 to 1) of its greatest, on the ramp up."""
+    """When (s) the speed comes to a share (0 to 1) of its largest, on the ramp up."""
     return law.ramp * law.duration * share_of_max
 
 
@@ -231,7 +231,7 @@ class CheckRules(ByValue):
 
 
 @dataclass(frozen=True, eq=False)
-class MotionWay(ByValue):
+class MotionPath(ByValue):
     """A motion's way.
 
     Attributes
@@ -295,7 +295,7 @@ class _JointMove(ByValue):
         return self.start + share, speed, acceleration
 
 
-def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> MotionWay | None:
+def joint_motion_path(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: CheckRules) -> MotionPath | None:
     """A joint move; None if no joint moves."""
     step = end - start
     if np.abs(step).max() < NO_WAY:
@@ -317,7 +317,7 @@ def joint_way(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: Ch
     findings = (*moments, *_joint_jumps(arm, start, end, moved, turned))
     lead = float(np.abs(step).max())
     rates = polynomial_motion(move.rates, law.breaks, 2).rate_bounds
-    return MotionWay(
+    return MotionPath(
         *(arm, law, times, move.joints(times), move.joints, move.joints_at, rates, moved, lead, end, findings),
         moments=moments,
     )
@@ -337,9 +337,9 @@ def _limit_moments(arm: Robot, law: MotionLaw, start: Reals, end: Reals) -> dict
     return {side.cause(float(side.of(end))): limit_moment(law, side, start, end) for side in _sides_left(arm, end)}
 
 
-def tool_way(
+def tool_motion_path(
     arm: Robot, motion: ArmMotion, start: Reals, goal: tuple[Reals, Reals | None, Reals | None], rules: CheckRules
-) -> MotionWay | CheckFinding | None:
+) -> MotionPath | CheckFinding | None:
     """A line or arc from joints (n,) in rad; None if the tool does not move, a finding if it can't be followed.
 
     Parameters
@@ -365,12 +365,12 @@ def tool_way(
     )
     times = np.linspace(0.0, law.duration, _points(path.length, path.turned))
     try:
-        followed, proof = follow_and_prove(arm, path, times, Wanted(rules.limits.rates, rules.near), start)
+        followed, proof = follow_and_prove(arm, path, times, ProofRequirements(rules.limits.rates, rules.near), start)
     except NotWristPartitionedError:
         return LineNotChecked()
     last = followed.q[-1]
     end_joints = last if np.isfinite(last).all() else None
-    way = MotionWay(
+    way = MotionPath(
         *(arm, law, followed.t, followed.q, followed.joints, followed.joints_at, proof.rate_bounds),
         *(path.length, path.turned, end_joints, (), path),
     )
@@ -387,12 +387,12 @@ def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None
 
 
 def _followed_moments(
-    followed: Followed, proof: ToolProof, way: MotionWay, rules: CheckRules
+    followed: Followed, proof: ToolProof, way: MotionPath, rules: CheckRules
 ) -> dict[CheckFinding, float]:
     """Reach, configuration, limits, singular poses and speeds, each with the time (s) from which on it is wrong."""
     arm = way.arm
     found: dict[CheckFinding, float] = {
-        WayOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
+        StretchOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
         for stretch in unreachable(arm, followed)
     }
     for jump in followed.jumps:
@@ -442,7 +442,7 @@ def _as_checked(cause: RateCause) -> CheckFinding:
     return AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2, cause.slides)
 
 
-def _arrival_moments(followed: Followed, given: Reals | None, way: MotionWay) -> dict[CheckFinding, float]:
+def _arrival_moments(followed: Followed, given: Reals | None, way: MotionPath) -> dict[CheckFinding, float]:
     """Turns at rest at the start, and whether the end has the joints that the program gives; with their times, s."""
     found: dict[CheckFinding, float] = {}
     turn, last = followed.start_turn, followed.q[-1]
@@ -464,7 +464,7 @@ def _points(length: float, turned: float) -> int:
 def _rate_moments(
     arm: Robot, law: MotionLaw, greatest: tuple[Reals, Reals], limits: JointLimits
 ) -> dict[CheckFinding, float]:
-    """Of a joint move with greatest speeds and accelerations (n,), each with when (s) it gets too great."""
+    """Of a joint move with maximum speeds and accelerations (n,), each with when (s) it gets too great."""
     found: dict[CheckFinding, float] = {}
     speed = greatest[0]
     for j in np.flatnonzero(speed > limits.speed * (1 + SPEED_TOLERANCE)).tolist():

@@ -32,7 +32,7 @@ class TargetNotGiven:
 
 @dataclass(frozen=True)
 class FrameNotGiven:
-    """A tool or base is known by its name alone; ``needed`` if the motion can't be told without it."""
+    """A tool or base is known by its name alone; ``needed`` if the motion can't be placed without it."""
 
     name: str
     frame: Literal["tool", "base"]
@@ -49,7 +49,7 @@ class FrameTakenAsFlange:
 
 
 @dataclass(frozen=True)
-class WayNotKnown:
+class PathNotKnown:
     """Where the arm comes from is not known, so that only the target was checked."""
 
     code: Literal["way_not_known"] = "way_not_known"
@@ -64,7 +64,7 @@ class TargetOutOfReach:
 
 
 @dataclass(frozen=True)
-class WayOutOfReach:
+class StretchOutOfReach:
     """The tool leaves the reach on its way to the target."""
 
     at_mm: float
@@ -438,9 +438,9 @@ CheckFinding = (
     | TargetNotGiven
     | FrameNotGiven
     | FrameTakenAsFlange
-    | WayNotKnown
+    | PathNotKnown
     | TargetOutOfReach
-    | WayOutOfReach
+    | StretchOutOfReach
     | ConfigurationEnds
     | MeetsSingularity
     | PassesSingularity

@@ -54,7 +54,14 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import turned_difference
 from er3a.planning.tool_proof import inverse_and_reach
-from er3a.program_check.motion_checks import CheckRules, MotionWay, is_given, joint_way, limit_findings, tool_way
+from er3a.program_check.motion_checks import (
+    CheckRules,
+    MotionPath,
+    is_given,
+    joint_motion_path,
+    limit_findings,
+    tool_motion_path,
+)
 from er3a.program_check.program_check_findings import (
     ArcGoesOn,
     ArcHasNoCircle,
@@ -70,13 +77,13 @@ from er3a.program_check.program_check_findings import (
     LoopComesBackOtherwise,
     MoreThanFullSpeed,
     MotionCollides,
+    PathNotKnown,
     SpeedNotGiven,
     SplineAsLine,
+    StretchOutOfReach,
     TargetNotGiven,
     TargetOutOfReach,
     TurnNotMet,
-    WayNotKnown,
-    WayOutOfReach,
     ZoneCollides,
     ZoneNotSettled,
     ZoneTooLarge,
@@ -234,7 +241,7 @@ def _branch_not_met(target: PoseTarget, joint: bool) -> CheckFinding:
     return ConfigurationNotMet(shown, "target" if joint else "line")
 
 
-MOST_REASONS = 1000  # targets out of reach for which it is told why
+MOST_REASONS = 1000  # targets out of reach whose reasons are looked for
 
 
 def target_findings(
@@ -249,28 +256,28 @@ def target_findings(
     first: dict[Hashable, int] = {}
     for number in motions:
         first.setdefault(keys[number], number)
-    told: dict[int, tuple[CheckFinding, ...]] = {}
+    findings: dict[int, tuple[CheckFinding, ...]] = {}
     poses: dict[int, list[tuple[int, PlacedMotion]]] = defaultdict(list)
     for number in first.values():
         placed = arms.placed(motions[number])
         target = placed.motion.target
         if isinstance(target, JointTarget):
             known = np.where(np.isnan(target.joints), placed.arm.lower, target.joints)
-            told[number] = limit_findings(placed.arm, known)
+            findings[number] = limit_findings(placed.arm, known)
         elif not isinstance(target, PoseTarget) or placed.base is None or placed.missing:
-            told[number] = goal_of(placed, target, None).findings
+            findings[number] = goal_of(placed, target, None).findings
         elif closed_form_missing(placed.arm) is None and placed.arm.coupling is None:  # others take too long
             poses[id(placed.arm)].append((number, placed))
     for group in poses.values():
-        told |= _of_poses(group)
-    looked = [number for number in motions if first[keys[number]] in told]
-    return len(looked), {number: found for number in looked if (found := told[first[keys[number]]])}
+        findings |= _of_poses(group)
+    looked = [number for number in motions if first[keys[number]] in findings]
+    return len(looked), {number: found for number in looked if (found := findings[first[keys[number]]])}
 
 
 def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[CheckFinding, ...]]:
     """Findings of targets that are poses, of one arm."""
     arm = group[0][1].arm
-    told: dict[int, tuple[CheckFinding, ...]] = {number: () for number, _ in group}
+    findings: dict[int, tuple[CheckFinding, ...]] = {number: () for number, _ in group}
     try:
         found = inverse_batch(arm, np.stack([_pose(placed) for _, placed in group]))
     except PoseError:  # one of them is no pose
@@ -281,12 +288,12 @@ def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[CheckFin
     for i in np.flatnonzero(~inside).tolist():
         number, placed = group[i]
         if found.solved[i].any():
-            told[number] = limit_findings(arm, found.q[i, int(away[i].argmin())])
+            findings[number] = limit_findings(arm, found.q[i, int(away[i].argmin())])
         elif (reasons := reasons + 1) <= MOST_REASONS:
-            told[number] = goal_of(placed, placed.motion.target, None).findings
+            findings[number] = goal_of(placed, placed.motion.target, None).findings
         else:
-            told[number] = (TargetOutOfReach(()),)
-    return told
+            findings[number] = (TargetOutOfReach(()),)
+    return findings
 
 
 def _pose(placed: PlacedMotion) -> Reals:
@@ -393,7 +400,7 @@ class _Near:
     inverse : (n, 6), of J0; size : its absolute values
     changes : (n, n, n), sizes of J0^-1 dJ/dq_i, by i
     weights : (n,), by which rows of the table move per joint, in sum
-    reach : greatest lever of the tool point, over ``length`` (m)
+    reach : largest lever of the tool point, over ``length`` (m)
     """
 
     inverse: Reals
@@ -424,7 +431,7 @@ class _Near:
         return np.asarray(np.sqrt((self.inverse**2).sum(axis=1)), np.float64)
 
     def column(self, moved: Reals) -> tuple[Reals, float]:
-        """Greatest length of the columns (n,) of J while joints move by (n,), and by how much rows do in sum."""
+        """Largest length of the columns (n,) of J while joints move by (n,), and by how much rows do in sum."""
         rows = float(self.weights @ moved)
         longest = math.hypot(1.0, self.reach * math.exp(min(rows, 1.0)))
         return longest * self.weights, rows
@@ -506,7 +513,7 @@ def zone_clearance(
         bent, lasting = (bend, bend) if patch is None else patch.bend(at, triangle)
         proven = bool(np.isfinite(bent).all())
         off = per_joint @ bent if proven else np.full(len(every), np.inf)
-        distances = bodies.told(bodies.distances(bodies.ends(middle), every))
+        distances = bodies.counted(bodies.distances(bodies.ends(middle), every))
         measured += 1
         worst = int(np.argmin(distances))
         least = min(least, float(distances[worst]))
@@ -517,7 +524,7 @@ def zone_clearance(
         if not open_.any():
             continue
         if measured >= most or (proven and (open_ & (nearer < np.maximum(per_joint @ lasting, tolerance))).any()):
-            settled = False  # smaller parts would not tell more
+            settled = False  # smaller parts would show no more
             if measured >= most:
                 break
             continue
@@ -602,7 +609,7 @@ class CheckedMotion(ByValue):
     kind: str
     placed: PlacedMotion
     start: Reals | None
-    way: MotionWay | None
+    way: MotionPath | None
     end: Reals | None
     findings: tuple[CheckFinding, ...]
     clearance: float | None = None
@@ -675,7 +682,7 @@ class StepChecker:
 
     def joint_moves_instead(self, number: int) -> tuple[Reals, ...]:
         """Joint moves (n,), one or two, that take the tool where a motion does and pass its checks; empty if none was
-        found, and of arms with joints that slide.
+        found, and of arms with prismatic joints.
 
         The first that passes is taken: straight to the solution nearest to the start, or else round by the middle of
         both with some joints turned away. They are checked at the share of full speed that is assumed.
@@ -743,7 +750,7 @@ class StepChecker:
             joint = motion.kind == "joint"
             findings.append(SpeedNotGiven(*((assumed.joint_share, "share") if joint else (assumed.tool_speed, "m/s"))))
         if before is None:
-            findings.append(WayNotKnown())
+            findings.append(PathNotKnown())
             findings += () if goal.joints is None else limit_findings(placed.arm, goal.joints)
             return CheckedMotion(motion.kind, placed, None, None, goal.joints, tuple(findings))
         if motion.kind == "joint":
@@ -756,7 +763,7 @@ class StepChecker:
         findings += [each for each in placed.missing if each not in findings]
         if goal.joints is None:
             return CheckedMotion("joint", placed, before, None, None, tuple(findings))
-        way = joint_way(placed.arm, placed.motion, before, goal.joints, self.rules)
+        way = joint_motion_path(placed.arm, placed.motion, before, goal.joints, self.rules)
         if way is None:
             return CheckedMotion("joint", placed, before, None, goal.joints, tuple(findings), stays=True)
         found = (*findings, *way.findings)
@@ -786,19 +793,19 @@ class StepChecker:
             turns = bool(np.abs(end[:3, :3] - forward(placed.arm, before)[:3, :3]).max() > SAME_JOINTS)
             findings.append(ArcGoesOn(float(np.degrees(placed.motion.angle)), turns))
             given = None
-        way = tool_way(placed.arm, placed.motion, before, (end, given, via), self.rules)
+        way = tool_motion_path(placed.arm, placed.motion, before, (end, given, via), self.rules)
         if way is None:
             return CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True)
-        if not isinstance(way, MotionWay):
+        if not isinstance(way, MotionPath):
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, way))
-        if any(isinstance(each, WayOutOfReach) for each in way.findings):
+        if any(isinstance(each, StretchOutOfReach) for each in way.findings):
             findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
-        told = (*findings, *way.findings)
+        seen = (*findings, *way.findings)
         target = placed.motion.target
         if isinstance(target, PoseTarget) and target.branch is not None and way.end is not None:
             arrived = solutions_meant(target.branch, way.arm, way.end[None])[0]
-            told += () if arrived else (_branch_not_met(target, joint=False),)
-        return self._measured(CheckedMotion(kind, placed, before, way, way.end, told, moments=way.moments))
+            seen += () if arrived else (_branch_not_met(target, joint=False),)
+        return self._measured(CheckedMotion(kind, placed, before, way, way.end, seen, moments=way.moments))
 
     def _via(self, placed: PlacedMotion, before: Reals) -> Reals | None:
         """The arc's point (3,), m."""
@@ -862,7 +869,7 @@ class StepChecker:
         self.motions[second] = replace(self.motions[second], blended_ends=min(self.motions[second].blended_ends + 1, 2))
 
     def _round_corner(
-        self, way: MotionWay, after: MotionWay, corners: Reals, shares: tuple[float, float]
+        self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float]
     ) -> CheckFinding | None:
         """What stands in a way from joints (3, n) before a corner to behind it, over shares of the two motions."""
         assert self.obstacles is not None
@@ -873,13 +880,13 @@ class StepChecker:
         slack = max(way.sagitta(shares[0]), after.sagitta(shares[1]))
         return zone_clearance(bodies, corners, tolerance, patch=patch_of(way.arm, corners, slack))
 
-    def _rounded(self, way: MotionWay, after: MotionWay, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
+    def _rounded(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
         key = (id(way), id(after))
         if key not in self._corners:
             self._corners[key] = self._zone_findings(way, after, motion)
         return self._corners[key]
 
-    def _zone_findings(self, way: MotionWay, after: MotionWay, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
+    def _zone_findings(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
         shares = [_zone_share(motion.placed.motion, part) for part in (way, after)]
         found: list[CheckFinding] = []
         zone = motion.placed.motion.zone
@@ -898,7 +905,7 @@ class StepChecker:
         return tuple(found)
 
 
-def _bend(way: MotionWay, first: float, last: float) -> Reals:
+def _bend(way: MotionPath, first: float, last: float) -> Reals:
     """By how much joints (n,) leave the straight way between two shares of a motion, rad; 0 in a joint move."""
     if way.tool_path is None:
         return np.zeros(way.q.shape[1])
@@ -906,7 +913,7 @@ def _bend(way: MotionWay, first: float, last: float) -> Reals:
     return bend_of_line(way.arm, q, way.sagitta((last - first) / BEND_PARTS))
 
 
-def _zone_share(motion: ArmMotion, way: MotionWay) -> float:
+def _zone_share(motion: ArmMotion, way: MotionPath) -> float:
     """The share of a way that its zone may take; over one half where the zone is larger than that."""
     zone = motion.zone
     match zone.kind:
@@ -929,7 +936,7 @@ def _vias(arm: Robot, start: Reals, end: Reals) -> Reals:
 
 
 def _as_written(q: Reals) -> Reals:
-    """Joint angles (..., n) in rad, rounded to 0.001 deg, as they are told."""
+    """Joint angles (..., n) in rad, rounded to 0.001 deg, as reports state them."""
     found: Reals = np.radians(np.round(np.degrees(q), 3))
     return found
 

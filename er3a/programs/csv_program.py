@@ -41,7 +41,7 @@ def write_csv(
     Parameters
     ----------
     times : (n,), s
-    joints : (n, k), deg, or mm of joints that slide
+    joints : (n, k), deg, or mm of prismatic joints
     poses : (n, 4, 4), T_base_tool, m
     head : comments, one to a line
     columns : names of the k columns of joints, if other than ``q1_deg`` ...

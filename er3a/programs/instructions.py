@@ -71,7 +71,7 @@ class Rate:
 
     Attributes
     ----------
-    value : in ``unit``; ``share`` is of the greatest the arm can do (0..1), ``s`` is the motion's whole time
+    value : in ``unit``; ``share`` is of the largest the arm can do (0..1), ``s`` is the motion's whole time
     text : the word that was read, for speeds that are names
     """
 
@@ -493,7 +493,7 @@ def _cos_sin(degrees: float) -> tuple[float, float]:
 
 
 def _rotation_vector(R: list[list[float]]) -> tuple[float, float, float]:
-    """Rotation vector (rad) of a rotation matrix, by the quaternion whose greatest part is found first."""
+    """Rotation vector (rad) of a rotation matrix, by the quaternion whose largest part is found first."""
     (a, b, c), (d, e, f), (g, h, i) = R
     squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
     greatest = squares.index(max(squares))

@@ -455,7 +455,7 @@ class Frame:
 
 
 @dataclass(slots=True)
-class RunWay:
+class ExecutionPath:
     """A way through the program: everything that it depends on from here."""
 
     frames: list[Frame]
@@ -466,13 +466,13 @@ class RunWay:
     line: tuple[tuple[int, int], ...] = ()  # ways that it comes from, each with the count of states until then
     beside: bool = False  # whether it runs beside the program
 
-    def fork(self, new: int, states: int) -> RunWay:
+    def fork(self, new: int, states: int) -> ExecutionPath:
         """Another that goes its own way from here."""
         frames = [frame.copy() for frame in self.frames]
         memory = self.memory.copy()
         memory.local = frames[-1].local
         line = (*self.line, (self.number, states))
-        return RunWay(frames, memory, self.step, new, dict(self.rounds), line, self.beside)
+        return ExecutionPath(frames, memory, self.step, new, dict(self.rounds), line, self.beside)
 
 
 class Machine:
@@ -503,7 +503,7 @@ class Machine:
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
         self.loops = {name: _loops(routine) for name, routine in program.routines.items()}
         self.seen: dict[Hashable, tuple[int, int, int]] = {}  # way, count, last step
-        self.waiting: list[RunWay] = []
+        self.waiting: list[ExecutionPath] = []
         self.ways = 1
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
@@ -521,7 +521,7 @@ class Machine:
         if entry is not None:
             frame = Frame(entry)
             memory.local = frame.local
-            self.waiting.append(RunWay([frame], memory))
+            self.waiting.append(ExecutionPath([frame], memory))
         while self.waiting:
             self._follow(self.waiting.pop())
         return Execution(self.program, tuple(self.steps), tuple(self.endings), self._unmet())
@@ -535,7 +535,7 @@ class Machine:
             if (routine.name, at) not in self.passed and _may_move(operation, self.dialect)
         )
 
-    def _follow(self, way: RunWay) -> None:
+    def _follow(self, way: ExecutionPath) -> None:
         """Follow one way to its end."""
         back = False
         while True:
@@ -584,7 +584,7 @@ class Machine:
             else:
                 self._carry_out(way, frame, operation)
 
-    def _carry_out(self, way: RunWay, frame: Frame, operation: Move | Assign | Waiting | Doing | Fixed) -> None:
+    def _carry_out(self, way: ExecutionPath, frame: Frame, operation: Move | Assign | Waiting | Doing | Fixed) -> None:
         memory = way.memory
         if isinstance(operation, Move):
             motion = self.dialect.motion(memory, operation)
@@ -609,7 +609,7 @@ class Machine:
                 if isinstance(done, Unknown) and done.may_move:
                     memory.here = Position()
 
-    def _note(self, way: RunWay, place: Place, instruction: Instruction) -> None:
+    def _note(self, way: ExecutionPath, place: Place, instruction: Instruction) -> None:
         self.first_after.setdefault(way.step, len(self.steps))
         self.steps.append(Step(instruction, place, way.frames[-1].calls, way.step))
         way.step = len(self.steps) - 1
@@ -619,7 +619,7 @@ class Machine:
             self.stopped = not self.keep_on("following", len(self.steps), 0)
         return self.stopped
 
-    def _end(self, way: RunWay, kind: EndKind, place: Place, behind: int | None = None, limit: int = 0) -> None:
+    def _end(self, way: ExecutionPath, kind: EndKind, place: Place, behind: int | None = None, limit: int = 0) -> None:
         """``behind``: the step in front of the one that follows."""
         follows = None if behind is None else self.first_after.get(behind)
         self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside))
@@ -655,7 +655,7 @@ class Machine:
         seconds = number(memory.value(waiting.of))
         return Pause(seconds) if seconds is not None and seconds >= 0 else Pause(condition=waiting.text)
 
-    def _branch(self, way: RunWay, frame: Frame, branch: Branch, at: int) -> bool:
+    def _branch(self, way: ExecutionPath, frame: Frame, branch: Branch, at: int) -> bool:
         """Go on, on the side that the condition chooses, or on both; whether that is backwards."""
         holds = way.memory.value(branch.condition)
         if isinstance(holds, bool):
@@ -692,13 +692,13 @@ class Machine:
             frame.at = branch.otherwise
         return not taken and branch.otherwise <= at
 
-    def _take_sides(self, branch: Branch, holding: RunWay, other: RunWay) -> None:
+    def _take_sides(self, branch: Branch, holding: ExecutionPath, other: ExecutionPath) -> None:
         """One way on the side of the condition, another on the other side."""
         other.frames[-1].at = branch.otherwise
         self._note(holding, branch.place, Decision(branch.text, True))
         self._note(other, branch.place, Decision(branch.text, False))
 
-    def _call(self, way: RunWay, call: Call) -> None:
+    def _call(self, way: ExecutionPath, call: Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
         local, fits = _locals(routine, call.arguments, call.keywords, memory)
         if call.result == START:
@@ -714,7 +714,7 @@ class Machine:
         way.frames.append(Frame(routine, 0, local, calls, call.result, outs))
         memory.local = local
 
-    def _start(self, way: RunWay, start: Beside) -> None:
+    def _start(self, way: ExecutionPath, start: Beside) -> None:
         """Follow a routine that moves the arm beside the program, on a way that begins here.
 
         The program's own way goes on. Behind the start of a thread it does not know where the arm stands; an interrupt,
@@ -750,7 +750,7 @@ class Machine:
         if start.kind == "thread":
             way.memory.here = Position()
 
-    def _changed_later(self, way: RunWay) -> frozenset[str]:
+    def _changed_later(self, way: ExecutionPath) -> frozenset[str]:
         """Names of the variables, of those that have names in motions, that a way may still change."""
         found: set[str] = set()
         called: set[str] = set()
@@ -771,7 +771,7 @@ class Machine:
         found |= _changed_in(self.program, _with_called(self.program, called), self.dialect)
         return frozenset(found) - self.dialect.modal
 
-    def _return(self, way: RunWay, operation: Return) -> None:
+    def _return(self, way: ExecutionPath, operation: Return) -> None:
         memory = way.memory
         value: Value = Unclear("a value") if operation.value is None else memory.value(operation.value)
         frame = way.frames.pop()
@@ -781,12 +781,12 @@ class Machine:
         if frame.result:
             memory.write(frame.result, value, local=True)
 
-    def _drifts(self, way: RunWay, routine: str, at: int) -> bool:
+    def _drifts(self, way: ExecutionPath, routine: str, at: int) -> bool:
         rounds = way.rounds.get((routine, at), 0) + 1
         way.rounds[routine, at] = rounds
         return rounds > self.limits.rounds
 
-    def _met(self, way: RunWay) -> tuple[EndKind, int] | None:
+    def _met(self, way: ExecutionPath) -> tuple[EndKind, int] | None:
         """Whether this way (it repeats) or another (it joins) was in this state before, and behind which step."""
         memory, last = way.memory, len(way.frames) - 1
         frames = tuple(
@@ -866,9 +866,9 @@ def execute(
     Raises
     ------
     InputError
-        for an arm that the program's language, or the table, has not the joints of
+        for an arm whose number of joints the program's language, or the table, does not have
     ShapeError, PoseError
-        for a start that has not an angle for each joint, and a frame that is no rigid transform
+        for a start that lacks an angle for each joint, and a frame that is no rigid transform
     """
     if robot is not None and (reason := _not_meant(program, robot)):
         raise InputError(program.file, None, reason, "Give the arm that the program is meant for")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.programs.instructions import Place
 
 
@@ -109,7 +109,7 @@ class SpeedsEstimated:
 
 @dataclass(frozen=True)
 class SpeedsCut:
-    """Speeds above what the joints can do were written as the greatest."""
+    """Speeds above what the joints can do were written as the largest."""
 
     motions: int
     code: Literal["written_speeds_cut"] = "written_speeds_cut"

@@ -28,7 +28,7 @@ class Language:
     opening : with what all its texts begin, and those of no other language
     dialect : how its expressions, motions and functions are meant when a program runs
     writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
-    joints : how many joint angles a target can have; None for any number, of joints that slide too
+    joints : how many joint angles a target can have; None for any number, of prismatic joints too
     points : suffix of the file with a program's points, where they stand in one of their own
     companions : what finds the files that belong to a program: modules that it calls, points, the controller's data
     """

@@ -372,7 +372,7 @@ class WriteOptions(ByValue):
 
     Attributes
     ----------
-    robot : the arm; without it joints can't be told from poses, nor poses from joints
+    robot : the arm; without it poses have no joints, and joints no pose
     start : (n,), rad, where the arm is before the first motion
     notes : findings of those who made the sequence, to be said in the head
     head : further lines of the head
@@ -600,14 +600,14 @@ ASSUMED_JOINT_SPEED = math.radians(100.0)  # rad/s, of a joint whose greatest sp
 
 
 def joint_speeds(robot: Robot | None, joints: int) -> Reals:
-    """Greatest speeds (n,) of the joints, rad/s."""
+    """Maximum speeds (n,) of the joints, rad/s."""
     if robot is None:
         return np.full(joints, ASSUMED_JOINT_SPEED)
     return np.where(np.isnan(robot.speed), ASSUMED_JOINT_SPEED, robot.speed)
 
 
 def share_of_max(ready: ReadyMotion, robot: Robot | None) -> float | None:
-    """The speed of a joint motion as a share of the greatest; None if the program gives none that can be told."""
+    """The speed of a joint motion as a share of the maximum; None if the program's is not known."""
     speed = ready.motion.speed
     if speed is None:
         return None
@@ -637,7 +637,7 @@ def leading_joint_speed(ready: ReadyMotion, robot: Robot | None) -> float | None
 
 
 def tool_speed(ready: ReadyMotion) -> float | None:
-    """The speed of a line or arc, m/s; None if the program gives none that can be told."""
+    """The speed of a line or arc, m/s; None if the program's is not known."""
     speed = ready.motion.speed
     if speed is None or speed.unit not in ("m/s", "s"):
         return None

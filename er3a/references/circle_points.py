@@ -34,8 +34,8 @@ class CirclePoints:
     Attributes
     ----------
     axes : direction of positive rotation and the circle's centre, per joint
-    radius_mm : (n,), of the circles; 0 of joints that slide, whose track is a line
-    roundness_mm : (n,), greatest distance of a track's point from its circle, or line
+    radius_mm : (n,), of the circles; 0 of prismatic joints, whose track is a line
+    roundness_mm : (n,), largest distance of a track's point from its circle, or line
     offset_mm : (3,), the carried point in the flange's frame
     """
 
@@ -80,7 +80,7 @@ def fit_circle(track: Reals) -> tuple[Reals, Reals, float, float]:
     -------
     normal : (3,), unit vector about which the points run right-handed
     centre : (3,)
-    radius, roundness : radius, and the greatest distance of a point from the circle
+    radius, roundness : radius, and the largest distance of a point from the circle
     """
     middle = track.mean(axis=0)
     basis = np.linalg.svd(track - middle)[2]
@@ -99,7 +99,7 @@ def fit_circle(track: Reals) -> tuple[Reals, Reals, float, float]:
 
 
 def fit_line(track: Reals) -> tuple[Reals, Reals, float, float]:
-    """Direction of a track (N, 3) of a joint that slides, its middle, 0, and the greatest distance from the line."""
+    """Direction of a track (N, 3) of a prismatic joint, its middle, 0, and the largest distance from the line."""
     middle = track.mean(axis=0)
     direction = np.linalg.svd(track - middle)[2][0]
     direction = -direction if (track[-1] - track[0]) @ direction < 0 else direction

@@ -1,6 +1,6 @@
 """What a model says about each reference.
 
-Greatest and least values over the joint limits, by optimisation.
+Largest and smallest values over the joint limits, by optimisation.
 
 Points spread evenly over the box are evaluated in one batch; its best points and an equal number of others start a
 bounded truncated-Newton search each [1]_. Nothing is random: equal inputs give equal numbers.

@@ -294,7 +294,7 @@ class Limit(Quantity):
 
 @dataclass(frozen=True)
 class SlideLimit(Limit):
-    """A limit of a joint that slides."""
+    """A limit of a prismatic joint."""
 
     unit: ClassVar[Unit] = "mm"
 
@@ -304,7 +304,7 @@ class SlideLimit(Limit):
 
 @dataclass(frozen=True)
 class Speed(Quantity):
-    """A joint's greatest speed; NaN where the robot's file gives none."""
+    """A joint's maximum speed; NaN where the robot's file gives none."""
 
     joint: int
     unit: ClassVar[Unit] = "deg/s"
@@ -315,7 +315,7 @@ class Speed(Quantity):
 
 @dataclass(frozen=True)
 class SlideSpeed(Speed):
-    """The greatest speed of a joint that slides."""
+    """The maximum speed of a prismatic joint."""
 
     unit: ClassVar[Unit] = "mm/s"
 
@@ -325,7 +325,7 @@ class SlideSpeed(Speed):
 
 @dataclass(frozen=True)
 class PoseOutside(QuantityAtPose):
-    """How far a pose lies outside the joint limits: greatest excess of a joint (mm of one that slides), 0 inside."""
+    """How far a pose lies outside the joint limits: largest excess of a joint (mm of one that slides), 0 inside."""
 
     unit: ClassVar[Unit] = "deg"
 
@@ -341,7 +341,7 @@ class PoseOutside(QuantityAtPose):
 
 @dataclass(frozen=True)
 class Extreme(Quantity):
-    """Greatest or least value of a measure of a point over all joint angles within the limits."""
+    """Largest or smallest value of a measure of a point over all joint angles within the limits."""
 
     point: Point
     extreme: Extremity

@@ -4,7 +4,7 @@ Documents that references and tables rest on, and which of them are independent 
 
 A document that was made from another says nothing that the other does not say. Two documents are independent if neither
 was made from the other, directly or by way of others, and no third stands behind both. Documents of one publisher are
-different documents; that they have it in common is told beside.
+different documents; what they have in common is stated beside them.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ class Reference:
 
     @property
     def document(self) -> str:
-        """What tells its document from others: its origin, else its source."""
+        """What distinguishes its document from others: its origin, else its source."""
         return self.origin or self.source
 
     @property

@@ -86,7 +86,7 @@ GROUPS: dict[str, Group] = {
 class AxisRow(Row):
     """The line of a joint's axis in the zero pose.
 
-    ``point_mm`` is None of a joint that slides, whose axis has no place. Else it is where the axis meets the next part
+    ``point_mm`` is None of a prismatic joint, whose axis has no place. Else it is where the axis meets the next part
     of the arm: axis 1 the mounting plane, axes 2, 3 and 5 the arm's plane of symmetry, axes 4 and 6 axis 5. Sliding it
     along the axis changes no check. ``signed``: ``direction`` is that of positive rotation (right hand), else just the
     line's.
@@ -201,7 +201,7 @@ class EnvelopeRow(Row):
 
 @dataclass(frozen=True)
 class ReachRow(Row):
-    """Greatest or least distance of a point from axis 1 or 2, over all joint angles within the limits."""
+    """Largest or smallest distance of a point from axis 1 or 2, over all joint angles within the limits."""
 
     kind: ClassVar[str] = "reach"
     groups: ClassVar[tuple[str, ...]] = ("reach",)
@@ -238,7 +238,7 @@ class LimitRow(Row):
 
 @dataclass(frozen=True)
 class SpeedRow(Row):
-    """A joint's greatest speed, deg/s, or mm/s of one that ``slides``; None where the source gives none."""
+    """A joint's maximum speed, deg/s, or mm/s of one that ``slides``; None where the source gives none."""
 
     kind: ClassVar[str] = "speeds"
     groups: ClassVar[tuple[str, ...]] = ("speeds",)

@@ -102,7 +102,7 @@ class DrawingExtent(Subject):
 
 @dataclass(frozen=True)
 class Reach(Subject):
-    """Greatest or least distance of a point from the axis of joint 1 or 2."""
+    """Largest or smallest distance of a point from the axis of joint 1 or 2."""
 
     extreme: Extremity
     point: Point
@@ -121,7 +121,7 @@ class JointLimit(Subject):
 
 @dataclass(frozen=True)
 class JointSpeed(Subject):
-    """A joint's greatest speed."""
+    """A joint's maximum speed."""
 
     joint: int
     code: Literal["joint_speed"] = "joint_speed"

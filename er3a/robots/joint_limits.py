@@ -11,7 +11,7 @@ from er3a.errors import Er3aError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_way, turns_in, whole_turns
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_move, turns_in, whole_turns
 
 SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
 MOST_ROWS = 10_000
@@ -31,7 +31,7 @@ class LimitExceeded:
 
 @dataclass(frozen=True)
 class SlideExceeded:
-    """A joint that slides is beyond its upper or below its lower limit, by the excess."""
+    """A prismatic joint is beyond its upper or below its lower limit, by the excess."""
 
     joint: int
     side: Literal["above", "below"]
@@ -98,7 +98,7 @@ def theta_limits(robot: Robot) -> Reals:
 
 
 def limit_margin(robot: Robot, q: Reals) -> Reals:
-    """Least distance (...,) of joints (..., n) from their limits, rad (m of joints that slide); negative outside.
+    """Smallest distance (...,) of joints (..., n) from their limits, rad (m of prismatic joints); negative outside.
 
     Infinite where all joints are continuous. Limits of sums of joints count too.
     """
@@ -160,7 +160,7 @@ def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
 def unwound(robot: Robot, q: Reals) -> Reals:
     """Joint values (..., n) with their whole turns taken off: angles in (-pi, pi], behind a gear those of rows."""
     turns = whole_turns(robot)
-    return np.where(turns.alone, wrap_to_pi(q), q) if turns.each else shortest_way(robot, q)
+    return np.where(turns.alone, wrap_to_pi(q), q) if turns.each else shortest_move(robot, q)
 
 
 def but_for_turns(robot: Robot, q: Reals) -> Reals:
@@ -169,7 +169,7 @@ def but_for_turns(robot: Robot, q: Reals) -> Reals:
 
 
 def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
-    """Least and greatest number of turns to add so that each value lies within its limits (least > greatest: none).
+    """Smallest and largest number of turns to add so that each value lies within its limits (smallest > largest: none).
 
     Of a continuous joint the turn it has is given; of one that a turn of its own would move elsewhere 0, or none if it
     is outside.

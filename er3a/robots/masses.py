@@ -70,7 +70,8 @@ class Load(MassBody):
 
 @dataclass(frozen=True, eq=False)
 class Drives(ByValue):
-    """What is known of the joints' drives, at the joint: (n,) each, NaN where unknown; N for N m where a joint slides.
+    """What is known of the joints' drives, at the joint: (n,) each, NaN where unknown; N in place of N m for prismatic
+    joints.
 
     Attributes
     ----------

@@ -62,7 +62,7 @@ class CombinedLimit:
     """Limits of a sum of joints: ``lower <= factors @ q <= upper``, such as J2 + J3 of arms with a parallelogram.
 
     ``factors`` has one number for each of the n joints; lower and upper are in rad (m if all its joints slide; among
-    joints that turn, factors of slides are in rad/m).
+    revolute joints, factors of slides are in rad/m).
     """
 
     factors: tuple[float, ...]
@@ -129,8 +129,8 @@ class Robot(ByValue, Displayed):
     sliding : (m,) bool, rows of prismatic joints
     coupling : (m, n), or None for the identity
     lower, upper : (n,), rad or m, limits of q; of a continuous joint the turn that is sampled
-    speed : (n,), rad/s or m/s, greatest joint speed, NaN where unknown
-    continuous : (n,) bool, joints that turn without end
+    speed : (n,), rad/s or m/s, maximum joint speed, NaN where unknown
+    continuous : (n,) bool, revolute joints without limits
     combined : limits of sums of joints, beside those of each
     base : (4, 4), T_world_base; tool : (4, 4), T_flange_tool
     flange : (4, 4), from the table's last frame to the flange: what tools, loads and cameras are mounted on, and what
@@ -151,7 +151,7 @@ class Robot(ByValue, Displayed):
     ShapeError, PoseError
         for arrays of another shape, or of something that is no number
     RobotError
-        for a convention or a direction that there isn't
+        for a convention or a direction that does not exist
     """
 
     name: str
@@ -249,9 +249,9 @@ class Robot(ByValue, Displayed):
         ----------
         a, alpha, d : (n,), m and rad
         offset : (n,), rad; None for 0
-        lower, upper : (n,), rad or m; None for a turn around 0, and for 0 to 1 m where a joint slides
+        lower, upper : (n,), rad or m; None for a turn around 0, and for 0 to 1 m for a prismatic joint
         convention : "standard" or "modified"
-        sliding : (n,) bool; None for an arm whose joints all turn
+        sliding : (n,) bool; None for an arm with revolute joints only
         more : further attributes, such as ``base``, ``tool`` or ``speed``
 
         Raises

@@ -92,7 +92,7 @@ def check_joint_values(robot: Robot, values: Any, argument: str, stacklevel: int
     """Refuse NaN and infinity among joint values (..., n), and warn of those that can only be degrees.
 
     A row can only be degrees if one of its joints that turn and have limits is several turns beyond them in rad, and
-    all of these are within them in degrees. Of joints that turn without end and of slides nothing is said. What has no
+    all of these are within them in degrees. Of continuous and of prismatic joints nothing is said. What has no
     number for each joint is left to the function that takes it.
 
     Raises
@@ -137,7 +137,7 @@ def warn_of_degrees(values: Reals, argument: str, stacklevel: int = 2) -> None:
 
 @derived
 def _surely_no_radians(robot: Robot) -> float:
-    """The least value (rad) that is several turns beyond a joint's limits; infinite if no joint that turns has any."""
+    """The smallest value (rad) that is several turns beyond a joint's limits; infinite if no revolute joint has any."""
     ends = np.maximum(np.abs(robot.lower), np.abs(robot.upper))[~robot.slides & ~robot.continuous]
     return float(ends.min(initial=np.inf)) + SEVERAL_TURNS
 

@@ -109,7 +109,7 @@ def turns_in(robot: Robot, move: Reals) -> Reals:
     return np.asarray(np.round(move @ turns.counts.T) @ turns.steps.T)
 
 
-def shortest_way(robot: Robot, move: Reals) -> Reals:
+def shortest_move(robot: Robot, move: Reals) -> Reals:
     """Moves of joints (..., n), less the whole turns of rows in them, each row by its shorter way."""
     return move - turns_in(robot, move)
 
@@ -129,7 +129,7 @@ def nearest_rows(
     robot: Robot, q: Reals, q_ref: Reals, around: tuple[Reals, Reals] | None = None
 ) -> tuple[Reals, Flags]:
     """The same arms (N, n) as joints (N, n) by the turns that keep all limits and are nearest to q_ref (N, n): by the
-    least greatest move, then the least sum of moves; and whether there are such turns (N,).
+    smallest maximum move, then the smallest sum of moves; and whether there are such turns (N,).
 
     Where there are none, joints are left as they are if steps are whole turns of one joint each; else, of those that
     leave no joint's limit by more than half of what a turn of each row moves it, come the turns that leave limits
@@ -142,12 +142,12 @@ def nearest_rows(
     """
     turns = whole_turns(robot)
     found, fits = q.copy(), np.zeros(len(q), dtype=bool)
-    told = np.isfinite(q).all(axis=1)
+    solved = np.isfinite(q).all(axis=1)
     beyond = np.full(len(turns.lines), np.inf)
     beyond[: robot.joints] = 0.5 * np.abs(turns.steps).sum(axis=1)
     tries = [(widened, np.zeros(len(beyond))) for widened in (WIDENED if robot.continuous.any() else WIDENED[:1])]
     for widened, away in tries if turns.each else [*tries, (1.0, beyond)]:
-        left = np.flatnonzero(told & ~fits)
+        left = np.flatnonzero(solved & ~fits)
         lower, upper = _windows(robot, q_ref[left], widened)
         if around is not None:
             lower, upper = lower - around[0][left], upper - around[1][left]
@@ -163,7 +163,7 @@ def turns_inward(robot: Robot, low: Reals, high: Reals) -> Reals:
 
     Parameters
     ----------
-    low, high : (N, n + s), rad or m, least and greatest values of joints and sums along each motion
+    low, high : (N, n + s), rad or m, smallest and largest values of joints and sums along each motion
     """
     turns = whole_turns(robot)
     middle = (low + high)[:, : robot.joints] / 2

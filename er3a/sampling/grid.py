@@ -80,7 +80,7 @@ def tool_bound(robot: Robot) -> Bound:
     The tool point is a chain of constant steps joined by rotations about z. The part of a step along its joint's z axis
     does not turn with that joint, so it may be added to the step before; this is done where it shortens the sum of
     lengths (forearm and elbow offset become one lever). Joint 2 onwards then give a ball by the triangle inequality. A
-    joint that slides is taken at the middle of its range, and half the range is added to the radius.
+    prismatic joint is taken at the middle of its range, and half the range is added to the radius.
     """
     links, half = constant_links(robot), 0.0
     if robot.sliding.any():

@@ -1,7 +1,7 @@
 """Which of several joint solutions is nearest to where the arm comes from, and why it is taken, or why none is.
 
-Of the admissible solutions the one is taken whose greatest joint move from the reference is least
-(:func:`er3a.geometry.vectors.greatest_move`, the measure of *nearest* wherever solutions are ranked): where all joints
+Of the admissible solutions the one is taken whose maximum joint move from the reference is smallest
+(:func:`er3a.geometry.vectors.max_joint_move`, the measure of *nearest* wherever solutions are ranked): where all joints
 start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the least root of the
 summed squares of all joint moves decides, then the lower branch number.
 """
@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.collision.pairs import PairOverlaps
-from er3a.geometry.vectors import greatest_move
+from er3a.geometry.vectors import max_joint_move
 from er3a.kinematics.solutions import Label, Solutions, Unsolved
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.joint_limits import LimitsExceeded, limit_margin
@@ -63,7 +63,7 @@ NextBest = OtherBranch | OtherTurns | OtherFreeJoint
 
 
 @dataclass(frozen=True)
-class GreatestMove:
+class MaxJointMove:
     """The joint that moves farthest, and how far."""
 
     joint: int
@@ -75,15 +75,15 @@ class GreatestMove:
 class OnlyAdmissible:
     """No other solution is within the limits (and free of collisions, where they count)."""
 
-    move: GreatestMove
+    move: MaxJointMove
     code: Literal["only_admissible"] = "only_admissible"
 
 
 @dataclass(frozen=True)
 class MovesLess:
-    """Its greatest joint move is less than the next best solution's, by ``less_deg``."""
+    """Its largest joint move is less than the next best solution's, by ``less_deg``."""
 
-    move: GreatestMove
+    move: MaxJointMove
     less_deg: float
     next_best: NextBest
     code: Literal["moves_less"] = "moves_less"
@@ -91,9 +91,9 @@ class MovesLess:
 
 @dataclass(frozen=True)
 class MovesLessTogether:
-    """The greatest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
+    """The largest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
 
-    move: GreatestMove
+    move: MaxJointMove
     less_deg: float
     next_best: NextBest
     code: Literal["moves_less_together"] = "moves_less_together"
@@ -103,7 +103,7 @@ class MovesLessTogether:
 class LowerBranchNumber:
     """The next best solution is just as near."""
 
-    move: GreatestMove
+    move: MaxJointMove
     next_best: NextBest
     code: Literal["lower_branch_number"] = "lower_branch_number"
 
@@ -118,7 +118,7 @@ class NoSolution:
 
 @dataclass(frozen=True)
 class AllOutsideLimits:
-    """All solutions leave the limits; told of the one that does so least."""
+    """All solutions leave the limits; stated of the one that does so least."""
 
     count: int
     branch: int
@@ -129,7 +129,7 @@ class AllOutsideLimits:
 
 @dataclass(frozen=True)
 class AllCollide:
-    """All solutions within the limits collide; told of the one farthest from its limits."""
+    """All solutions within the limits collide; stated of the one with the largest margin to its limits."""
 
     count: int
     overlap: PairOverlaps
@@ -147,13 +147,13 @@ class Choice:
     Attributes
     ----------
     order : (k,) int, rows of the solutions to choose from, best first
-    greatest_move : (n,), rad, the farthest that any joint turns from the reference to each solution
+    max_joint_move : (n,), rad, the farthest that any joint turns from the reference to each solution
     distance : (n,), rad, root of the summed squares of the joint moves
     reason : why the first was taken, or why none
     """
 
     order: Integers
-    greatest_move: Reals
+    max_joint_move: Reals
     distance: Reals
     reason: WhyFirst | WhyNone
 
@@ -173,7 +173,7 @@ def nearest(
     q_ref : (6,), rad, the joint angles that the arm comes from
     refused : why each row is not admissible, None for those that are; left out, the limits alone refuse
     """
-    moves, greatest = np.abs(solutions.q - q_ref), greatest_move(solutions.q, q_ref)
+    moves, greatest = np.abs(solutions.q - q_ref), max_joint_move(solutions.q, q_ref)
     distance: Reals = np.linalg.norm(moves, axis=1)
     allowed = solutions.within_limits if refused is None else [why is None for why in refused]
     rows = np.flatnonzero(allowed)
@@ -189,7 +189,7 @@ def nearest(
 
 
 def _first(rows: list[int], distance: Reals, branch: Integers) -> int:
-    """Of rows whose greatest moves are alike."""
+    """Of rows whose largest moves are alike."""
     least = min(distance[row] for row in rows)
     return min((row for row in rows if distance[row] <= least + SAME_MOVE), key=lambda row: (branch[row], row))
 
@@ -198,7 +198,7 @@ def _why_first(solutions: Solutions, order: list[int], moves: Reals, distance: R
     chosen = order[0]
     joint = int(moves[chosen].argmax())
     most = moves[chosen, joint]
-    move = GreatestMove(joint + 1, float(np.degrees(most)))
+    move = MaxJointMove(joint + 1, float(np.degrees(most)))
     if len(order) == 1:
         return OnlyAdmissible(move)
     second = order[1]
@@ -227,8 +227,8 @@ def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | Non
     overlaps = {row: why for row, why in enumerate(refused) if isinstance(why, PairOverlaps)}
     margin = limit_margin(robot, solutions.q)
     if overlaps:
-        roomiest = max(overlaps, key=lambda row: margin[row])
-        return AllCollide(len(overlaps), overlaps[roomiest])
+        widest = max(overlaps, key=lambda row: margin[row])
+        return AllCollide(len(overlaps), overlaps[widest])
     least = int(margin.argmax())
     return AllOutsideLimits(
         len(solutions.q), int(solutions.branch[least]), solutions.label[least], solutions.reason[least]

@@ -28,7 +28,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError, ShapeError
-from er3a.geometry.vectors import greatest_move
+from er3a.geometry.vectors import max_joint_move
 from er3a.kinematics.inverse import checked_reference
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.solutions import Solutions
@@ -60,9 +60,9 @@ class Rule:
 
 
 def joint_weights(robot: Robot) -> Reals:
-    """Weights (n,) of joint moves: the greatest lever (m) at which each joint swings the tool, the longest being 1.
+    """Weights (n,) of joint moves: the largest lever (m) at which each joint swings the tool, the longest being 1.
 
-    A joint near the base moves more of the arm; a joint with no lever still counts a tenth. A joint that slides moves
+    A joint near the base moves more of the arm; a joint with no lever still counts a tenth. A prismatic joint moves
     the tool by as much as itself.
     """
     lengths = np.abs(robot.a) + np.abs(robot.d)
@@ -73,8 +73,8 @@ def joint_weights(robot: Robot) -> Reals:
     return weights
 
 
-def _greatest_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
-    return np.degrees(greatest_move(q, q_ref))
+def _max_joint_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
+    return np.degrees(max_joint_move(q, q_ref))
 
 
 def _weighted_move(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Reals:
@@ -102,7 +102,7 @@ def _clearance(robot: Robot, q: Reals, q_ref: Reals, scene: Scene | None) -> Rea
 
 
 RULES: dict[RuleName, Rule] = {
-    "nearest": Rule("deg", "least", _greatest_move),
+    "nearest": Rule("deg", "least", _max_joint_move),
     "weighted": Rule("deg", "least", _weighted_move),
     "time": Rule("s", "least", _time),
     "manipulability": Rule("1", "greatest", _manipulability),
@@ -270,11 +270,11 @@ def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, .
     """Why each row is refused: limits that it leaves, or which of the bodies overlap; None for the others."""
     refused: list[Refusal | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
-    distance, pair = bodies.least_of_turns(solutions.q[inside])
-    told: dict[tuple[int, float], PairOverlaps] = {}  # turns share theirs
+    distance, pair = bodies.min_distance_of_turns(solutions.q[inside])
+    overlaps: dict[tuple[int, float], PairOverlaps] = {}  # turns share theirs
     for row, depth, number in zip(inside.tolist(), (-distance).tolist(), pair.tolist()):
         if depth > COLLIDES:
-            refused[row] = told.setdefault((number, depth), PairOverlaps(bodies.pairs[number], depth * 1000))
+            refused[row] = overlaps.setdefault((number, depth), PairOverlaps(bodies.pairs[number], depth * 1000))
     return tuple(refused)
 
 
@@ -332,7 +332,7 @@ def select_sequence(
     ----------
     poses : the solutions of each pose, in order; rows outside the limits or in collision are left out
     q_ref : (6,), rad, where the arm starts
-    rule : how a move costs: "nearest" (greatest joint move), "weighted" or "time"
+    rule : how a move costs: "nearest" (largest joint move), "weighted" or "time"
     acceleration : (n,), rad/s^2; moves by "time" then run from rest to rest, else at full speed throughout
 
     Raises
@@ -385,7 +385,8 @@ def best_of_sets(
 
 
 def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
-    """Least time (..., n) in s in which joints turn by angles (..., n) from rest to rest, on triangle or trapezoid."""
+    """Smallest time (..., n) in s in which joints turn by angles (..., n) from rest to rest, on triangle or
+    trapezoid."""
     short = angle < speed**2 / acceleration
     time: Reals = np.where(short, 2 * np.sqrt(angle / acceleration), angle / speed + speed / acceleration)
     return time
@@ -394,7 +395,7 @@ def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
 def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:
     rows = np.flatnonzero(solutions.within_limits)
     if rows.size:
-        rows = rows[bodies_of(robot, scene).least_of_turns(solutions.q[rows])[0] >= 0]
+        rows = rows[bodies_of(robot, scene).min_distance_of_turns(solutions.q[rows])[0] >= 0]
     if not rows.size:
         raise Er3aError(f"pose {number} of the sequence has no solution within the limits and free of collisions")
     return rows

@@ -26,14 +26,14 @@ from er3a.planning.follow import follow
 from er3a.planning.motion_faults import OVER, jerk_exceeded
 from er3a.planning.moves import JointMove, line
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import Wanted, follow_and_prove
+from er3a.planning.tool_proof import ProofRequirements, follow_and_prove
 from er3a.planning.way_around import EndOutsideLimits, NoneFound, NoWayAround, PlanningTask, WayAround, way_around
 from er3a.robots.joint_limits import limits_exceeded, within
 from er3a.robots.robot import Robot
 
 Part = Literal["move", "approach", "retreat"]
 PARTS: tuple[Part, ...] = ("move", "approach", "retreat")
-DEPTH = 2e-4  # m, to within which the least clearance is found
+DEPTH = 2e-4  # m, to within which the smallest clearance is found
 PEAKS = (15 / 8, 10 / np.sqrt(3), 60.0)  # of a quintic from rest to rest: speed, acceleration and jerk, by duration
 SPARE = 1.02  # of the duration, so that bounds settle what samples allow
 LEAST_DURATION = 0.05  # s
@@ -108,7 +108,7 @@ def tool_leg(
     Parameters
     ----------
     waypoints : (k, n), rad, joints along it, from a search
-    speed : m/s, the tool's greatest
+    speed : m/s, the tool's largest
     """
     if parallel_axes_arm(robot) is None and closed_form_missing(robot) is not None:
         return joint_legs(part, waypoints, limits)
@@ -124,8 +124,8 @@ def tool_leg(
         return None
     duration *= max(1.0, SPARE * slower)
     path = line(*ends, duration)
-    wanted = Wanted(limits.rates, NO_NEAR)
-    followed, proof = follow_and_prove(robot, path, np.linspace(0, duration, CHECKS), wanted, waypoints[0])
+    required = ProofRequirements(limits.rates, NO_NEAR)
+    followed, proof = follow_and_prove(robot, path, np.linspace(0, duration, CHECKS), required, waypoints[0])
     over = (np.abs(proof.rates) > np.stack([limits.speed, limits.acceleration]) * (1 + OVER)).any()
     over |= limits.jerk is not None and bool(jerk_exceeded(proof.times, proof.jerk, proof.steps, limits.rates[2]))
     if followed.jumps or proof.undecided or over or not proof.proven.all() or not within(robot, proof.q).all():

@@ -4,7 +4,7 @@ A grasp is reached along a straight line of the tool and left along another, str
 that the object's symmetry allows, with every joint solution, is judged at the grasp first: limits, singularity,
 clearance. The best of them are then followed along both lines, and on the way that leads there from where the arm waits
 (:mod:`er3a.vision.grasp_motion`). Of those that pass, the one is taken whose smallest margin, each divided by what is
-asked of it, is greatest.
+asked of it, is largest.
 
 The object and what is held are no bodies of the scene; the arm, its tool's capsule if it has one, and the scene are.
 """
@@ -77,7 +77,7 @@ class GraspNeeds:
 
     Attributes
     ----------
-    clearance : m; limit_margin : rad; singular_value : least singular value of the scaled Jacobian
+    clearance : m; limit_margin : rad; singular_value : smallest singular value of the scaled Jacobian
     tolerance : errors that the gripper forgives, m along and rad about the tool's x, y and z
     probability : with which the tolerance is kept
     """
@@ -146,7 +146,7 @@ class LineUnproven:
 
 
 @dataclass(frozen=True)
-class WayCollides:
+class PathCollides:
     """Something is nearer than asked on a straight line."""
 
     part: Part
@@ -180,7 +180,7 @@ GraspRefusal = (
     | GraspCollides
     | LineLeaves
     | LineUnproven
-    | WayCollides
+    | PathCollides
     | NoTransfer
     | GraspUnlikely
 )
@@ -244,7 +244,7 @@ class GraspTask:
     Attributes
     ----------
     home : (n,), rad, where the arm waits
-    limits : of the joints' rates; line_speed : m/s, the tool's greatest on approach and retreat; seed : of the planner
+    limits : of the joints' rates; line_speed : m/s, the tool's largest on approach and retreat; seed : of the planner
     """
 
     robot: Robot
@@ -305,7 +305,7 @@ def _poses(target: DetectedObject, T_base_object: Reals) -> list[tuple[str, floa
 
 
 def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[list[_Candidate], GraspRefusal | None]:
-    """Candidates that pass at the grasp, the one with the greatest margin first; else what the best of them lacks."""
+    """Candidates that pass at the grasp, the one with the largest margin first; else what the best of them lacks."""
     needs, robot = task.needs, task.robot
     if not candidates:
         return [], GraspOutOfReach(poses)
@@ -394,11 +394,11 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
     )
 
 
-def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> WayCollides | None:
+def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> PathCollides | None:
     least = least_clearance(task.bodies, legs) if task.bodies is not None else None
     if least is None or least[0] >= task.needs.clearance:
         return None
-    return WayCollides(part, least[1], 1000 * least[0], 1000 * task.needs.clearance)
+    return PathCollides(part, least[1], 1000 * least[0], 1000 * task.needs.clearance)
 
 
 def _along(task: GraspTask, T_from: Reals, T_to: Reals, q: Reals) -> Reals:

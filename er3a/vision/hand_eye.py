@@ -1,6 +1,7 @@
 """Hand-eye calibration: the likeliest poses of camera and board, how sure they are, and what speaks against them.
 
-Samples that can't be right: found without any calibration, by angles, and with one, by residuals.
+Outliers, samples that can't be right: found without any calibration, by angles (:func:`check_angles`), and with one,
+by residuals (:func:`worst_sample`).
 
 Between two samples hand and board turn by equal angles, whatever the hand-eye pose, and whichever way round the
 transforms are written [1]_. Samples are taken out, the one in most conflicts first, until all pairs left agree. For
@@ -376,7 +377,7 @@ class MethodAnswer(ByValue):
     ----------
     X : (4, 4); None where the method fails
     apart_mm, apart_deg : from the likeliest hand-eye pose
-    beyond : the greatest ratio of a difference in X's six numbers to half its 95 % interval
+    beyond : the largest ratio of a difference in X's six numbers to half its 95 % interval
     """
 
     name: MethodName
@@ -563,7 +564,7 @@ def _shared_covariance(samples: CalibrationSet, refined: Refined) -> Reals:
 
 
 def _check_determined(samples: CalibrationSet) -> tuple[float, float]:
-    """The greatest turn between two samples and how far the rotation axes leave one direction, rad."""
+    """The largest turn between two samples and how far the rotation axes leave one direction, rad."""
     if len(samples) < LEAST_SAMPLES:
         raise HandEyeError(TooFewSamples(len(samples), LEAST_SAMPLES))
     for stream in ("flange", "target"):

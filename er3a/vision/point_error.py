@@ -131,7 +131,7 @@ def seen_pose_error(
 
 
 def _stacked(left: Reals, right: Reals, corner: Reals | None = None) -> Reals:
-    """[[left, right], [0, corner]] (..., 6, 6), the corner 1 unless told otherwise."""
+    """[[left, right], [0, corner]] (..., 6, 6), the corner 1 unless given."""
     shape = np.broadcast_shapes(left.shape[:-2], right.shape[:-2])
     out = np.zeros((*shape, 6, 6))
     out[..., :3, :3], out[..., :3, 3:], out[..., 3:, 3:] = left, right, np.eye(3) if corner is None else corner

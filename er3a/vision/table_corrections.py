@@ -4,8 +4,8 @@ To the twelve numbers of both poses come the table's entries. The samples can't 
 joint's d and offset move the arm as the base's frame does, in which a fixed camera or board stands; the last rows move
 the flange, on which the other of the two is. So the twelve numbers come first, then the entries in the order of
 preference of :mod:`er3a.calibration.parameters`; one whose effect lies in the span of those before it (to 0.1 % of its
-size) keeps its value, and is told with those that act as it does. What is left is estimated by Gauss-Newton steps, with
-the weights and intervals of :mod:`er3a.vision.likelihood`.
+size) keeps its value, and is named with those that act as it does. What is left is estimated by Gauss-Newton steps,
+with the weights and intervals of :mod:`er3a.vision.likelihood`.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ LEAST_FREEDOM = 6
 class NoCorrections:
     """Why no corrections come with a calibration.
 
-    ``joints``: no joint angles were recorded, or the arm has not six; ``few``: too few samples for so many numbers;
-    ``steps``: the search does not end.
+    ``joints``: no joint angles were recorded, or the arm does not have six; ``few``: too few samples for so many
+    numbers; ``steps``: the search does not end.
     """
 
     why: Literal["joints", "few", "steps"]
@@ -66,7 +66,7 @@ class TableCorrections(ByValue):
     ----------
     robot : with the corrected table
     level : which entries were asked for
-    estimates : of those that can be told, in mm and deg, with half-widths of their 95 % intervals (k,)
+    estimates : of those that can be determined, in mm and deg, with half-widths of their 95 % intervals (k,)
     held : why the others keep their values
     X, Y, half_width : as of :class:`er3a.vision.hand_eye.HandEye`, (12,)
     moved : (2,), m and rad: how far X is from the one without corrections

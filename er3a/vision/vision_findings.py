@@ -137,7 +137,7 @@ class BoardScale:
 
 @dataclass(frozen=True)
 class LittleMotion:
-    """The samples turn little: the greatest angle between two, and of the rotation axes to their common direction."""
+    """The samples turn little: the largest angle between two, and of the rotation axes to their common direction."""
 
     greatest_turn_deg: float
     axes_apart_deg: float

@@ -50,7 +50,7 @@ class Capability:
     reachability : ratio of the directions [1]_, or of what else is asked, that are reached
     solutions : branches within limits, the mean over reached directions (0 where none is), of the roll that has most
     most_solutions : the most branches that any direction has
-    manipulability : m^3, the greatest ``|det J|`` [2]_ of any reached pose
+    manipulability : m^3, the largest ``|det J|`` [2]_ of any reached pose
     """
 
     reachability: Reals
@@ -115,8 +115,8 @@ def map_capability(robot: Robot, middles: Reals, count: int, asked: AskedOrienta
         values = manipulability_of(robot, q, within).reshape(shape)
         low, high = places_served(robot, q[..., 0])
         out = reachability[part], solutions[part], most[part], best[part]
-        told = low.reshape(shape), high.reshape(shape), frame.width, frame.bar > 0
-        _tally(told, within.reshape(shape), values, out)
+        bounds = low.reshape(shape), high.reshape(shape), frame.width, frame.bar > 0
+        _tally(bounds, within.reshape(shape), values, out)
     return Capability(reachability, solutions, most, best)
 
 

@@ -50,7 +50,7 @@ class Relaxed:
     Attributes
     ----------
     joints, factors : from 1, and what they count in the sum; of a joint's own limit this joint, and 1
-    unit : "mm" where the joints slide; of a sum of joints that turn and joints that slide "deg", as its limits are
+    unit : "mm" where the joints slide; of a sum of revolute and prismatic joints "deg", as its limits are
     limit : as it is, in ``unit``
     by : by how much it is widened: the least of ``STEPS[unit]`` that makes the void vanish, or the most there is; of a
         sum that this leaves in force at some joints, by as much as takes it away, in whole ``unit``
@@ -107,7 +107,7 @@ class Geometry:
 
 @dataclass(frozen=True)
 class OnlySampled:
-    """Only samples tell of the void, so nothing is known of its cause."""
+    """Only samples suggest the void, so nothing is known of its cause."""
 
     code: Literal["void_only_sampled"] = "void_only_sampled"
 

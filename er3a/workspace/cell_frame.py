@@ -1,4 +1,4 @@
-"""The frame that cells are told in: rings about axis 1, or bars along a first joint that slides, in parts along it.
+"""The frame of cells: rings about axis 1, or bars along a first prismatic joint, in parts along it.
 
 Joint 1 alone carries the tool around (or along), so what a tool can do at one place of a ring or bar it can do at the
 others with joint 1 moved on, as far as its limits go.

@@ -2,7 +2,7 @@
 
 A ring of the section (or a sector of it) is *in* the core if the sphere of directions falls into patches for each of
 which one branch and roll is good for all points of the ring and all directions of the patch. It is *out* if some
-direction is reached from none of its points. Both are told by :mod:`interval_inverse`; what is neither is split.
+direction is reached from none of its points. :mod:`interval_inverse` decides both; what is neither is split.
 """
 
 from __future__ import annotations

@@ -36,9 +36,9 @@ class GeneralArm(NamedTuple):
     ----------
     links : (n, 4, 4), from the frame of each row's joint to that of the one before; the first unused
     tip : (3,), m, the tool point in the frame that moves with the last of these joints
-    sliding : (n,), whether the joint slides
+    sliding : (n,), whether the joint is prismatic
     lower, upper : (n,), rad or m, what x is never outside of, turns at most a full one wide
-    levers, radii : (n,), m, the point is never further from each axis; a joint that slides has the lever 1
+    levers, radii : (n,), m, the point is never further from each axis; a prismatic joint has the lever 1
     heights : (n, 2), lowest and highest z of the point along each axis once its joint moved, m
     drive, start : (n, m) and (n,)
     v_lower, v_upper : (m,), limits of v; combined (c, m), least, most (c,): ``least <= combined @ v <= most``.
@@ -47,7 +47,7 @@ class GeneralArm(NamedTuple):
     full_turn : whether joint 1 covers a full turn
     bar : m, length of the bars along a joint 1 that slides, 0 where it turns. Then the frame has y along the slide, the
         point stands at x from 0 to ``radii[0]`` and, with the slide at its lower limit, at y from 0 on; places along
-        y are told as angles, ``bar`` being a turn, and so is the range of joint 1 (from 0)
+        y are given as angles, ``bar`` being a turn, and so is the range of joint 1 (from 0)
     """
 
     links: Reals
@@ -306,7 +306,7 @@ def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Re
     Parameters
     ----------
     theta : (n,), rad or m
-    radii : (n,), set to the point's distance from each axis, m; 1 for joints that slide
+    radii : (n,), set to the point's distance from each axis, m; 1 for prismatic joints
     columns : (n, 3), set to the derivative of the point by each value, m
     frame : (3, 4), working memory
 

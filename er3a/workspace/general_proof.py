@@ -732,7 +732,7 @@ def _carry(L: Reals, low: float, high: float, behind: Rings, rings: Rings) -> No
 
 @kernel
 def _shift(still: Rings, low: float, high: float, rings: Rings) -> None:
-    """Fill in what a joint that slides may reach: the rings of the still joint within its range."""
+    """Fill in what a prismatic joint may reach: the rings of the still joint within its range."""
     n_rho, n_z = rings.counts.shape
     for i in range(n_rho):
         for j in range(n_z):

@@ -1,10 +1,10 @@
 """Where a box can stand so that the tool reaches every point of it along every required direction, and the proof.
 
 A lattice of points is asked for all directions of a cone, branch by branch. A box fits where all lattice points in it
-are good, which sliding minima tell for all places at once. The lattice only proposes.
+are good, which sliding minima find for all places at once. The lattice only proposes.
 
 Criterion: places where one branch serves the whole box come first, of these proven ones. Then the least manipulability
-over the box and the cone, which keeps away from singularities, and the least distance from the joint limits are
+over the box and the cone, which keeps away from singularities, and the smallest distance from the joint limits are
 weighed: each as a share of the best of all places, and the smaller share counts. That distance is a demand of its own
 too: the task narrows the limits.
 
@@ -133,8 +133,8 @@ class Task:
     ----------
     box : (3,), m, edges along x, y, z
     axis : (3,), unit vector, middle of the tool's directions; half_angle : rad, how far around it they reach
-    lowest : m, least height of the box's underside; clear : m, least distance of its points from axis 1
-    margin : rad, how far joints with less than a full turn keep within their limits, and sums of joints that turn
+    lowest : m, least height of the box's underside; clear : m, smallest distance of its points from axis 1
+    margin : rad, how far joints with less than a full turn keep within their limits, and sums of revolute joints
         within theirs; not those that slide
     step : rad, how far directions in the cone are apart
     support : what the box stands on, at the height of ``lowest``; None where it may stand anywhere
@@ -156,8 +156,8 @@ def limited_joints(robot: Robot) -> Flags:
 
 
 def _limit_margin(robot: Robot, q: Reals) -> Reals:
-    """Least distance (...,), rad, of joints (..., n) from the limits of those with less than a full turn, and of sums
-    of joints that turn."""
+    """Smallest distance (...,), rad, of joints (..., n) from the limits of those with less than a full turn, and of
+    sums of revolute joints."""
     limited = np.flatnonzero(limited_joints(robot))
     inside = np.minimum(q[..., limited] - robot.lower[limited], robot.upper[limited] - q[..., limited])
     margin: Reals = inside.min(axis=-1, initial=np.inf)
@@ -172,7 +172,7 @@ def _turning_sums(robot: Robot) -> tuple[CombinedLimit, ...]:
 
 
 def narrowed(robot: Robot, margin: float) -> Robot:
-    """The robot with the limits of joints that have less than a full turn, and of sums of joints that turn, drawn in by
+    """The robot with the limits of joints that have less than a full turn, and of sums of revolute joints, drawn in by
     ``margin`` (rad)."""
     inward = np.where(limited_joints(robot), np.minimum(margin, (robot.upper - robot.lower) / 2), 0.0)
     turning = _turning_sums(robot)
@@ -195,8 +195,8 @@ class Field:
     least : (nx, ny, nz, slots), m^3, least manipulability over the directions by branch, NO where it misses one, and
         where slots are no branches
     least_any : (nx, ny, nz), the same by the best branch for each direction
-    limit_margin : (nx, ny, nz, slots), rad, least distance from the limits of joints with less than a full turn and of
-        sums of joints that turn, by branch
+    limit_margin : (nx, ny, nz, slots), rad, smallest distance from the limits of joints with less than a full turn
+        and of sums of revolute joints, by branch
     """
 
     origin: Reals
@@ -468,7 +468,7 @@ def _lattice_points(field: Field, box: Reals) -> Integers:
 
 
 def _sliding_least(values: Reals, points: Integers) -> Reals:
-    """Least value over ``points`` (3,) lattice points from each one on; NO where the box leaves the lattice."""
+    """Smallest value over ``points`` (3,) lattice points from each one on; NO where the box leaves the lattice."""
     for axis, size in enumerate(points):
         values = scipy.ndimage.minimum_filter1d(
             values, int(size), axis, mode="constant", cval=NO, origin=-(int(size) // 2)

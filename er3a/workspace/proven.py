@@ -136,12 +136,12 @@ def estimate_volume(
     points: int,
     seed: int,
 ) -> VolumeEstimate:
-    """Estimate the reached volume: what is proven, and of what the proof leaves open the share that points tell.
+    """Estimate the reached volume: what is proven, and of what the proof leaves open the share that points estimate.
 
     Parameters
     ----------
     search : what decides a point: an arm in its section form, or a function of points (n, 3) about axis 1 (m) that
-        tells which are reached for certain
+        says which are reached for certain
     points : how many all cells would get; those that are left open get as many to their volume, but no fewer than
         ``FEW``
     """

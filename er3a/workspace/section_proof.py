@@ -504,7 +504,7 @@ def turn_aside(
 
 Known = tuple[Reals, int]
 Arcs = tuple[Reals, Integers]  # azimuths, and how many
-Best = tuple[Reals, Integers]  # per sector and flip: the greatest slack, and its configuration
+Best = tuple[Reals, Integers]  # per sector and flip: the largest slack, and its configuration
 
 _SECTORS = 12
 _SPLITS = 256
@@ -730,7 +730,7 @@ class Proof:
     level : (n,), how often the cell was split off
     witness : (n, 4): theta_2, tau, phi of a configuration that reaches the cell's centre, and 1; or zeros
     boxes : how many boxes the emptiness proofs looked at
-    bar : m, length of the cells where they are bars along a first joint that slides; 0 for rings. Then rho is the place
+    bar : m, length of the cells where they are bars along a first prismatic joint; 0 for rings. Then rho is the place
         across the bars beside z, and azimuths are places along them, their length being a turn
     """
 

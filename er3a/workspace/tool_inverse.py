@@ -167,10 +167,10 @@ def _solutions(robot: Robot, T: Reals, redundancy: Reals | None) -> tuple[Reals,
 
 
 def generic_manipulability(robot: Robot, q: Reals, wanted: Flags) -> Reals:
-    """Product of the singular values of the Jacobian of what is asked of the tool, at the wanted joint values (..., n),
-    0 at others.
+    """Product of the singular values of the Jacobian of what the tool has to meet, at joint values (..., n); 0 at those
+    not ``wanted``.
 
-    In m^3, less one m for each joint that slides among those that place the tool point.
+    In m^3, less one m for each prismatic joint among those that place the tool point.
     """
     J, found = jacobian(robot, q[wanted]), np.zeros(wanted.shape)
     mask = task_mask(robot) > 0

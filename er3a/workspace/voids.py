@@ -1,4 +1,4 @@
-"""Voids inside the hull: what the proof finds empty, and what only samples tell of.
+"""Voids inside the hull: what the proof finds empty, and what only samples suggest.
 
 Voids that samples leave are untouched cells inside the hull, sorted into enclosed ones and open pockets. How far to
 trust a void rests on its rim, the touched cells that border it:
@@ -426,12 +426,12 @@ class Void:
 
     Attributes
     ----------
-    status : whether the lower volume is proven empty, or only samples tell of the void
+    status : whether the lower volume is proven empty, or only samples suggest the void
     lower, upper : bounds of its volume, m^3
     centroid, extent : (3,), m
-    relaxed : what of it is reached with each limit widened; none if only samples tell of it
+    relaxed : what of it is reached with each limit widened; none if only samples suggest it
     holds_shoulder : whether it holds the point of axis 1 at the height of joint 2
-    vertices, triangles : (V, 3), m, and (F, 3), its surface on blocks; none if only samples tell of it
+    vertices, triangles : (V, 3), m, and (F, 3), its surface on blocks; none if only samples suggest it
     mesh_m3 : volume within that surface; None if it is not watertight
     """
 
@@ -466,7 +466,7 @@ def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> l
 
 
 def sampled_only(voids: list[SampledVoid], grid: Grid, shoulder: Reals, proven: list[Void]) -> list[Void]:
-    """Voids that only the samples tell of: those that lie in no proven one's box."""
+    """Voids that only the samples suggest: those that lie in no proven one's box."""
     cell_of_shoulder = np.floor((shoulder - grid.origin) / grid.cell)
     found = []
     for void in voids:

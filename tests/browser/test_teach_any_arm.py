@@ -192,7 +192,7 @@ def test_the_least_distance_is_python_s(page, name, scene, random):
     q = joints_at_random(robot, random, POSES)
     found = asked(page, DISTANCES, panel_data(robot, NEAR), clearance_data(robot, around), q.tolist())
     bodies = Bodies(robot, around)
-    least, _ = bodies.least(q)
+    least, _ = bodies.min_distance(q)
     assert not any(one["deep"] for one in found)
     distance = np.array([one["distance"] for one in found])
     rim = bodies.layout.disc.max() * (1 / np.cos(np.pi / RIM) - 1)  # Python's cylinders overlap as prisms around them

@@ -15,10 +15,10 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular
 from er3a.planning.moves import JointMove, line
-from er3a.planning.tool_proof import Wanted, follow_and_prove
+from er3a.planning.tool_proof import ProofRequirements, follow_and_prove
 
 DEPTH = 1e-3
-WANTED = Wanted((), NearSingular(0.1, 0.1, 0.03))
+WANTED = ProofRequirements((), NearSingular(0.1, 0.1, 0.03))
 ENDS = np.array([0.0, 1.0])
 
 

@@ -108,12 +108,12 @@ def test_quill_that_slides_down_meets_the_floor_where_it_says():
     sheet, floor = (Plane(name, np.array([0.0, 0.0, 1.0]), z) for name, z in (("sheet", 0.05), ("floor", 0.1)))
     bodies = Bodies(robot, Scene("floor", (floor,)))
     down = np.array([[0.3, -0.4, z, 1.0] for z in (0.0, 0.1, 0.2299, 0.2301, 0.3)])
-    assert np.allclose(bodies.least(down)[0], 0.4 - down[:, 2] - 0.05 - 0.02 - 0.1, atol=1e-12)
+    assert np.allclose(bodies.min_distance(down)[0], 0.4 - down[:, 2] - 0.05 - 0.02 - 0.1, atol=1e-12)
     assert bodies.free(down).tolist() == [True, True, True, False, False]
     assert free_between(bodies.layout, down[0], down[2], 1e-5, 3000)[0] == FREE
     assert free_between(bodies.layout, down[0], down[4], 1e-5, 3000)[0] != FREE
     both = Bodies(robot, Scene("floor on a sheet", (sheet, floor)))
-    (least,), (pair,) = both.least(down[4:])
+    (least,), (pair,) = both.min_distance(down[4:])
     assert (both.pairs[pair].solid, round(least, 9)) == ("floor", -0.07), "the deepest is named"
 
 
@@ -126,7 +126,7 @@ def test_distances_are_those_of_coal(robot, seed):
     scene = scene_about(robot, random)
     bodies = Bodies(robot, scene)
     apart = Bodies(robot.replace(envelopes=()), scene)  # default capsules: only that they can be judged
-    assert np.isfinite(apart.least(joints_at_random(robot, random, 3))[0]).all()
+    assert np.isfinite(apart.min_distance(joints_at_random(robot, random, 3))[0]).all()
     q = joints_at_random(robot, random, 5)
     every = np.flatnonzero(~bodies.joined)
     for row in q:
@@ -135,7 +135,7 @@ def test_distances_are_those_of_coal(robot, seed):
         assert (found < 0) == (expected < 0) or abs(found - expected) < 1e-5
         assert found < 0 or abs(found - expected) < 1e-5
         assert bodies.joined.any() or bool(bodies.free(row[None])[0]) == (found >= 0)
-        least = float(bodies.least(row[None])[0][0])
+        least = float(bodies.min_distance(row[None])[0][0])
         assert bodies.joined.any() or least < 0 or abs(least - expected) < 1e-5
 
 

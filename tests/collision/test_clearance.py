@@ -10,7 +10,7 @@ from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_bodies, arm_shapes, capsule_poses, default_envelopes
+from er3a.collision.shapes import arm_bodies, arm_shapes, default_envelopes, link_frames
 from er3a.dynamics.arm_model import estimated_links
 from er3a.errors import InputError, InputWarning
 from er3a.files.robot_library import ROBOTS, load_robot
@@ -29,6 +29,13 @@ def segment_distances(ends: np.ndarray, points) -> float:
     """Distance of lines sampled finely from a function of points."""
     t = np.linspace(0, 1, 2001)[:, None]
     return min(points(start + t * (end - start)).min() for start, end in ends)
+
+
+def capsule_poses(robot, capsules, q) -> np.ndarray:
+    """End points (..., n, 2, 3) of the capsules' lines, m, at joint values (..., n)."""
+    T = link_frames(robot, q)[..., [each.link for each in capsules], :, :]
+    ends = np.array([(each.start, each.end) for each in capsules])
+    return np.einsum("...nij,nkj->...nki", T[..., :3, :3], ends) + T[..., None, :3, 3]
 
 
 def test_capsules_follow_the_arm(robot, random):
@@ -139,9 +146,11 @@ def test_turns_of_an_arm_are_measured_once(random, monkeypatch):
     arm = load_robot("ur5e")
     bodies, q = Bodies(arm, None), joints_at_random(arm, random, 30)
     turned = np.concatenate([q, q + 2 * np.pi * random.integers(-1, 2, q.shape)])
-    each, measured = bodies.least(turned), []
-    monkeypatch.setattr(bodies, "least", lambda rows: measured.append(len(rows)) or Bodies.least(bodies, rows))
-    once = bodies.least_of_turns(turned)
+    each, measured = bodies.min_distance(turned), []
+    monkeypatch.setattr(
+        bodies, "min_distance", lambda rows: measured.append(len(rows)) or Bodies.min_distance(bodies, rows)
+    )
+    once = bodies.min_distance_of_turns(turned)
     np.testing.assert_allclose(once[0], each[0], atol=1e-9)
     np.testing.assert_array_equal(once[1], each[1])
     assert measured == [30]

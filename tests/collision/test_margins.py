@@ -16,7 +16,7 @@ def test_arms_that_keep_a_margin_are_those_whose_least_distance_does(name, margi
     robot = load_robot(name)
     bodies = Bodies(robot, load_scene("data/scenes/table_and_post.yaml"))
     q = random.uniform(robot.lower, robot.upper, (2000, robot.joints))
-    least = bodies.least(q)[0]
+    least = bodies.min_distance(q)[0]
     kept = bodies.free(q, margin)
     np.testing.assert_array_equal(kept, least >= margin if margin else least > 0)
     assert 0 < kept.sum() < len(q)

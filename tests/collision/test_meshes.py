@@ -13,7 +13,7 @@ import yaml
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import collision_matrix
-from er3a.collision.meshes import capsule_around, hull_of, uncovered
+from er3a.collision.meshes import hull_of, uncovered
 from er3a.errors import InputError
 from er3a.files.mesh_import import import_mesh
 from er3a.files.pieces_file import load_pieces
@@ -85,17 +85,6 @@ def test_hulls_of_many_corners_get_a_margin_that_holds_the_rest(random):
     outside = points[(heights > 0).any(axis=1)]
     assert len(outside)
     assert trimesh.proximity.closest_point_naive(hull, outside)[1].max() <= margin + 1e-9
-
-
-def test_capsule_around_a_mesh_holds_it():
-    for mesh in (angle_iron(), trimesh.creation.torus(100, 30), trimesh.creation.cylinder(20, 300)):
-        capsule = capsule_around(np.array(mesh.vertices) / 1000, 2)
-        start, end = np.array(capsule.start), np.array(capsule.end)
-        points = trimesh.sample.sample_surface(mesh, 5000, seed=1)[0] / 1000
-        share = np.clip((points - start) @ (end - start) / max((end - start) @ (end - start), 1e-30), 0, 1)
-        away = np.linalg.norm(points - start - share[:, None] * (end - start), axis=1)
-        assert away.max() <= capsule.radius
-    assert capsule.radius < 0.024
 
 
 def test_robot_and_scene_take_pieces_from_files(tmp_path, monkeypatch):
@@ -217,7 +206,7 @@ def test_hulls_without_margin_that_overlap_are_found_by_every_search():
     q = np.random.default_rng(4).uniform(robot.lower, robot.upper, (50, 2))
     assert bodies.overlaps(q).all()
     assert not bodies.free(q).any()
-    assert (bodies.least(q)[0] < 0).all()
+    assert (bodies.min_distance(q)[0] < 0).all()
     assert [row.state for row in bodies.matrix] == ["watched"]
     assert [row.state for row in collision_matrix(robot.replace(pair_rules=())).rows] == ["joined"]
 
@@ -235,6 +224,6 @@ def test_faces_that_nearly_touch_are_as_far_apart_as_they_are():
         ]
         base = transform(random.normal(size=3), random.uniform(-np.pi, np.pi, 3))
         robot = made_of([("R", 0, 0, 0, -180, 180)]).replace(hulls=tuple(plates), pair_rules=(rule,), base=base)
-        distance = Bodies(robot, None).least(random.uniform(-np.pi, np.pi, (200, 1)))[0]
+        distance = Bodies(robot, None).min_distance(random.uniform(-np.pi, np.pi, (200, 1)))[0]
         assert (distance <= 2e-6 + 1e-9).all()
         assert (distance > -1e-9).all()

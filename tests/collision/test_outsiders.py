@@ -57,7 +57,7 @@ def test_pairs_overlap_where_pinocchio_says_so(robot, random):
     bodies = Bodies(robot, load_scene(SCENE))
     peer = Peer(bodies)
     q = random.uniform(robot.lower, robot.upper, (300, 6))
-    found, least = bodies.overlaps(q), bodies.least(q)[0]
+    found, least = bodies.overlaps(q), bodies.min_distance(q)[0]
     np.testing.assert_array_equal(found, [peer.all_pairs(each) for each in q])
     np.testing.assert_array_equal(found.any(axis=1), least < 0)
     np.testing.assert_array_equal(bodies.free(q), least >= 0)

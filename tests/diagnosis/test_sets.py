@@ -205,7 +205,7 @@ def test_a_disagreement_too_small_to_tell_says_from_what_size_on_it_can_be(arm):
     small = diagnosis_of(changed(arm, "a3", 0.0003), stated).conclusion
     assert isinstance(small, TooSmallToTell)
     assert ("a3",) in [tuple(map(entry_of, faults)) for faults in small.candidates]
-    larger = 0.0003 * 1.5 * small.told_from / small.residual
+    larger = 0.0003 * 1.5 * small.distinguishability / small.residual
     told = diagnosis_of(changed(arm, "a3", larger), stated).conclusion
     assert isinstance(told, MostLikelyFault)
     assert entry_of(told.faults[0]) == "a3"

@@ -113,7 +113,7 @@ def test_a_redundant_arm_has_the_member_with_most_margin(random):
     q = random.uniform(-2, 2, 7)
     T = forward(robot, q)
     found = inverse(robot, T, q, self_motion_rows=True)
-    best = max(motion.roomiest_margin for motion in found.families)
+    best = max(motion.max_margin for motion in found.families)
     grid = np.linspace(-np.pi, np.pi, 400)
     rows = inverse_batch(robot, np.broadcast_to(T, (400, 4, 4)), redundancy=grid[:, None]).q
     on_grid = np.nanmax(np.minimum(rows - robot.lower, robot.upper - rows).min(axis=2))
@@ -139,7 +139,7 @@ def test_self_motions_of_a_redundant_arm_are_traced_when_looked_at(random, monke
     assert len(asked) == 2
     np.testing.assert_array_equal(whole.q[: len(found.q)], found.q)
     for motion in found.families:
-        for member in (motion.q0, motion.roomiest):
+        for member in (motion.q0, motion.max_margin_member):
             assert np.abs(whole.q - member).max(axis=1).min() < 1e-6
 
 

@@ -9,21 +9,21 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from er3a.kinematics.chain import links_of_rows, poses_of
+from er3a.geometry.transforms import rot_z
+from er3a.kinematics.chain import poses_of
 from er3a.kinematics.classes.arm_angle import (
     arm_angle_arm,
     arm_angles_of,
-    feasible_arm_angles,
     is_out_of_reach,
     solve_at_arm_angle,
-    widest_margin,
 )
-from er3a.kinematics.classes.chain_solvers import arm_class, with_free_roll, with_joint_fixed
+from er3a.kinematics.classes.chain_solvers import arm_class
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
 from er3a.kinematics.classes.hidden_joint import TERMS, zeros_on_circle
 from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.scara import scara, solve_scara
 from er3a.kinematics.classes.six_revolute import CERTAIN, prepared, solve_six_revolute
+from testing.arms import links_of_rows
 
 pytestmark = pytest.mark.long  # kernels that take half a minute to compile
 
@@ -255,30 +255,6 @@ def test_out_of_reach_begins_where_the_elbow_is_straight_or_folded(name, bent):
         assert np.isnan(solve_at_arm_angle(arm, np.tile(beyond, (9, 1, 1)), np.linspace(-3, 3, 9))[0]).all()
 
 
-def test_arm_angles_within_limits_are_those_that_a_fine_grid_finds():
-    random = np.random.default_rng(7)
-    arm = arm_angle_arm(links("iiwa"))
-    limits = np.radians([170, 120, 170, 120, 170, 120, 175])
-    grid = np.linspace(-np.pi, np.pi, 1501)
-    for q in random.uniform(-limits, limits, (10, 7)):
-        T = pose_by_hand(ROWS["iiwa"], q)
-        rows = solve_at_arm_angle(arm, np.broadcast_to(T, (len(grid), 4, 4)), grid)[0]
-        inside = (np.abs(rows) <= limits).all(axis=2)
-        for each in feasible_arm_angles(arm, T, -limits, limits):
-            told, at_end = np.zeros(len(grid), bool), np.zeros(len(grid), bool)
-            for low, high in each.intervals:
-                for angle in (grid, grid + 2 * np.pi):
-                    told |= (angle >= low) & (angle <= high)
-                    at_end |= np.minimum(np.abs(angle - low), np.abs(angle - high)) < 1e-9
-            assert ((told == inside[:, each.slot]) | at_end).all()
-        psi, slot, best, margin = widest_margin(arm, T, -limits, limits)
-        on_grid = (limits - np.abs(rows)).min(axis=2)
-        assert margin >= np.nanmax(on_grid) - 1e-6
-        assert np.abs(pose_by_hand(ROWS["iiwa"], best) - T).max() < 1e-9
-        assert margin == pytest.approx((limits - np.abs(best)).min(), abs=1e-9)
-        assert np.abs(solve_at_arm_angle(arm, T[None], psi)[0][0, slot] - best).max() < 1e-9
-
-
 def test_scara_and_other_seven_joints():
     random = np.random.default_rng(9)
     rows = ([0.325, 0.225, 0, 0], [0, np.pi, 0, 0], [0.4, 0, 0.1, 0.05])
@@ -291,12 +267,14 @@ def test_scara_and_other_seven_joints():
         assert nearest(found[0], q) < 1e-7
         assert max(np.abs(pose_by_hand(rows, row, sliding) - T).max() for row in found[0]) < 1e-12
     q = random.uniform(-2, 2, 7)
-    held = with_joint_fixed(links("panda"), 6, q[6])
+    whole = links("panda")
+    held = np.concatenate([whole[:6], (whole[6] @ rot_z(q[6]) @ whole[7])[None]])
     found = solve_six_revolute(prepared(held), pose_by_hand(ROWS["panda"], q)[None])
     assert nearest(found.q[0], q[:6]) < 1e-7
     short = links_of_rows(*(np.array(column[:5], float) for column in ROWS["ur5"]))
     q = random.uniform(-2, 2, 6)
-    found = solve_six_revolute(prepared(with_free_roll(short)), poses_of(with_free_roll(short), q)[None])
+    rolling = np.concatenate([short, np.eye(4)[None]])
+    found = solve_six_revolute(prepared(rolling), poses_of(rolling, q)[None])
     assert nearest(found.q[0], q) < 1e-7
 
 

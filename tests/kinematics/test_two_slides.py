@@ -7,12 +7,12 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from er3a.kinematics.chain import links_of_rows
 from er3a.kinematics.classes.chain_solvers import chain_solver
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import DependentJoints, Iteration
 from er3a.robots.robot import Robot
+from testing.arms import links_of_rows
 
 pytestmark = pytest.mark.long  # kernels that take half a minute to compile
 

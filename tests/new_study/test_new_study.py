@@ -17,9 +17,9 @@ import er3a
 from er3a.collision.along import bodies_of, clearance
 from er3a.errors import Er3aError, InputError
 from er3a.files.dh_table import read_dh_table
+from er3a.files.kept_files import ROOT
 from er3a.files.robot_library import load_robot, robot_of
 from er3a.files.scene_file import load_scene
-from er3a.files.shipped import ROOT
 from er3a.formats.urdf import export_urdf
 from er3a.kinematics.singularity import scaled_jacobian
 from er3a.pipeline.check import check_file, check_study

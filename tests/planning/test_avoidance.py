@@ -15,13 +15,13 @@ from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import NearSingular, characteristic_length, determinant_factors, factor_of
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
-from er3a.planning.avoidance import avoidance, strategies, via_point
+from er3a.planning.avoidance import avoidance, strategies
 from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare, deviation
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import singular_events
 from er3a.planning.moves import line
+from er3a.planning.names import StrategyName
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import within
 
@@ -124,14 +124,14 @@ def test_no_random_bend_of_the_same_shape_is_smaller(name, random):
     (region,) = case.regions
     slot = int(case.followed.slot[region[0]])
     for kind in ("shift", "tilt"):
-        least = min(via_point._bends(case, *region, kind), key=lambda bend: bend.amount)
+        least = min(strategies._bends(case, *region, kind), key=lambda bend: bend.amount)
         grid = np.linspace(least.start, least.end, 200)
         for _ in range(60):
             direction = random.normal(size=3)
             direction *= 0.95 * least.amount / np.linalg.norm(direction)
             parts = (direction, np.zeros(3)) if kind == "shift" else (np.zeros(3), direction)
-            other = via_point.Bend(least.start, least.top, least.end, *parts)
-            T = via_point.BentPath(case.followed.line, (other,)).poses(grid)
+            other = strategies.Bend(least.start, least.top, least.end, *parts)
+            T = strategies.BentPath(case.followed.line, (other,)).poses(grid)
             q = solve_slots(case.robot, T, np.zeros((len(T), 6)))[0][:, slot]
             kind = name.split("_")[0]
             distance = np.abs(factor_of(determinant_factors(case.robot, q), kind))
@@ -139,7 +139,7 @@ def test_no_random_bend_of_the_same_shape_is_smaller(name, random):
 
 
 def test_bend_is_smooth_and_vanishes_at_its_ends():
-    bend = via_point.Bend(0.2, 0.5, 0.9, np.ones(3), np.zeros(3))
+    bend = strategies.Bend(0.2, 0.5, 0.9, np.ones(3), np.zeros(3))
     s = np.linspace(0, 1, 100_001)
     size = bend.size(s)
     assert size.max() == 1

@@ -83,7 +83,7 @@ def test_points_and_directions_of_the_tool_are_met_between_the_points_solved(rob
         np.testing.assert_allclose(found, asked, atol=1e-8)
 
 
-def test_without_start_joints_the_roomiest_arm_is_taken_and_limits_count():
+def test_without_start_joints_the_arm_with_most_margin_is_taken_and_limits_count():
     T = forward(SCARA, by_hand(*np.array([[0.4, 0.2, 0.25, 0.1], [0.3, 0.35, 0.25, 0.1]]).T, 1))
     motion = follow_by_class(SCARA, line(T[0], T[1], 1.0))
     assert motion.joints(np.array([0.0]))[0, 1] > 0

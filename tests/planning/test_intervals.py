@@ -17,16 +17,16 @@ from er3a.planning.motion_faults import (
     TooFast,
     limit_intervals,
     out_of_limits,
-    rate_intervals,
     rates_exceeded,
     unreachable,
 )
 from er3a.planning.moves import JointMove, line
 from er3a.planning.sequences import arc
 from er3a.planning.timing import joint_limits
-from er3a.planning.tool_proof import Wanted, follow_and_prove
+from er3a.planning.tool_proof import ProofRequirements, follow_and_prove
 from er3a.robots.joint_limits import CombinationExceeded
 from er3a.robots.robot import CombinedLimit
+from testing.motion_cases import rate_intervals
 
 GRID = np.linspace(0, 1, 21)
 
@@ -125,13 +125,13 @@ def test_a_limit_of_a_sum_is_proven_along_a_line_of_the_tool():
     end = start.copy()
     end[0, 3] += 0.08
     way, t = line(start, end, 2.0), np.linspace(0, 2, 9)
-    wanted = Wanted(joint_limits(robot, np.full(6, 10.0), 0.25).rates, NearSingular(0.01, 0.01, 0.001))
-    free, proof = follow_and_prove(robot, way, t, wanted)
+    required = ProofRequirements(joint_limits(robot, np.full(6, 10.0), 0.25).rates, NearSingular(0.01, 0.01, 0.001))
+    free, proof = follow_and_prove(robot, way, t, required)
     assert "limits" not in {part.cause.quantity for part in proof.undecided}
     sums = free.q[:, 1] + free.q[:, 2]
     top = np.degrees(sums.min() + 0.6 * np.ptp(sums))
     tight = with_sum_limit(top)
-    followed, proof = follow_and_prove(tight, way, t, wanted, free.q[0])
+    followed, proof = follow_and_prove(tight, way, t, required, free.q[0])
     found = out_of_limits(tight, followed.t, followed.q, followed.joints)
     assert [type(each.cause) for each in found] == [CombinationExceeded]
     assert "limits" not in {part.cause.quantity for part in proof.undecided}

@@ -10,8 +10,9 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.singularity import NearSingular
 from er3a.planning import piecewise
-from er3a.planning.motion_faults import GreatestRates, RateLimit, SingularCheck, limit_intervals, rate_intervals
+from er3a.planning.motion_faults import MaxRates, RateLimit, SingularCheck, limit_intervals
 from er3a.planning.piecewise import MotionInParts
+from testing.motion_cases import rate_intervals
 
 BREAKS = np.linspace(0.0, 2.0, 21)  # s
 NEAR = NearSingular(np.radians(5.0), np.radians(5.0), 0.03)
@@ -65,7 +66,7 @@ def test_rates_over_many_parts(in_parts):
     assert (steep.start, steep.end) == pytest.approx((1.0, 2.0), abs=1e-6)  # one part in a million is allowed
     (last,) = rate_intervals(motion, rate_limit(3, 6.1))  # no step at the borders, one to rest at the end
     assert (last.start, last.end) == (2.0, 2.0)
-    greatest = GreatestRates(6)
+    greatest = MaxRates(6)
     for part in motion.parts():
         greatest.add(part)
     np.testing.assert_allclose([part[0] for part in greatest.rates], [12.0, 12.0], rtol=1e-12)

@@ -41,7 +41,7 @@ def blocked(bodies, random):
     """Two arms that are clear, between which the straight move is not."""
     while True:
         q = random.uniform(ROBOT.lower, ROBOT.upper, (2, 6)) * 0.9
-        if bodies.least(q)[0].min() > 5e-3 and bodies.least(np.linspace(*q, 30))[0].min() < 0:
+        if bodies.min_distance(q)[0].min() > 5e-3 and bodies.min_distance(np.linspace(*q, 30))[0].min() < 0:
             return q
 
 
@@ -62,7 +62,7 @@ def test_planned_motions_touch_nothing_and_keep_their_limits(title, random):
         found += 1
         q, velocity, acceleration = way.motion.curve.rates(np.linspace(0, way.motion.duration, DENSE))
         np.testing.assert_allclose(q[[0, -1]], [start, end], atol=1e-12)
-        assert apart.least(q).min() > 0
+        assert apart.min_distance(q).min() > 0
         assert (q <= ROBOT.upper + 1e-9).all()
         assert (q >= ROBOT.lower - 1e-9).all()
         assert (np.abs(velocity) <= LIMITS.speed * (1 + 1e-9)).all()
@@ -76,7 +76,7 @@ def test_the_straight_move_between_them_would_touch(random):
     scene = load_scene("data/scenes/table_and_post.yaml")
     one = task(scene)
     start, end = blocked(one.bodies, random)
-    assert contacts_of(ROBOT, scene).least(np.linspace(start, end, DENSE)).min() < 0
+    assert contacts_of(ROBOT, scene).min_distance(np.linspace(start, end, DENSE)).min() < 0
 
 
 @pytest.mark.long
@@ -114,7 +114,7 @@ def test_a_wall_through_the_arms_middle_has_no_way_around():
     ends = []
     for side in (1, -1):
         q = random.uniform(-0.5, 0.5, (300, 6)) + np.array([side * np.pi / 2, 0.6, 0, 0, 0.8, 0])
-        ends.append(next(arm for arm in q if one.bodies.least(arm[None])[0][0] > 5e-3))
+        ends.append(next(arm for arm in q if one.bodies.min_distance(arm[None])[0][0] > 5e-3))
     assert way_around(one, *ends) == NoneFound(60 * 3)
 
 
@@ -127,7 +127,7 @@ def test_ends_that_can_not_be_are_named():
     assert way_around(one, outside, home).end == "start"
     assert isinstance(way_around(one, home, outside), EndOutsideLimits)
     low = np.radians([0, 80, 40, 0, 60, 0])
-    if one.bodies.least(low[None])[0][0] < 0:
+    if one.bodies.min_distance(low[None])[0][0] < 0:
         assert isinstance(way_around(one, home, low), EndOverlaps)
     assert way_between(one, home[None], np.empty((0, 6))) == EndUnreached("end")
     assert way_around(PlanningTask(ROBOT, None, 1e-3, LIMITS, 3), home, home) == NothingMeasured()

@@ -11,7 +11,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Solutions
 from er3a.pipeline.messages.kinematics import say
 from er3a.robots.joint_limits import limit_margin
-from er3a.selection.nearest import GreatestMove, OnlyAdmissible, nearest
+from er3a.selection.nearest import MaxJointMove, OnlyAdmissible, nearest
 
 
 def solutions_of(q, within, branch) -> Solutions:
@@ -40,7 +40,7 @@ def test_nearest_of_none_and_of_one():
     assert [one.joint for one in choice.reason.exceeded.joints] == [1]
     choice = nearest(robot, solutions_of([[1, 0, 0, 0, 0, 0]], [True], [3]), np.zeros(6))
     assert choice.order.tolist() == [0]
-    assert choice.reason == OnlyAdmissible(GreatestMove(1, np.degrees(1)))
+    assert choice.reason == OnlyAdmissible(MaxJointMove(1, np.degrees(1)))
     assert say(choice.reason) == "greatest joint move 57.3 deg (J1); the only admissible solution"
 
 

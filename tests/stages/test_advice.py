@@ -79,7 +79,7 @@ def usable(T: np.ndarray, scene: Scene | None) -> bool:
     found = inverse(ROBOT, T)
     q = found.q[found.within_limits]
     margin = np.degrees(limit_margin(ROBOT, q)) >= LITTLE_MARGIN_DEG - 1e-9
-    return bool((margin & (Bodies(ROBOT, scene).least(q)[0] >= CLEARANCE - 1e-9)).any())
+    return bool((margin & (Bodies(ROBOT, scene).min_distance(q)[0] >= CLEARANCE - 1e-9)).any())
 
 
 def test_the_obstacle_is_to_be_moved_only_where_the_arm_alone_keeps_its_margins(refused):

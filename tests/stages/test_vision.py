@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from er3a.files.shipped import ROOT
+from er3a.files.kept_files import ROOT
 from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run

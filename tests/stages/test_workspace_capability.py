@@ -95,7 +95,7 @@ def test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice(done
         )
         found = inverse_batch(tight, poses(points[:, None], rotations[:, 0]).reshape(-1, 4, 4))
         q = found.q[:, branch_labels(robot).index(place.branch)]
-        least, pair = Bodies(robot, None).least(q)
+        least, pair = Bodies(robot, None).min_distance(q)
         assert 1000 * least.min() == pytest.approx(place.clearance_mm, abs=1e-6)
         assert Bodies(robot, None).pairs[pair[least.argmin()]] == place.clearance_pair
         room = np.degrees(np.minimum(q - robot.lower, robot.upper - q))

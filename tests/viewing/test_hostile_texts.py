@@ -18,8 +18,8 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.run import show
 from er3a.pipeline.study import load_study
 from er3a.pipeline.tables import table_types
-from er3a.pipeline.viewing.absent import report_absent
 from er3a.pipeline.viewing.index import write_index
+from er3a.pipeline.viewing.page import report_absent
 from er3a.pipeline.viewing.recording import escaped
 
 ROBOT = "er3_600"

@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import load_hand_eye, read_calibration
+from er3a.files.kept_files import ROOT
 from er3a.files.robot_library import load_robot
-from er3a.files.shipped import ROOT
 from er3a.files.vision_file import load_vision
-from er3a.files.vision_inputs import vision_files
 from er3a.kinematics.forward import forward
 from er3a.pipeline.cli import app
+from er3a.pipeline.stages.vision.entry import vision_files
 from testing import camera_cells
 from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
 

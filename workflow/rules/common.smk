@@ -7,7 +7,7 @@ from snakemake.dag import PeriodicityDetector
 
 from er3a.pipeline.code_digest import code_digest
 from er3a.errors import Er3aError
-from er3a.files.shipped import view_command
+from er3a.files.kept_files import view_command
 from er3a.pipeline.messages import language, pages
 from er3a.pipeline.messages.language import catalogue_file, tr
 from er3a.pipeline.stages.registry import STAGES, all_messages

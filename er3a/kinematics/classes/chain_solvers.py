@@ -3,7 +3,7 @@
 Chains are constant links and joints that turn about or slide along z (:mod:`chain`); base, tool, offsets and
 coupling are the caller's. Chains with more than six joints hold one joint after another at a given value until a class
 is met that needs none (six joints) or has its own parameter (arm angle); chains with fewer are completed by joints that
-they lack, and of what those turn it is told.
+they lack, and what those turn about is stated.
 """
 
 from __future__ import annotations
@@ -108,7 +108,8 @@ class Unsolved(WithoutParameters):
 
 
 def chain_solver(links: Reals, sliding: Flags) -> ChainSolver:
-    """The solver of a chain with constant links (n + 1, 4, 4), m, whose joints slide where ``sliding`` (n,) says so."""
+    """The solver of a chain with constant links (n + 1, 4, 4), m, whose joints are prismatic where ``sliding`` (n,)
+    says so."""
     links, sliding = np.ascontiguousarray(links, dtype=float), np.asarray(sliding, dtype=bool)
     for recognised_as in CLOSED_FORMS:
         if (solver := recognised_as(links, sliding)) is not None:
@@ -346,7 +347,7 @@ class ArmClass:
 
 
 def arm_class(links: Reals, sliding: Flags | None = None) -> ArmClass:
-    """The class of a chain with constant links (n + 1, 4, 4); ``sliding`` (n,) tells prismatic joints.
+    """The class of a chain with constant links (n + 1, 4, 4); ``sliding`` (n,) marks prismatic joints.
 
     - ``spherical_wrist``: axes 2 and 3 parallel to 1e-9 rad, axes 4, 5, 6 meet to 1e-9 m;
     - ``three_parallel``: axes 2, 3, 4 parallel, 5 and 6 meet; ``general_six``: any other six revolute joints;
@@ -376,22 +377,3 @@ def _neighbours(links: Reals) -> tuple[AxisPair, ...]:
         miss = np.linalg.norm(np.cross(apart, axes[k])) if sine < PARALLEL else abs(apart @ across) / sine
         found.append(AxisPair(k + 1, float(np.arctan2(sine, abs(axes[k] @ axes[k + 1]))), float(miss)))
     return tuple(found)
-
-
-def with_joint_fixed(links: Reals, joint: int, value: float) -> Reals:
-    """Links (n, 4, 4) of the chain with one revolute joint (number from 0) held at a value in rad.
-
-    With :mod:`six_revolute` this solves any seven-joint arm at one value of the joint that is taken as its redundancy.
-    """
-    c, s = np.cos(value), np.sin(value)
-    turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-    held = np.array(links[joint] @ turn @ links[joint + 1])
-    return np.concatenate([links[:joint], held[None], links[joint + 2 :]])
-
-
-def with_free_roll(links: Reals) -> Reals:
-    """Links of the chain with one more revolute joint, about the tool's z axis: for tools that may turn about it.
-
-    Solved for any pose with the wanted tool point and axis, its last joint is the turn that is left over.
-    """
-    return np.concatenate([links, np.eye(4)[None]])

@@ -123,7 +123,7 @@ class ChainSolver(Protocol):
 
     ``rows`` takes poses (N, 4, 4) in m and values (N, k) of the k parameters; it gives joint values (N, slots, n), NaN
     in empty slots, and how sure it is (N,): CERTAIN, UNCERTAIN, or CONTINUUM where branches meet or a joint is free.
-    ``names`` tells the slots' names, with joint values (n,) of the manufacturer's zero pose; none where no sign factors
+    ``names`` are the slots' names, with joint values (n,) of the manufacturer's zero pose; none where no sign factors
     separate the solutions.
     """
 
@@ -275,7 +275,7 @@ class ArmAngle:
 
 @dataclass(frozen=True, eq=False)
 class ThreeSliding(WithoutParameters):
-    """Six joints, three of which slide."""
+    """Six joints, three of them prismatic."""
 
     arm: Gantry
     code: ArmClassCode = "gantry"
@@ -291,7 +291,7 @@ class ThreeSliding(WithoutParameters):
 
 @dataclass(frozen=True, eq=False)
 class PlanarFour(WithoutParameters):
-    """Four joints of one direction, one of them sliding."""
+    """Four joints of one direction, one of them prismatic."""
 
     arm: Scara
     code: ArmClassCode = "scara"
@@ -399,7 +399,7 @@ def _turned(x: Reals) -> Reals:
 
 
 def _branches_meet(q: Reals, pairs: tuple[tuple[int, int], ...]) -> Flags:
-    """Whether two rows that differ in one root (slots apart, joint that tells it) lie within a small angle, (N,)."""
+    """Whether two rows that differ in one root (slots apart, joint that shows it) lie within a small angle, (N,)."""
     meet = np.zeros(len(q), dtype=bool)
     for step, joint in pairs:
         for slot in range(8):

@@ -1,7 +1,7 @@
 """Poses of an arm with axes 2, 3, 4 parallel, singular ones included: rows and continua.
 
 Where axis 6 is parallel to the three (q5 = 0 of a UR) the turn phi about them is free: axis 4 runs on a circle about W,
-where axes 5 and 6 meet, while joints 2 and 3 follow, a four-bar linkage. Its members are told by phi in closed form,
+where axes 5 and 6 meet, while joints 2 and 3 follow, a four-bar linkage. Its members follow from phi in closed form,
 and the ends of its ranges follow from the triangle's inequality.
 """
 

@@ -334,7 +334,7 @@ class Reading(NamedTuple):
 
     ``joint`` (6,) is the arm's joint at each place, ``sense`` +1 or -1 the sign of its angle there, ``links`` (6, 4, 4)
     the links behind them with the pose's left out, which stands at ``place`` and is inverted if ``sense`` is -1.
-    ``left`` (14, 27) are the left side's coefficients if the pose is not in it. ``slides`` (6,) tells the prismatic
+    ``left`` (14, 27) are the left side's coefficients if the pose is not in it. ``slides`` (6,) marks the prismatic
     joints, which may stand at places 1, 4 and 5 only.
     """
 

@@ -60,7 +60,7 @@ class LoopMemory(NamedTuple):
 
 
 def new_memory(sliding: Flags) -> LoopMemory:
-    """Memory for one thread; ``sliding`` (6,) tells prismatic joints."""
+    """Memory for one thread; ``sliding`` (6,) marks prismatic joints."""
     return LoopMemory(
         elimination=new_scratch(),
         found=np.zeros((MOST_ZEROS, 3)),
@@ -229,8 +229,8 @@ def _angle_of(cc: float, cs: float, ss: float) -> float:
 def _pencil(Y: Reals, step: int, slides: Flags, pairs: Reals, count: int) -> int:
     """Combinations of two null vectors that belong to one angle: entries one power further are tan(half) times.
 
-    ``step`` is 3 to tell by joint 4, 1 by joint 5. For the angle's (C, S), S low - C high = 0 with low and high the six
-    entries without the highest and without the lowest power; projected to two equations.
+    ``step`` is 3 to decide by joint 4, 1 by joint 5. For the angle's (C, S), S low - C high = 0 with low and high the
+    six entries without the highest and without the lowest power; projected to two equations.
     """
     low, high = np.empty((2, 6)), np.empty((2, 6))
     for b in range(2):
@@ -274,7 +274,8 @@ def _pencil(Y: Reals, step: int, slides: Flags, pairs: Reals, count: int) -> int
 
 @inner_kernel
 def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:
-    """Joints 1, 2 and 6 for joints 3, 4, 5 in ``m.x[0]``; two rows of ``m.x`` where the first is not told by one."""
+    """Joints 1, 2 and 6 for joints 3, 4, 5 in ``m.x[0]``; two rows of ``m.x`` where one does not determine the
+    first."""
     x = m.x[0]
     half_4, half_5 = 0.5 * (x[3] - SHIFT_4), 0.5 * (x[4] - SHIFT_5)
     c4, s4, c5, s5 = np.cos(half_4), np.sin(half_4), np.cos(half_5), np.sin(half_5)

@@ -1,7 +1,7 @@
 """Newton's method on the pose of six joints, aware of the Jacobian's rank, and the twin of a root near a fold.
 
 The Jacobian is the geometric one with lengths divided by the chain's size; the rotation error is half the sum of the
-vector products of the axes. Complete pivoting tells directions that the pose does not determine; they get no step. At a
+vector products of the axes. Complete pivoting finds directions that the pose does not determine; they get no step. At a
 simple root convergence is quadratic, at a double root the error halves in each step while the residual is its square.
 """
 

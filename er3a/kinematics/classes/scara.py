@@ -1,9 +1,9 @@
 """Four joints with one common direction, three revolute and one prismatic in any order (SCARA): two solutions.
 
 They move a body in a plane across that direction, along it and about it; a pose is met in x, y, z and yaw, and how far
-its axis is tilted from theirs is told beside the solutions.
+its axis is tilted from theirs is returned beside the solutions.
 
-Three sliding joints and three that turn, in any order: two solutions.
+Three prismatic and three revolute joints, in any order: two solutions.
 
 Only the turning joints move the orientation, so three angles follow from it; then the sliding ones' directions are
 known, and the position is linear in them. Where a turn has made two of them parallel (or all three lie in a plane),
@@ -103,7 +103,7 @@ def solve_scara(arm: Scara, T: Reals) -> tuple[Reals, Reals]:
 APART = 1e-9  # sine between neighbouring turning axes
 NEAR = 1e-9
 SPANS = 1e-9  # determinant of three sliding directions that span space
-FLAT = 1e-8  # least singular value of sliding directions, in parts of the largest, by which they do span a direction
+FLAT = 1e-8  # smallest singular value of sliding directions, in parts of the largest, by which they do span a direction
 REACHED = 1e-9  # m, by which slides that don't span space may miss a position
 
 
@@ -134,7 +134,7 @@ def gantry(links: Reals, sliding: Flags) -> Gantry | None:
 def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
     """Solutions q (N, 2, 6), rad and m, NaN where there is none; whether both roots meet or the slides don't span.
 
-    Where slides don't span space, the solution with the least shifts stands for all.
+    Where slides don't span space, the solution with the smallest shifts stands for all.
     """
     turn = np.ascontiguousarray(arm.frame @ T[:, :3, :3] @ arm.behind)
     angles, least = np.empty((len(T), SLOTS, 3)), np.empty(len(T))

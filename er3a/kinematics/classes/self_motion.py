@@ -1,7 +1,7 @@
 """Curves of joint values that keep the tool at rest: traced by steps along the Jacobian's null space.
 
 A step goes along the direction of the null space that is nearest to the last one, so the curve runs on through points
-where two curves cross; Newton's steps of least length, blind to directions without a clear singular value, bring it
+where two curves cross; minimum-norm Newton steps, blind to directions without a clear singular value, bring it
 back [1]_. Lengths are in units of the chain's size. A task that leaves the tool's turn about its own z axis open, or
 all of its orientation, has an error of 0 in what is open, and so has the Jacobian's share in it.
 
@@ -22,7 +22,7 @@ from er3a.kinematics.chain import multiply_rigid, post_rotate_z
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
-STEP = np.radians(2.0)  # greatest joint move between two points of a curve
+STEP = np.radians(2.0)  # largest joint move between two points of a curve
 MOST_POINTS = 1200
 REGULAR = 1e-6  # pivots of J J^T above this part of the largest diagonal entry
 TRUNCATED = 1e-5  # singular values below this part of the largest are no directions
@@ -171,7 +171,7 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
 
 @inner_kernel
 def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
-    """Newton's steps of least length; returns the error that is left."""
+    """Minimum-norm Newton steps; returns the error that is left."""
     least, step = np.inf, np.empty(x.shape[0])
     for _ in range(25):
         error = error_and_jacobian(posed, x, e, J)
@@ -198,7 +198,7 @@ def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
 
 @kernel
 def free_direction(posed: Posed, x: Reals, v: Reals) -> int:
-    """Fill v (n,) with a direction, of greatest component 1, in which x can move with the tool at rest.
+    """Fill v (n,) with a direction, of largest component 1, in which x can move with the tool at rest.
 
     Returns the null space's dimension there, 0 if no step in any of its directions stays on the pose.
     """
@@ -388,7 +388,7 @@ class PoseChain:
 
     @property
     def sliding(self) -> Flags:
-        """Which joints slide (n,)."""
+        """Which joints are prismatic (n,)."""
         return self.posed[1]
 
     def _scaled(self, x: Reals) -> Reals:

@@ -44,7 +44,7 @@ STUCK = 1e-9  # last pivot below which a row may move with the tool at rest
 
 
 class PreparedArm(Protocol):
-    """A chain in units of its size (m) and what tells its prismatic joints (6,)."""
+    """A chain in units of its size (m), and which joints are prismatic (6,)."""
 
     @property
     def links(self) -> Reals: ...
@@ -91,7 +91,7 @@ class RowsFound:
 def prepared(links: Reals, sliding: Flags | None = None, seed: int = 7) -> SixRevolute:
     """The solver for a chain with constant links (7, 4, 4); readings are tried out on poses of random joints.
 
-    ``sliding`` (6,) tells prismatic joints; one is within what the method can do, of two no reading was left so far.
+    ``sliding`` (6,) marks prismatic joints; one is within what the method can do, of two no reading was left so far.
     """
     sliding = np.zeros(6, dtype=bool) if sliding is None else np.asarray(sliding, dtype=bool)
     size = size_of(links)
@@ -129,7 +129,7 @@ def _trial(reading: Reading, links: Reals, T: Reals, memory: LoopMemory) -> floa
 def solve_six_revolute(arm: SixRevolute, T: Reals) -> RowsFound:
     """All solutions for poses T (N, 4, 4), m; each reading takes the poses that those before it left in doubt.
 
-    After ``MOST_READINGS`` that told something a pose stays in doubt; those whose determinant vanishes don't count, as
+    After ``MOST_READINGS`` that were conclusive a pose stays in doubt; those whose determinant vanishes don't count, as
     they may do so beside special geometry where others don't.
     """
     return all_rows(arm, _by_readings, T)
@@ -142,14 +142,14 @@ def _by_readings(
 
     The joint that a reading hides may rest along a self-motion, whose row then stands like any other but for its pivot.
     """
-    told, left = np.zeros(len(T), dtype=np.int64), np.arange(len(T))
+    readings_used, left = np.zeros(len(T), dtype=np.int64), np.arange(len(T))
     moving = np.zeros(len(T), dtype=bool)
     for reading in arm.readings:
         verdicts = np.empty(len(left), dtype=np.int64)
         rows_by_reading(reading, arm.links, arm.size, T, left, memory, q, count, verdicts, moving)
         certainty[left] = np.minimum(certainty[left], verdicts)
-        told[left] += verdicts != CONTINUUM
-        left = left[(verdicts != CERTAIN) & (told[left] < MOST_READINGS)]
+        readings_used[left] += verdicts != CONTINUUM
+        left = left[(verdicts != CERTAIN) & (readings_used[left] < MOST_READINGS)]
     certainty[moving] = CONTINUUM
 
 
@@ -207,7 +207,7 @@ def rows_by_reading(
 ) -> None:
     """Add to ``q`` (N, 16, 6) and ``count`` (N,) what one reading of the loop finds at the poses with these numbers.
 
-    ``moving`` (N,) tells where some row may move with the tool at rest.
+    ``moving`` (N,) marks where some row may move with the tool at rest.
     """
     pose, rest, pose_link = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     for i in range(numbers.shape[0]):
@@ -279,13 +279,13 @@ def _by_reading(
     zeros = hidden_angles(e, level, m)
     if zeros < 0:
         return UNCERTAIN, rows, np.inf
-    earlier, told, least = rows, 0, np.inf
+    earlier, distinct, least = rows, 0, np.inf
     for z in range(zeros):
         solved, candidates = False, 0
         again = False
         for other in range(z):
             again = again or abs(m.zeros[z, 0] - m.zeros[other, 0]) < SAME_ZERO
-        told += not again
+        distinct += not again
         pairs = pairs_at(e, m.zeros[z, 0], reading.slides, m)
         for p in range(pairs):
             m.x[0, 2], m.x[0, 3], m.x[0, 4] = m.zeros[z, 0], m.pairs[p, 0], m.pairs[p, 1]
@@ -308,8 +308,8 @@ def _by_reading(
                             rows = add_row(links, pose, m, m.start, pivot, q, rows)
         if m.zeros[z, 2] == 0.0 or not solved:
             verdict = UNCERTAIN
-    # Complex zeros come in pairs, and each zero tells a solution of its own.
-    if rows % 2 == 1 or (earlier == 0 and rows < told):
+    # Complex zeros come in pairs, and each real zero has a solution of its own.
+    if rows % 2 == 1 or (earlier == 0 and rows < distinct):
         verdict = UNCERTAIN
     return verdict, rows, least
 

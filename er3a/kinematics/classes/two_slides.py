@@ -1,6 +1,6 @@
-"""Six joints of which two slide, in any order and direction: all solutions, up to eight.
+"""Six joints, two of them prismatic, in any order and direction: all solutions, up to eight.
 
-The four joints that turn must close the orientation alone, ``Rz(x_1) A_1 Rz(x_2) A_2 Rz(x_3) A_3 Rz(x_4) A_4 = 1``:
+The four revolute joints must close the orientation alone, ``Rz(x_1) A_1 Rz(x_2) A_2 Rz(x_3) A_3 Rz(x_4) A_4 = 1``:
 the loop of a spherical four-bar. For each x_1 two angles x_2 do so, and the other two follow from both. The position is
 linear in the slides, so they go out with one determinant [1]_: that of both sliding directions and of where the loop
 ends with both slides at 0. Its product over both angles x_2, times a power of what the roots of x_2 divide by, is a
@@ -40,8 +40,8 @@ from er3a.numerics.arrays import Complexes, Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 TRIALS = 24
-MOST_READINGS = 3  # that tell something, for a pose in doubt
-NOISE = 1e-9  # of the largest sample: more, and a reading tells nothing
+MOST_READINGS = 3  # that are conclusive, for a pose in doubt
+NOISE = 1e-9  # of the largest sample: more, and a reading is inconclusive
 LEAST = 1e-20  # largest sample below which a reading vanishes for all poses
 MOST_DEGREE = 8
 FAINT = 1e-13  # of the largest coefficient: so small ones are rounding
@@ -55,8 +55,8 @@ class SlideReading(NamedTuple):
     """The loop read from a joint that turns on, in one sense.
 
     ``joint`` (6,), ``sense``, ``links`` (6, 4, 4) and ``place`` as in :class:`hidden_joint.Reading`; ``slides`` (6,)
-    tells the sliding places; the polynomial has this ``degree`` if the product is taken times ``rho^(2 power)``, and
-    its largest sample is about ``usual`` times the square of the pose's distance.
+    determines the sliding places; the polynomial has this ``degree`` if the product is taken times ``rho^(2 power)``,
+    and its largest sample is about ``usual`` times the square of the pose's distance.
     """
 
     joint: Integers
@@ -80,7 +80,8 @@ class TwoSlides:
 
 
 def two_slides(links: Reals, sliding: Flags, seed: int = 7) -> TwoSlides | None:
-    """The solver for links (7, 4, 4) of which two joints slide; None if no reading of the loop tells its solutions."""
+    """The solver for links (7, 4, 4) two of whose joints are prismatic; None if no reading of the loop determines its
+    solutions."""
     size = size_of(links)
     scaled = np.array(links, float)
     scaled[:, :3, 3] /= size
@@ -135,7 +136,7 @@ def _by_readings(arm: TwoSlides, T: Reals, memory: LoopMemory, q: Reals, count: 
     scaled[:, :3, 3] /= arm.size
     loops = arm.links[6] @ inverse_rigid(scaled) @ arm.links[0]
     far = _reach(loops) ** 2
-    told, left, moving = np.zeros(len(T), dtype=np.int64), np.arange(len(T)), np.zeros(len(T), dtype=bool)
+    readings_used, left, moving = np.zeros(len(T), dtype=np.int64), np.arange(len(T)), np.zeros(len(T), dtype=bool)
     for reading in arm.readings:
         if not left.size:
             break
@@ -149,10 +150,10 @@ def _by_readings(arm: TwoSlides, T: Reals, memory: LoopMemory, q: Reals, count: 
         _rows(reading, arm.links, scaled, loops, known, zeros, memory, q, count, verdicts)
         certainty[known] = np.minimum(certainty[known], verdicts)
         moving[known] |= verdicts == CONTINUUM
-        told[known] += 1
+        readings_used[known] += 1
         done = np.zeros(len(T), dtype=bool)
         done[known] = verdicts == CERTAIN
-        left = left[~done[left] & (told[left] < MOST_READINGS)]
+        left = left[~done[left] & (readings_used[left] < MOST_READINGS)]
     certainty[moving] = CONTINUUM
 
 
@@ -162,7 +163,8 @@ def _reach(loops: Reals) -> Reals:
 
 
 def _clear(terms: Reals, peak: Reals) -> Flags:
-    """Whether the terms (N, 20) that would vanish without rounding are small; False where the reading tells nothing."""
+    """Whether the terms (N, 20) that would vanish without rounding are small; False where the reading is
+    inconclusive."""
     return np.asarray(np.abs(terms[:, 2 * MOST_DEGREE + 1 :]).max(axis=1) < NOISE * peak)
 
 
@@ -199,7 +201,7 @@ def _zeros(terms: Reals, degree: int) -> Reals:
 
 @inner_kernel
 def _loop_of(reading: SlideReading, pose_link: Reals, links: Reals, A: Reals) -> None:
-    """Fill ``links`` (6, 4, 4) of the loop and the rotations ``A`` (4, 3, 3) behind each joint that turns."""
+    """Fill ``links`` (6, 4, 4) of the loop and the rotations ``A`` (4, 3, 3) behind each revolute joint."""
     for i in range(6):
         links[i] = reading.links[i]
     K = links[reading.place]
@@ -291,7 +293,7 @@ def _ends(links: Reals, slides: Flags, turns: Complexes, ways: Complexes) -> com
 
 @kernel
 def _sampled(reading: SlideReading, loops: Reals, angles: Reals, samples: Reals) -> None:
-    """Values (N, S) of the polynomial, NaN where the reading tells nothing."""
+    """Values (N, S) of the polynomial, NaN where the reading is inconclusive."""
     links, A = np.empty((6, 4, 4)), np.empty((4, 3, 3))
     turns, ways = np.zeros((4, 2), np.complex128), np.zeros((3, 3), np.complex128)
     for n in range(loops.shape[0]):
@@ -328,14 +330,14 @@ def _rows(
     count: Integers,
     verdicts: Integers,
 ) -> None:
-    """Add to ``q`` (N, 16, 6) and ``count`` (N,) what the zeros (k, z, 2) of the poses with these numbers (k,) tell."""
+    """Add to ``q`` (N, 16, 6) and ``count`` (N,) the solutions at zeros (k, z, 2) of the poses with numbers (k,)."""
     links, A = np.empty((6, 4, 4)), np.empty((4, 3, 3))
     turns, ways = np.zeros((4, 2), np.complex128), np.zeros((3, 3), np.complex128)
     for i in range(numbers.shape[0]):
         n = numbers[i]
         _loop_of(reading, loops[n], links, A)
         reach = max(1.0, max(abs(poses[n, 0, 3]), max(abs(poses[n, 1, 3]), abs(poses[n, 2, 3]))))
-        verdict, told, before = CERTAIN, 0, count[n]
+        verdict, expected, before = CERTAIN, 0, count[n]
         for z in range(zeros.shape[1]):
             off = abs(zeros[i, z, 1])
             if not off < NEAR_CIRCLE:
@@ -371,10 +373,10 @@ def _rows(
                         )
                         if residual < SOLVES * reach:
                             count[n] = add_row(chain, poses[n], m, m.start, pivot, q[n], count[n])
-            told += off < ON_CIRCLE
+            expected += off < ON_CIRCLE
             if off < CLUSTER and not solved:
                 verdict = max(verdict, UNCERTAIN)
-        if count[n] % 2 == 1 or (before == 0 and count[n] < told):
+        if count[n] % 2 == 1 or (before == 0 and count[n] < expected):
             verdict = max(verdict, UNCERTAIN)
         verdicts[i] = verdict
 

@@ -17,7 +17,7 @@ from scipy.stats import kendalltau
 from er3a.comparison.compare import compare
 from er3a.dynamics.torques import gravity
 from er3a.geometry.transforms import rotation_angle, rpy_of, transform
-from er3a.kinematics.forward import forward, frames, jacobian
+from er3a.kinematics.forward import forward, frames, jacobian, skeleton
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.singularity import characteristic_length, conditioning
@@ -28,8 +28,7 @@ from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectorySummary
 from er3a.pipeline.stages.validation.model import ReferenceCheck, ValidationSummary
 from er3a.pipeline.stages.workspace.model import VoidSummary, VoidUnexpected, WorkspaceSummary
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.skeleton import skeleton
-from er3a.planning.avoidance.strategy_names import StrategyName
+from er3a.planning.names import StrategyName
 from er3a.planning.profiles import quintic, trapezoid
 from er3a.planning.toolbox import RAMP, quaternion, zyz
 from er3a.references.subjects import Reach
@@ -64,11 +63,11 @@ class TableNumbers:
     upper_arm_deg, forearm_deg : from the vertical, all joints at 0
     tool_mm, example_mm, example_rpy_deg : tool point at 0, and the pose of the article's example
     solutions, within_limits : of the article's target; ``nearest_deg`` the one within the limits that is nearest to 0
-    volume_m3 : proven bounds; reach_mm : greatest distance of the tool point from axis 1
+    volume_m3 : proven bounds; reach_mm : largest distance of the tool point from axis 1
     void_litres : proven bounds of the largest enclosed void, None without one; void_mm : its centre
     other_voids : bounds (L) of other enclosed ones, and z (mm) of their centres
     line : of the article's straight line the verdict; None where the study has no such path
-    move_clearance_mm, line_clearance_mm : least clearance on the article's paths
+    move_clearance_mm, line_clearance_mm : smallest clearance on the article's paths
     """
 
     statements: int | None
@@ -404,14 +403,14 @@ def _hidden_percent(robot: Robot) -> float:
 
 
 def _holding_nm(real: Robot, seed: int, load: Load | None) -> float | None:
-    """The greatest torque (N m) that joint 2 holds at rest at random poses; None where no link's mass is known."""
+    """The maximum torque (N m) that joint 2 holds at rest at random poses; None where no link's mass is known."""
     if not real.masses.links:
         return None
     return float(np.abs(gravity(real, random_joints(real, seed, CLOUD), load)[:, 1]).max())
 
 
 def _reach_check(validation: ValidationSummary, real: str) -> ReachCheck | None:
-    """The greatest distance of the wrist centre from axis 1, if the real arm's references know it."""
+    """The largest distance of the wrist centre from axis 1, if the real arm's references know it."""
     wanted = Reach("greatest", "wrist_centre", 1)
     for check in validation.checks:
         if isinstance(check, ReferenceCheck) and check.reference_set == real and check.subject == wanted:

@@ -13,7 +13,7 @@ from markupsafe import Markup, escape
 
 from er3a.files.kept_files import write_atomically
 from er3a.geometry.transforms import translation
-from er3a.kinematics.forward import forward, jacobian
+from er3a.kinematics.forward import forward, jacobian, skeleton
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.article.article_numbers import (
     CLOUD,
@@ -49,7 +49,6 @@ from er3a.pipeline.viewing.index import border_mm
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, stage_head
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, REFERENCE
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.planning.moves import JointMove
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot

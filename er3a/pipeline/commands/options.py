@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from er3a.errors import Er3aError, InputWarning
-from er3a.files.shipped import given_file
+from er3a.files.kept_files import given_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 from er3a.version import __version__
@@ -77,7 +77,7 @@ def _robots(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def given_files(files: Any) -> Any:
-    """One file or several, or none, as :func:`er3a.files.shipped.given_file` finds them: a callback of typer."""
+    """One file or several, or none, as :func:`er3a.files.kept_files.given_file` finds them: a callback of typer."""
     if isinstance(files, list):
         return [given_file(file) for file in files]
     return files and given_file(files)

@@ -189,7 +189,7 @@ def _until(budget: TimeBudget, file: Path, at: Callable[[str], None]) -> KeepOn:
 
 
 def _joints(text: str | None, robot: Robot) -> Reals | None:
-    """Joint values (n,) in rad or m from a list in degrees, mm of joints that slide."""
+    """Joint values (n,) in rad or m from a list in degrees, mm of prismatic joints."""
     if text is None:
         return None
     try:

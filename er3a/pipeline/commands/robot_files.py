@@ -273,8 +273,8 @@ def hand_eye(
         print_json(hand_eye_record(found, offset, table))
     else:
         left_out = images.boardless if images else ()
-        told = [f"sample {say(each)}" for each in (*open_tilts, *left_out)]
-        print("\n".join([hand_eye_lines(found, offset), *told, *(correction_lines(table) if table else [])]))
+        sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *left_out)]
+        print("\n".join([hand_eye_lines(found, offset), *sample_lines, *(correction_lines(table) if table else [])]))
     if grave_warnings(found.warnings) or found.directions[0].status == "excluded":
         raise typer.Exit(1)
 

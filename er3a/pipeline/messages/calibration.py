@@ -146,7 +146,7 @@ def _residual_line(found: ResidualStructure) -> str:
 
 
 def residual_texts(found: ResidualStructure) -> list[str]:
-    """Whether what remains is noise, its structure if it isn't, and where it is greatest."""
+    """Whether what remains is noise, its structure if it isn't, and where it is largest."""
     greatest = tr("greatest: {worst_mm:.3g} mm in row {row}", worst_mm=found.worst_mm, row=found.worst_row)
     if found.is_noise:
         return [tr("what remains is noise by all four tests"), greatest]

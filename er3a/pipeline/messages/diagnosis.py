@@ -149,7 +149,7 @@ TEXTS = texts(
         "named": "Most likely fault: {hypothesis}.",
         "too_small_to_tell": (
             "The disagreement ({residual} {unit}) is too small to tell which of {count} faults causes it: "
-            "{candidates}. From about {told} {unit} on these references distinguish them, where they can at all."
+            "{candidates}. From about {distinct} {unit} on these references distinguish them, where they can at all."
         ),
         "mostly": "The best hypothesis tried: {hypothesis}, which still exceeds the references' uncertainty.",
         "unexplained": (
@@ -228,18 +228,14 @@ def _(found: WrongUnit) -> str:
 
 
 @say.register
-def _(found: WrongAlphaSign) -> str:
-    fault = say_as(found)
-    return _at_joint(found.joint, fault)
+def _(found: WrongAlphaSign | ReversedDirection) -> str:
+    return _at_joint(found.joint, say_as(found))
 
 
 @say.register
-def _(found: WrongAlpha) -> str:
-    if found.given_deg == 0:
-        fault = say_as(found, "missing", fits=fitted(found))
-    else:
-        fault = say_as(found, "given", fits=fitted(found))
-    return _at_joint(found.joint, fault)
+def _(found: WrongAlpha | WrongOffset | WrongLength) -> str:
+    given = found.given_mm if isinstance(found, WrongLength) else found.given_deg
+    return _at_joint(found.joint, say_as(found, "missing" if given == 0 else "given", fits=fitted(found)))
 
 
 @say.register
@@ -252,20 +248,6 @@ def _(found: SwappedEntries) -> str:
 @say.register
 def _(found: ShiftedRows) -> str:
     return word(found.code, SHIFTS, f"{found.entries} {found.toward}")
-
-
-@say.register
-def _(found: WrongOffset) -> str:
-    if found.given_deg == 0:
-        fault = say_as(found, "missing", fits=fitted(found))
-    else:
-        fault = say_as(found, "given", fits=fitted(found))
-    return _at_joint(found.joint, fault)
-
-
-@say.register
-def _(found: ReversedDirection) -> str:
-    return _at_joint(found.joint, say_as(found))
 
 
 @say.register
@@ -282,15 +264,6 @@ def _(found: WrongLimits) -> str:
 @say.register
 def _(found: WrongLimit) -> str:
     fault = say_as(found, found.side, given=found.given_deg, fits=fitted(found))
-    return _at_joint(found.joint, fault)
-
-
-@say.register
-def _(found: WrongLength) -> str:
-    if found.given_mm == 0:
-        fault = say_as(found, "missing", fits=fitted(found))
-    else:
-        fault = say_as(found, "given", fits=fitted(found))
     return _at_joint(found.joint, fault)
 
 
@@ -362,7 +335,7 @@ def _(found: TooSmallToTell) -> str:
         residual=shown(found.residual),
         count=len(found.candidates),
         candidates=_candidates(found.candidates),
-        told=shown(found.told_from),
+        distinct=shown(found.distinguishability),
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.say import by, joined, listed, say, say_as, texts, word
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.motion_faults import (
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
@@ -14,6 +13,7 @@ from er3a.planning.motion_faults import (
     TooFast,
     TooFastIfAssumed,
 )
+from er3a.planning.names import StrategyName
 from er3a.planning.tool_proof import Quantity, Undecided
 
 STRATEGIES: dict[StrategyName, str] = {

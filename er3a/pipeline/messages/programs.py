@@ -360,7 +360,7 @@ def _(found: found_in.TargetOutOfReach) -> str:
 
 
 @say.register
-def _(found: found_in.WayOutOfReach) -> str:
+def _(found: found_in.StretchOutOfReach) -> str:
     reasons = joined(listed(found.reasons))
     return say_as(found, reasons=reasons)
 

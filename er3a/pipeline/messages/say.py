@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any, Literal, TypeVar
 
-from er3a.findings import Finding
+from er3a.by_value import Finding
 from er3a.pipeline.messages import language
 
 KeyT = TypeVar("KeyT", bound=str)

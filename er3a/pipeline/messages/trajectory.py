@@ -22,9 +22,8 @@ from er3a.pipeline.stages.trajectory.model import (
     Stretch,
     TriedStrategy,
 )
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict, StrategyName
 
 FIGURES = {
     "safe": N_("Safe paths"),

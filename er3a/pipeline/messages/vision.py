@@ -21,7 +21,7 @@ from er3a.vision.grasping import (
     GraspUnlikely,
     LineLeaves,
     LineUnproven,
-    WayCollides,
+    PathCollides,
 )
 from er3a.vision.hand_eye import HandEye, spread_of
 from er3a.vision.table_corrections import NoCorrections, TableCorrections
@@ -283,7 +283,7 @@ def _(found: LineUnproven) -> str:
 
 
 @say.register
-def _(found: WayCollides) -> str:
+def _(found: PathCollides) -> str:
     if found.clearance_mm < 0:
         return say_as(found, "overlap", part=word("vision.part", PARTS, found.part), depth=-found.clearance_mm)
     return say_as(found, "apart", part=word("vision.part", PARTS, found.part))

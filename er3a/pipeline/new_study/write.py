@@ -26,14 +26,13 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
-from er3a.files.kept_files import write_atomically
+from er3a.files.kept_files import ROOT, write_atomically
 from er3a.files.path_file import PathFile, ProgramPath
 from er3a.files.reference_sets import FORMATS
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
 from er3a.files.robot_library import read_robot, robot_of, robot_path
 from er3a.files.robot_writer import robot_file, yaml_text
 from er3a.files.scene_file import SceneFile
-from er3a.files.shipped import ROOT
 from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.formats.mesh_file import read_text
@@ -50,10 +49,10 @@ from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
-from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, wanted_of
+from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, proof_requirements
 from er3a.planning.commands import CommandSource
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import Wanted
+from er3a.planning.tool_proof import ProofRequirements
 from er3a.robots.joint_limits import limit_margin, shown, within
 from er3a.robots.robot import Convention, Robot, robot_name
 from er3a.selection.nearest import nearest
@@ -76,7 +75,7 @@ class SampledReach:
     ----------
     q : (N, n) rad or m, drawn within the limits, a tenth of each range away from them
     poses : (N, 4, 4) m
-    radius : m, greatest distance from the base's origin
+    radius : m, largest distance from the base's origin
     side_deg : about the base's z axis, where most of the points lie; one of ``SIDES_DEG``
     stands : whether the arm works above its mounting plane rather than below it
     """
@@ -224,7 +223,7 @@ class TaskSearch:
     follows_tool: bool = field(init=False)
     near: NearSingular = field(init=False)
     limits: JointLimits = field(init=False)
-    wanted: Wanted = field(init=False)
+    required: ProofRequirements = field(init=False)
     bodies: Bodies = field(init=False)
     middle: Reals = field(init=False)
     fit: Reals = field(init=False)
@@ -234,8 +233,8 @@ class TaskSearch:
 
     def __post_init__(self) -> None:
         self.follows_tool = has_branches(self.robot)
-        self.limits, self.wanted = limits_of(self.robot, self.settings), wanted_of(self.robot, self.settings)
-        self.near, self.bodies = self.wanted.near, Bodies(self.robot, self.scene)
+        self.limits, self.required = limits_of(self.robot, self.settings), proof_requirements(self.robot, self.settings)
+        self.near, self.bodies = self.required.near, Bodies(self.robot, self.scene)
         self.middle = self.reach.q.mean(axis=0)
         q = self.reach.q[:DRAWN]
         roomy, regular, free = self._roomy(q), self._regular(q), self.bodies.free(q)
@@ -416,7 +415,7 @@ class TaskSearch:
         assert not isinstance(entry, ProgramPath)
         try:
             motion = motion_of(
-                self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.wanted
+                self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {}, self.required
             )
         except Er3aError:
             return "can't be followed"
@@ -502,8 +501,8 @@ def arm_of(
         problem = f"{' and '.join(given)} each name an arm" if given else "which arm?"
         raise Er3aError(f"{problem} Give one of --urdf FILE, --dh FILE.csv and --robot NAME")
     if name is not None and not re.match(NAME_PATTERN, name):
-        told = "small letters, digits, - and _, a letter or digit first, 64 at most"
-        raise Er3aError(f"--name '{name}' can't be a robot's name: {told}")
+        allowed = "small letters, digits, - and _, a letter or digit first, 64 at most"
+        raise Er3aError(f"--name '{name}' can't be a robot's name: {allowed}")
     if dh is None and (convention, length_unit, angle_unit) != (None, None, None):
         raise Er3aError("--convention, --length-unit and --angle-unit say how a table is meant; give them with --dh")
     if urdf is None and (ends != (None, None) or xacro or split):

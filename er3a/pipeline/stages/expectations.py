@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from er3a.kinematics.solutions import TargetOutcome
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.programs.syntax import ProgramOutcome
 from er3a.vision.vision_findings import GraspOutcome
 
@@ -57,9 +57,11 @@ class Judged(Protocol):
 
 def unmet_expectations(judged: Iterable[Judged]) -> ExpectationsUnmet | None:
     """The expectations that are not met; None if all are."""
-    told = [(each, each.expect) for each in judged if each.expect is not None]
-    unmet = tuple(UnmetExpectation(each.name, expect, each.outcome) for each, expect in told if expect != each.outcome)
-    return ExpectationsUnmet(len(told), unmet) if unmet else None
+    expected = [(each, each.expect) for each in judged if each.expect is not None]
+    unmet = tuple(
+        UnmetExpectation(each.name, expect, each.outcome) for each, expect in expected if expect != each.outcome
+    )
+    return ExpectationsUnmet(len(expected), unmet) if unmet else None
 
 
 def demonstrations(judged: Iterable[Judged], sound: Outcome) -> tuple[Demonstration, ...]:

@@ -86,9 +86,11 @@ def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: P
     import_module(stage.messages)
     stored = read_stage(folder, stage)
     if isinstance(stored.results, AbsentResults):
-        from er3a.pipeline.viewing.absent import record_absent, report_absent
-
-        view: View = {"record": record_absent, "report": report_absent}[verb]
+        if verb == "record":  # Rerun is loaded by its own jobs alone
+            from er3a.pipeline.viewing.recording import record_absent as absent
+        else:
+            from er3a.pipeline.viewing.page import report_absent as absent
+        view: View = absent
     else:
         view = getattr(stage.module(verb), verb)
     view(study, stored, output)

@@ -8,9 +8,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
+from er3a.by_value import Finding
 from er3a.files.robot_library import LoadFields
 from er3a.files.yaml_file import StrictModel
-from er3a.findings import Finding
 from er3a.numerics.jit import cache_folder
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.tables import table_types

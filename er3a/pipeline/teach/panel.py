@@ -259,7 +259,7 @@ WORDS: dict[str, Any] = {
 SIX = 6
 _HERE = Path(__file__).parent
 NEAR_LIMIT = np.radians(5.0)
-NEAR_END = 0.01  # m, of a joint that slides
+NEAR_END = 0.01  # m, of a prismatic joint
 NEAR_TOUCH = 0.03  # m
 KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
 

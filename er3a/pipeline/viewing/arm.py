@@ -18,11 +18,10 @@ from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Solid, Sphere
 from er3a.collision.shapes import Body, arm_bodies
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
-from er3a.kinematics.forward import frames
+from er3a.kinematics.forward import frames, skeleton
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.viewing.palette import BODY, JOINT_NAMES, LINK, legible, link_colour, rgb
 from er3a.pipeline.viewing.palette import JOINTS as JOINT_COLOURS
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot, Visual
 

@@ -336,7 +336,7 @@ def record_calibration(found: Calibration, errors: MeasuredErrors, output: Path)
 
 
 def _error_arrows(entity: str, errors: MeasuredErrors, model: str, size: float) -> dict[str, Logged]:
-    """Points coloured from none to the greatest error, and arrows from the measured to the modelled point."""
+    """Points coloured from none to the largest error, and arrows from the measured to the modelled point."""
     distance, points = errors.distances_mm(model), errors.xyz_mm / 1000
     greatest = float(distance.max()) or 1.0
     colours = (255 * colormaps["viridis"](distance / greatest)[:, :3]).astype(np.uint8)

@@ -187,7 +187,7 @@ def _value(value: float | None, unit: str) -> str:
 
 
 def _in_borders(robot: str, old: Path, new: Path) -> list[Change]:
-    """How far each exact border moved: the greatest distance of a point of one from the other, either way."""
+    """How far each exact border moved: the largest distance of a point of one from the other, either way."""
     borders = [_borders(folder) for folder in (old, new)]
     found = []
     for key in sorted(borders[0] | borders[1]):
@@ -216,7 +216,7 @@ def _borders(folder: Path) -> dict[tuple[str, str], list[Reals]]:
 
 
 def _farthest(arcs: list[Reals], others: list[Reals]) -> tuple[float, float, float]:
-    """The greatest distance of the arcs' points from the other arcs, as lines from point to point, and the radius and
+    """The largest distance of the arcs' points from the other arcs, as lines from point to point, and the radius and
     height where it is, in mm."""
     points = np.concatenate(arcs)[:, None]
     starts, ends = (np.concatenate([arc[part] for arc in others]) for part in (np.s_[:-1], np.s_[1:]))

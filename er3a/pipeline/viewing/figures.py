@@ -83,7 +83,7 @@ def _axes(i: int, ax: Axes, others: list[Axes]) -> dict[str, Any]:
 
 
 def _colour_bar(ax: Axes, others: list[Axes]) -> Any:
-    """The colour bar that tells the numbers in axes: their own, or one of the same colours and limits."""
+    """The colour bar of the numbers in axes: their own, or one of the same colours and limits."""
     for mappable in _shaded(ax):
         for other in (mappable, *(shade for each in others for shade in _shaded(each))):
             if other.colorbar and other.cmap.name == mappable.cmap.name and other.get_clim() == mappable.get_clim():

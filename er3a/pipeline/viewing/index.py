@@ -24,6 +24,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from er3a.files.kept_files import write_atomically
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import near_shapes
@@ -55,7 +56,6 @@ from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import number
 from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 

@@ -25,14 +25,13 @@ from matplotlib.figure import Figure
 
 from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
-from er3a.files.kept_files import write_atomically
-from er3a.files.shipped import INSTALLED, ROOT, view_command
+from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, say, say_all, word
-from er3a.pipeline.results import Provenance, Stored, read_stage, read_status
+from er3a.pipeline.results import AbsentResults, Provenance, Stored, read_stage, read_status
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
@@ -430,7 +429,7 @@ def alternative_table(study: Study, name: str, results: Path) -> str | None:
 
 
 def panel_link(q_deg: Iterable[float], text: str) -> str:
-    """A text that leads to the arm at joint values (deg; mm of joints that slide) in the teach panel."""
+    """A text that leads to the arm at joint values (deg; mm of prismatic joints) in the teach panel."""
     joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
     return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)
 
@@ -439,3 +438,15 @@ def stage_head(folder: Path, stage: Stage) -> Head:
     """The verdict and key figures that a folder holds, in the page's language."""
     words = import_module(stage.messages)
     return head_of(read_stage(folder, stage), words.FIGURES)
+
+
+def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
+    """Write the page of a stage that was not computed: the verdict, and where it comes from."""
+    render(
+        Path(__file__).with_name("absent.html.j2"),
+        output,
+        head=head_of(stored, {}),
+        command=run_command(study, f"{stored.robot}/{stored.stage}.html"),
+        robot=study.robot(stored.robot),
+        robot_pages=study.pages(stored.robot),
+    )

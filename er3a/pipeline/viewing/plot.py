@@ -12,10 +12,9 @@ from matplotlib.animation import FuncAnimation
 from matplotlib.figure import Figure
 
 from er3a.errors import ShapeError
-from er3a.kinematics.forward import forward, frames
+from er3a.kinematics.forward import forward, frames, skeleton
 from er3a.numerics.arrays import Reals, as_floats
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
@@ -31,7 +30,7 @@ def plot(robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] |
     ----------
     q : (n,), rad or m: a figure; (N, n): an animation with the tool's trail, which a notebook plays
     seconds : how long the animation lasts
-    window : (6,), m, what the axes show: least and greatest x, y, z, as ``workspace`` of the Robotics Toolbox; None
+    window : (6,), m, what the axes show: smallest and largest x, y, z, as ``workspace`` of the Robotics Toolbox; None
         for all of the motion
 
     Returns
@@ -43,7 +42,7 @@ def plot(robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] |
     Raises
     ------
     ShapeError
-        if q is neither, or the window has not six numbers
+        if q is neither, or the window does not have six numbers
     """
     edges = None if window is None else as_floats(np.asarray(window), "window")
     if edges is not None and edges.shape != (6,):

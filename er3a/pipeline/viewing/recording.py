@@ -19,11 +19,14 @@ import rerun.blueprint as rrb
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_bodies
 from er3a.files.kept_files import write_atomically
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
+from er3a.pipeline.results import AbsentResults, Stored
+from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import ARM, TIMELINE, arm_view, body_shape, log_arm, seconds, send_motion, solid_shapes
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, LINK, MUTED, VERDICTS, legible, rgb
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
@@ -375,3 +378,8 @@ def _touching(shown: Recorded, events: Sequence[PlayedEvent]) -> Iterator[tuple[
         for name in sorted(now ^ before):
             yield from ((t, entity, shape if name in now else GONE) for entity, shape in shapes.get(name, ()))
         before = now
+
+
+def record_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
+    """Write the recording of a stage that was not computed, which holds the reason alone."""
+    write_reason(output, stored.robot, stored.stage, escaped(say(stored.results.summary.verdict.finding)))

@@ -1,4 +1,4 @@
-"""Starting the Rerun viewer so that nobody else can reach it and it tells nobody of its use.
+"""Starting the Rerun viewer so that nobody else can reach it and it reports its use to nobody.
 
 Recordings shown in a browser on this machine, for where there is no desktop.
 
@@ -55,16 +55,16 @@ def viewer_running(
 
     Parameters
     ----------
-    messages : file for what it tells, errors only
+    messages : file for its errors
     """
     limited = ["timeout", str(LONGEST_S)] if shutil.which("timeout") else []
-    told = messages.open("w") if messages else subprocess.DEVNULL
+    stderr = messages.open("w") if messages else subprocess.DEVNULL
     with without_statistics() as environment:
         viewer = subprocess.Popen(
             [*limited, *viewer_command(recordings, *words)],
             env=environment | {"RUST_LOG": "error", "RUST_BACKTRACE": "0"},  # warnings would be shown in the picture
             stdout=subprocess.DEVNULL,
-            stderr=told,
+            stderr=stderr,
             start_new_session=True,
         )
         try:
@@ -73,8 +73,8 @@ def viewer_running(
             with suppress(ProcessLookupError):
                 os.killpg(viewer.pid, signal.SIGKILL)
             viewer.wait()
-            if not isinstance(told, int):
-                told.close()
+            if not isinstance(stderr, int):
+                stderr.close()
 
 
 def has_display() -> bool:

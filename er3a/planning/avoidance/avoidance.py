@@ -139,7 +139,7 @@ class EndsOffPath:
 
 @dataclass(frozen=True)
 class SpeedExceeded:
-    """A joint needs so many times its greatest speed."""
+    """A joint needs so many times its maximum speed."""
 
     ratio: float
     code: Literal["speed_exceeded"] = "speed_exceeded"
@@ -147,7 +147,7 @@ class SpeedExceeded:
 
 @dataclass(frozen=True)
 class AccelerationExceeded:
-    """A joint needs so many times its greatest acceleration."""
+    """A joint needs so many times its maximum acceleration."""
 
     ratio: float
     code: Literal["acceleration_exceeded"] = "acceleration_exceeded"

@@ -509,7 +509,7 @@ def read_krl(source: ProgramText) -> Program:
             findings += more
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
-    by_name, told = linked([*called, *routines])
+    by_name, unlinked = linked([*called, *routines])
     return Program(
         "krl",
         source.path.stem,
@@ -517,7 +517,7 @@ def read_krl(source: ProgramText) -> Program:
         by_name,
         routines[0].name,
         tuple(reader.data),
-        (*findings, *told),
+        (*findings, *unlinked),
         source.lines,
     )
 

@@ -503,7 +503,7 @@ def _speed(
 
 
 def _velocity(memory: ProgramMemory) -> tuple[float, float]:
-    """The share of programmed speeds, and the greatest in mm/s."""
+    """The share of programmed speeds, and the largest in mm/s."""
     found = plain(memory.read("%SPEED"), 2)
     return (1.0, FULL_SPEED) if found is None else (found[0] / 100, found[1])
 

@@ -266,7 +266,7 @@ def read_rapid(source: ProgramText) -> Program:
     for name in sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else ():
         last = next(each for each in reversed(data) if isinstance(each.target, Variable) and each.target.name == name)
         findings.append(NameTwice(name, last.place))
-    by_name, told = linked([each for reader in readers for each in reader.routines])
+    by_name, unlinked = linked([each for reader in readers for each in reader.routines])
     return Program(
         "rapid",
         source.path.stem,
@@ -274,7 +274,7 @@ def read_rapid(source: ProgramText) -> Program:
         by_name,
         _entry(own, by_name),
         tuple(data),
-        (*findings, *told),
+        (*findings, *unlinked),
         source.lines,
     )
 

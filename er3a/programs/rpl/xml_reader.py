@@ -210,13 +210,13 @@ class _Pou:
             raise fault(place, f"there is no <Pou> '{name}' for the loop's body", "Add it, or correct <pouref>")
         if body in within or len(within) > MOST_LOOPS:
             raise fault(place, f"the loop's body '{name}' holds the loop itself", "Give each loop its own <Pou>")
-        told = text_of(element)
+        source = text_of(element)
         if element.tag == "while":
-            builder.open_while(place, expression(element.text_of("cond")), told)
+            builder.open_while(place, expression(element.text_of("cond")), source)
         else:
             first, last = (expression(element.text_of(tag)) for tag in ("from", "to"))
             step = expression(element.text_of("by")) if element.child("by") is not None else None
-            builder.open_for(place, element.text_of("var"), first, last, step, told)
+            builder.open_for(place, element.text_of("var"), first, last, step, source)
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
 
@@ -228,23 +228,23 @@ class _Pou:
             body = self._named(name, within)
             if body is None or body in within or len(within) > MOST_LOOPS:
                 raise fault(place, f"there is no <Pou> '{name}' for a side of the if", "Add it, or correct <pouref>")
-            told = f"IF {condition} THEN"
+            source = f"IF {condition} THEN"
             if number == 0:
-                builder.open_if(place, expression(condition), told)
+                builder.open_if(place, expression(condition), source)
             else:
-                builder.next_arm(place, expression(condition) if condition else None, told)
+                builder.next_arm(place, expression(condition) if condition else None, source)
             self._body(builder, body, f"{place.element}/{name}", within)
         builder.close("if", place)
 
     def _unknown_block(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
         """An element that is not understood and has bodies: each may be carried out, or not."""
-        told = text_of(element)
-        builder.unknown(place, told, may_move=False)
+        source = text_of(element)
+        builder.unknown(place, source, may_move=False)
         for name in (each.text for each in element.all("pouref")):
             body = self._named(name, within)
             if body is None or body in within or len(within) > MOST_LOOPS:
                 raise fault(place, f"there is no <Pou> '{name}' for a body here", "Add it, or correct <pouref>")
-            builder.open_if(place, Opaque(told), told)
+            builder.open_if(place, Opaque(source), source)
             self._body(builder, body, f"{place.element}/{name}", within)
             builder.close("if", place)
 
@@ -297,23 +297,23 @@ def _below(pou: XmlNode) -> Iterator[XmlNode]:
 
 def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
     """An element that is no loop."""
-    told = text_of(element)
+    source = text_of(element)
     if element.tag in ("mjoint", "mlin"):
         parts = [element.child(tag) for tag in MOTION_PARTS]
         given = tuple(None if part is None or not part.text else expression(part.text) for part in parts)
-        builder.add(Move(place, element.tag.upper(), given, told))
+        builder.add(Move(place, element.tag.upper(), given, source))
     elif element.tag == "set":
         target = expression(element.text_of("dest"))
-        builder.add(Assign(place, target, expression(element.text_of("expr")), told))
+        builder.add(Assign(place, target, expression(element.text_of("expr")), source))
     elif element.tag == "wait":
         condition = element.text_of("condition")
         builder.add(Waiting(place, "condition", expression(condition), condition))
         if (timeout_flag := element.text_of("var")) and element.text_of("timeout"):  # whether it came in time
-            builder.add(Assign(place, expression(timeout_flag), Opaque(told), told))
+            builder.add(Assign(place, expression(timeout_flag), Opaque(source), source))
     elif element.tag == "end_pro":
         builder.add(Halt(place))
     elif element.tag == "dwell":
-        builder.add(Waiting(place, "seconds", expression(element.text_of("expr")), told))
+        builder.add(Waiting(place, "seconds", expression(element.text_of("expr")), source))
     elif element.tag == "rem":
         builder.remark(place, element.text_of("text"))
     elif element.tag == "call" and (routine := element.child("subroutine")) is not None:
@@ -321,9 +321,9 @@ def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
         given_arguments: tuple[Expression, ...] = ()
         for arguments in routine.all("args"):
             given_arguments = tuple(expression(each.text) for each in arguments.all("arg") if each.text)
-        builder.add(Doing(place, Invocation(name, given_arguments), told))
+        builder.add(Doing(place, Invocation(name, given_arguments), source))
     else:
-        builder.unknown(place, told)
+        builder.unknown(place, source)
 
 
 def text_of(element: XmlNode) -> str:

@@ -324,13 +324,13 @@ def _block(builder: CodeBuilder, first: str, words: UrWords, place: Place, text:
         words.finish()
     except MisreadError:
         condition = Opaque(text.partition(" ")[2].rstrip(":"))
-    told = text.rstrip(":")
+    source = text.rstrip(":")
     if first == "if":
-        builder.open_if(place, condition, told)
+        builder.open_if(place, condition, source)
     elif first == "while":
-        builder.open_while(place, condition, told)
+        builder.open_while(place, condition, source)
     else:
-        builder.next_arm(place, condition, told)
+        builder.next_arm(place, condition, source)
 
 
 def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:

@@ -67,7 +67,7 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetCl
         rows = np.flatnonzero(solutions.within_limits)
         if not rows.size:
             continue
-        distance, pair = bodies.least_of_turns(solutions.q[rows])
+        distance, pair = bodies.min_distance_of_turns(solutions.q[rows])
         between = [bodies.pairs[k].label if k >= 0 else "" for k in pair]
         tables.append(
             TargetClearances(
@@ -103,7 +103,7 @@ def path_clearances(
         known = np.isfinite(along.distance)
         near = np.full((len(q), 2, 3), np.nan)
         pair = np.full(len(q), -1)
-        pair[known] = bodies.least(q[known])[1]
+        pair[known] = bodies.min_distance(q[known])[1]
         for row in np.flatnonzero(pair >= 0):
             near[row] = bodies.surface_points(q[row], pair[row])
         tables.append(
@@ -154,7 +154,7 @@ def compute(study: Study, name: str) -> CollisionResults:
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = find_places(bodies, space, settings.cells_across, settings.rounds, random)
     home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
-    least, nearest = bodies.least(home[None])
+    least, nearest = bodies.min_distance(home[None])
     at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and least[0] < 0 else None
     if at_home is None:
         places.joined[:] = joined_to_home(bodies, places, home, settings.neighbours)

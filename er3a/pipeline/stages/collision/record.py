@@ -79,15 +79,15 @@ def _places(results: CollisionResults) -> dict[str, Logged]:
 def _run(robot: Robot, results: CollisionResults, path: str) -> Run:
     rows: PathClearances = results.paths.take(results.paths.path == path)
     found = next((each for each in results.summary.closest if (each.kind, each.name) == ("path", path)), None)
-    told = f"nearest: {say(found.between)}, {found.clearance_mm:.1f} mm" if found else "no pose can be reached"
+    outcome = f"nearest: {say(found.between)}, {found.clearance_mm:.1f} mm" if found else "no pose can be reached"
     return Run(
         name=path,
-        text=f"## {escaped(path)}\n{escaped(told)}",
+        text=f"## {escaped(path)}\n{escaped(outcome)}",
         t=rows.t_s,
         q=meant(robot, rows.q_deg),
         events=events(results, path, rows),
         marks=nearest(rows),
-        outcome=told,
+        outcome=outcome,
         status="fail" if found is None or found.clearance_mm < 0 else "plain",
         curves={"clearance": rows.clearance_mm[:, None]},
     )

@@ -10,6 +10,7 @@ from matplotlib.colors import ListedColormap
 
 from er3a.collision.pairs import TRIED
 from er3a.files.scene_file import load_scene
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
@@ -31,7 +32,6 @@ from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -132,7 +132,7 @@ def _mixed(share: float) -> tuple[float, ...]:
 
 
 def clearance_over_time(results: CollisionResults) -> Picture | None:
-    """Least distance over time, path by path."""
+    """Smallest distance over time, path by path."""
     rows = results.paths
     names = [str(name) for name in dict.fromkeys(rows.path) if np.isfinite(rows.clearance_mm[rows.path == name]).any()]
     if not names:

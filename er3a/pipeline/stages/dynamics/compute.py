@@ -61,7 +61,7 @@ from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measu
 from er3a.pipeline.stages.trajectory.judgement import verdict_of as verdict_of_motion
 from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, limits_of, near_singular, study_motions
 from er3a.pipeline.study import Study
-from er3a.planning.path_verdicts import NOT_TO_BE_RUN, PathVerdict
+from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, no_body, together
@@ -178,7 +178,7 @@ class LoadedArm:
 
     Attributes
     ----------
-    unit_payload : 1 kg of the payload whose greatest mass is asked for
+    unit_payload : 1 kg of the payload whose largest mass is asked for
     links_grade, load_grade : of the masses
     limits : joint speeds and accelerations, partly assumed
     """
@@ -221,7 +221,7 @@ class PathTorques:
     ----------
     asked : whether the path is to be run, not to show a fault
     demand, imbalance : None where the arm can't follow it
-    inertia : (n, 2), least and greatest that each joint moves, without rotor
+    inertia : (n, 2), smallest and largest that each joint moves, without rotor
     load : that the program names which the path is from
     """
 
@@ -335,7 +335,7 @@ def _joint_loads(robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, a
 def _margins(
     arm: LoadedArm, parts: TorqueParts, t: Reals, q: Reals, qd: Reals, qdd: Reals
 ) -> tuple[Margin | None, Margin | None]:
-    """Greatest further payload and greatest speed scale under peak and rated torques, and joint speeds."""
+    """Largest further payload and maximum speed scale under peak and rated torques, and joint speeds."""
     drives = drives_of(arm.robot)
     more = arm.with_unit.rigid_torques(q, qd, qdd) - arm.model.rigid_torques(q, qd, qdd)
     viscous = known(drives.viscous) * qd

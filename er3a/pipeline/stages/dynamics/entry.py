@@ -18,7 +18,7 @@ from er3a.pipeline.stages.trajectory.entry import STAGE as TRAJECTORY
 class DynamicsSettings(StrictModel):
     """Torques along each path are computed at ``samples`` times.
 
-    The greatest payload is asked for one with its centre at ``payload_centre_mm`` in the flange's frame and the radius
+    The maximum payload is asked for one with its centre at ``payload_centre_mm`` in the flange's frame and the radius
     of gyration ``payload_gyration_mm`` about each axis. ``capsule_density_kg_m3`` asks for a guess: links without mass
     are filled evenly at this density, and all figures are graded ``inferred``.
     """

@@ -1,6 +1,6 @@
 """What the dynamics stage computes.
 
-Torques are those that the drives give, in the manufacturer's signs: N m for joints that turn, N for those that slide
+Torques are those that the drives give, in the manufacturer's signs: N m for revolute joints, N for prismatic ones
 (``unit``). Times count from a path's start.
 """
 
@@ -15,7 +15,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, per_joint
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.planning.timing import NoTimeLaw
 from er3a.robots.robot import Grade
 
@@ -68,7 +68,7 @@ class NoData:
 
 @dataclass(frozen=True)
 class NoLimits:
-    """Torques are known, and no limit that they could be compared with: the greatest one.
+    """Torques are known, and no limit that they could be compared with: the largest one.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class MassesUsed:
 
 @dataclass(frozen=True)
 class HoldingTorque:
-    """The greatest torque found that a joint holds at rest within the limits, and the pose where it does.
+    """The maximum torque found that a joint holds at rest within the limits, and the pose where it does.
 
     ``bound``: the absolute value that none of the poses within the limits exceeds, for the masses as given.
     """
@@ -201,8 +201,8 @@ class JointLoad:
     Attributes
     ----------
     tolerance : of the peak; rms_tolerance : of the effective torque
-    gravity, inertia, velocity, friction, tool : greatest of each part
-    power_w, braking_w : greatest given and taken back
+    gravity, inertia, velocity, friction, tool : largest of each part
+    power_w, braking_w : largest given and taken back
     """
 
     joint: int
@@ -225,7 +225,7 @@ class JointLoad:
 
 @dataclass(frozen=True)
 class BindingLimit:
-    """The greatest value under the limits, and what binds; None where nothing does.
+    """The largest value under the limits, and what binds; None where nothing does.
 
     ``t_s`` is None for the effective torque, which is one of the whole path.
     """
@@ -238,7 +238,7 @@ class BindingLimit:
 
 @dataclass(frozen=True)
 class WristMoment:
-    """The greatest moment that the load makes about a wrist axis along a path, accelerations included."""
+    """The largest moment that the load makes about a wrist axis along a path, accelerations included."""
 
     joint: int
     moment_n_m: float
@@ -292,7 +292,7 @@ class PathLoad:
 
     @property
     def hardest(self) -> JointLoad:
-        """The joint with the greatest peak; one that turns if there is any, because N and N m don't compare."""
+        """The joint with the largest peak; one that turns if there is any, because N and N m don't compare."""
         return max(self.joints, key=lambda load: (load.unit == "N m", load.peak))
 
 
@@ -302,9 +302,9 @@ class MotorNeed:
 
     Attributes
     ----------
-    speed : deg/s, mm/s where the joint slides
+    speed : deg/s, mm/s if the joint is prismatic
     inertia_low, inertia_high : of the load that the joint moves along the paths, kg m^2 (kg); without rotor
-    inertia_ratio : of the greatest to the rotor's at the joint
+    inertia_ratio : of the largest to the rotor's at the joint
     motor_rpm, motor_torque : at the motor, where the gear ratio is known
     """
 
@@ -331,9 +331,9 @@ class DynamicsSummary(Summary):
     Attributes
     ----------
     masses : None where there are none
-    payload_centre_mm, payload_gyration_mm : of the payload whose greatest mass is asked for
+    payload_centre_mm, payload_gyration_mm : of the payload whose largest mass is asked for
     uses : all that was compared with a limit, the tightest first
-    power_imbalance : greatest difference of power and change of energy, of the greatest power; None without paths
+    power_imbalance : largest difference of power and change of energy, of the largest power; None without paths
     """
 
     verdict: Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
@@ -352,7 +352,7 @@ class DynamicsSummary(Summary):
 
 @dataclass(frozen=True, eq=False)
 class TorqueRows(Table):
-    """Torques along the paths that the arm can follow, N m (N for joints that slide)."""
+    """Torques along the paths that the arm can follow, N m (N for prismatic joints)."""
 
     path: Texts = column("name of the path")
     t_s: Reals = column("time since the path's start")

@@ -21,7 +21,7 @@ from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
 STAGE = "dynamics"
-LONGEST = 0.35  # of the arm's size, the arrow of the greatest torque
+LONGEST = 0.35  # of the arm's size, the arrow of the maximum torque
 WIDTH = 0.012  # of the arm's size
 CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
 NOTE = """# {title}: torques
@@ -60,7 +60,7 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
 
 
 def _arrow_scales(robot: Robot, torques: Reals) -> Reals:
-    """Metres per N m, or per N of joints that slide, (n,): the greatest of each gets the longest arrow."""
+    """Metres per N m, or per N of prismatic joints, (n,): the largest of each gets the longest arrow."""
     peaks = np.abs(np.concatenate([torques, np.zeros((1, robot.joints))])).max(axis=0)
     turning, sliding = (peaks[robot.slides == slides].max(initial=1e-12) for slides in (False, True))
     scales: Reals = LONGEST * size_of(robot) / np.where(robot.slides, sliding, turning)

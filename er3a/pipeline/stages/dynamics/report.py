@@ -100,7 +100,7 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
 
 
 def holding_figure(summary: DynamicsSummary) -> Picture:
-    """Bars of the greatest holding torque at each joint."""
+    """Bars of the largest holding torque at each joint."""
     figure, ax = new_figure(1, 1, width=7.0, height=2.8)
     joints = np.arange(len(summary.holding))
     size = np.array([abs(held.torque) for held in summary.holding])

@@ -187,7 +187,7 @@ def _rows(
         manipulability=conditioning(robot, q, characteristic_length(robot)).manipulability,
         singular=_singular(robot, solutions),
         limit_margin=limit_margin(robot, q),
-        greatest_move=choice.greatest_move,
+        greatest_move=choice.max_joint_move,
         distance=choice.distance,
     )
 

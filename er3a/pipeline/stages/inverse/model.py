@@ -61,7 +61,7 @@ Obstacle = NothingFound | TiltMissing | ReachMissing | BranchesLeaveLimits | Bra
 
 @dataclass(frozen=True)
 class TurnTool:
-    """Turning the tool helps: part of random orientations that have a solution, and the least turn found.
+    """Turning the tool helps: part of random orientations that have a solution, and the smallest turn found.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class TurningDoesNotHelp:
 
 @dataclass(frozen=True)
 class ShiftTool:
-    """Moving the part or the base helps: the least shift of the tool found, and where it ends; see `TurnTool`."""
+    """Moving the part or the base helps: the smallest shift of the tool found, and where it ends; see `TurnTool`."""
 
     shift_mm: float
     to_mm: tuple[float, float, float]
@@ -207,7 +207,7 @@ class SelfMotion:
     """A continuum of solutions (``kinematics.families``, ``kinematics.self_motions``).
 
     Above a ``dimension`` of 1 it is one curve of many on a surface of solutions.
-    ``direction`` is in deg (mm of joints that slide) per deg of the joint that is free; of kind curve per deg of its
+    ``direction`` is in deg (mm of prismatic joints) per deg of the joint that is free; of kind curve per deg of its
     length.
     """
 

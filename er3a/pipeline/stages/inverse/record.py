@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 
 from er3a.files.scene_file import load_scene
+from er3a.kinematics.forward import skeleton
 from er3a.pipeline.messages.inverse import limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word, say
 from er3a.pipeline.messages.say import listed
@@ -17,7 +18,6 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES, capsules
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
 from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, write_recording
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
 from er3a.robots.robot import Robot
 

@@ -17,6 +17,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 
 from er3a.geometry.transforms import transform
+from er3a.kinematics.forward import skeleton
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import ClosedForm, Iteration
 from er3a.pipeline.messages.expectations import outcome_word
@@ -52,7 +53,6 @@ from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, colour_of, shape_of
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import LimitsExceeded, meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
@@ -506,10 +506,10 @@ def _no_noise(measure: float) -> float:
 
 def _self_motions(robot: Robot, families: tuple[SelfMotion, ...]) -> list[str]:
     """The nearest self-motions, and how many more there are."""
-    told = [_self_motion(robot, family) for family in families[:MOST_SELF_MOTIONS]]
+    texts = [_self_motion(robot, family) for family in families[:MOST_SELF_MOTIONS]]
     if len(families) > MOST_SELF_MOTIONS:
-        told.append(tr("{count} more in summary.json", count=len(families) - MOST_SELF_MOTIONS))
-    return told
+        texts.append(tr("{count} more in summary.json", count=len(families) - MOST_SELF_MOTIONS))
+    return texts
 
 
 def _self_motion(robot: Robot, family: SelfMotion) -> str:

@@ -236,7 +236,7 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[ProgramMotion,
     angles: list[Reals] = [np.empty((0, joints))]
     points: list[Reals] = [np.empty((0, 3))]
     lines: list[int] = []
-    told: list[str] = []
+    step_levels: list[str] = []
     now = 0.0
     for number in check.main:
         step = check.execution.steps[number]
@@ -258,13 +258,13 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[ProgramMotion,
         angles.append(q)
         points.append(forward(arm, q)[:, :3, 3])
         lines += [check.execution.own_line(step)] * len(t)
-        told += [levels[step.place]] * len(t)
+        step_levels += [levels[step.place]] * len(t)
         now += motion.way.law.duration if motion.way else 0.0
     kept = ProgramMotion(
         program=np.full(len(lines), name, object),
         t_s=np.concatenate(times),
         line=np.array(lines, int),
-        level=np.array(told, object),
+        level=np.array(step_levels, object),
         q_deg=np.degrees(np.concatenate(angles)),
         xyz_mm=np.concatenate(points) * 1000,
     )

@@ -67,8 +67,8 @@ def _run(results: ProgramsResults, program: ProgramSummary) -> Run:
         texts.append((t0, _document(program, line, listing, found, level)))
         bodies = touching(program, line)
         for each in [] if line in seen and not bodies else found:
-            told = f"{program.name}:{line}: {say(each.finding)}"
-            events.append(PlayedEvent(t0, t1, told, WEIGHTS[each.level], bodies))
+            text = f"{program.name}:{line}: {say(each.finding)}"
+            events.append(PlayedEvent(t0, t1, text, WEIGHTS[each.level], bodies))
         seen.add(line)
     return Run(
         name=program.name,

@@ -102,8 +102,8 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     motion = results.motion.take(results.motion.program == program.name)
     lines = _listing(program.name, text, rows, motion, found)
     status = STATUSES[program.outcome]
-    told = LANGUAGES[program.language].title, cycle_text(program), _worst(program)
-    return ProgramSection(program, status, *told, lines, elsewhere)
+    texts = LANGUAGES[program.language].title, cycle_text(program), _worst(program)
+    return ProgramSection(program, status, *texts, lines, elsewhere)
 
 
 def _worst(program: ProgramSummary) -> Markup:
@@ -134,8 +134,8 @@ def _listing(
         moves[line].append(i)
     kept = set(range(1, len(text) + 1))
     if len(text) > MOST_LINES:
-        told = sorted({*moves, *found})[: MOST_LINES // (2 * AROUND + 1)]
-        kept = {line + k for line in told for k in range(-AROUND, AROUND + 1)} & kept
+        marked = sorted({*moves, *found})[: MOST_LINES // (2 * AROUND + 1)]
+        kept = {line + k for line in marked for k in range(-AROUND, AROUND + 1)} & kept
     lines: list[ListingLine] = []
     skipped = False
     for number, words in zip(text.line.tolist(), text.text.tolist()):

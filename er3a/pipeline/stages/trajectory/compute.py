@@ -32,8 +32,8 @@ from er3a.pipeline.stages.trajectory.judgement import (
     clearance_rows,
     collisions,
     judge,
-    least_clearance,
     measured,
+    min_clearance,
     verdict_of,
 )
 from er3a.pipeline.stages.trajectory.model import (
@@ -60,14 +60,13 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectorySummary,
     TriedStrategy,
 )
-from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, wanted_of
+from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, proof_requirements
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.motion_faults import Interval, SingularEvent
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, within
@@ -147,10 +146,10 @@ class AvoidanceTask:
 
     def _no_more_than(self, found: Judgement) -> JointLimits:
         """The limits, or what of them the path needs if that is less."""
-        if found.fast or found.greatest_speed is None or found.greatest_acceleration is None:
+        if found.fast or found.max_speed is None or found.max_acceleration is None:
             return self.limits
-        speed = float((found.greatest_speed / self.limits.speed).max())
-        acceleration = float((found.greatest_acceleration / self.limits.acceleration).max())
+        speed = float((found.max_speed / self.limits.speed).max())
+        acceleration = float((found.max_acceleration / self.limits.acceleration).max())
         speed, acceleration = (min(1.0, max(ratio, LEAST_RATIO)) for ratio in (speed, acceleration))
         return replace(
             self.limits, speed=self.limits.speed * speed, acceleration=self.limits.acceleration * acceleration
@@ -164,7 +163,7 @@ class AvoidanceTask:
         if not isinstance(found, WayAround):
             return [StrategyResult("planned", None, (found,))]
         timed = found.motion
-        path = motion.built.tool or _ToolWay(motion)
+        path = motion.built.tool or _ToolPath(motion)
         distance, angle, _ = deviation(path, forward(self.robot, timed.q))
         cost = StrategyCost(timed, 1.0, distance, angle, *timed.ratios(self.limits), keeps_clear=True)
         return [StrategyResult("planned", cost)]
@@ -193,14 +192,14 @@ class AvoidanceTask:
         ]
 
     def _meets(self, cost: StrategyCost, margin: float) -> tuple[PairOverlaps | PairTooNear | None, float | None]:
-        """The deepest overlap on a motion, or what comes nearer than a margin (m), and its least clearance in mm (None
-        if nothing can meet)."""
+        """The deepest overlap on a motion, or what comes nearer than a margin (m), and its smallest clearance in mm
+        (None if nothing can meet)."""
         curve = cost.motion.curve
         grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
         along = clearance_along(
             self.surroundings.bodies, curve.joints, curve.rate_bounds, grid, grid, self.surroundings.tolerance
         )
-        least = least_clearance(along)
+        least = min_clearance(along)
         if least is None:
             return None, None
         if along.contacts:
@@ -222,7 +221,7 @@ class AvoidanceTask:
             yield self._rows(motion.entry.name, FASTEST, quickest, None)
 
     def _rows(self, path: str, strategy: str, timed: Timed, deviations: tuple[Reals, Reals] | None) -> AvoidanceRows:
-        """At most ROWS rows of a motion, and those of its greatest speed and deviation."""
+        """At most ROWS rows of a motion, and those of its maximum speed and deviation."""
         kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))
         kept = kept if deviations is None else np.union1d(kept, [np.argmax(deviations[0])])
         times = np.union1d(timed.t[kept], [self._fastest_time(timed)])
@@ -245,14 +244,14 @@ class AvoidanceTask:
         )
 
     def _fastest_time(self, timed: Timed) -> float:
-        """When a joint comes nearest to its greatest speed."""
+        """When a joint comes nearest to its maximum speed."""
         curve = timed.curve
         j = int(np.argmax(timed.greatest[0] / self.limits.speed))
         return max(curve.of_joint(curve.velocity, j, sign).peak() for sign in (1.0, -1.0))[1]
 
 
 @dataclass(frozen=True, eq=False)
-class _ToolWay:
+class _ToolPath:
     """The way of the tool on a move of the joints."""
 
     motion: Motion
@@ -263,7 +262,7 @@ class _ToolWay:
 
 
 def speed_ratio(velocity: Reals, limits: JointLimits) -> Reals:
-    """Greatest ratio of a joint's speed to its limit (N,), of velocities (N, 6) in rad/s; NaN where unknown."""
+    """Largest ratio of a joint's speed to its limit (N,), of velocities (N, 6) in rad/s; NaN where unknown."""
     ratio: Reals = np.abs(velocity / limits.speed).max(axis=1)
     return ratio
 
@@ -338,15 +337,13 @@ def path_summary(
         jumps=tuple(
             Jump(jump.t, jump.joint, float(np.degrees(jump.angle))) for jump in (followed.jumps if followed else ())
         ),
-        max_joint_speed_deg_s=None
-        if found.greatest_speed is None
-        else tuple(shown(robot, found.greatest_speed).tolist()),
-        max_joint_speed_ratio=_ratio(found.greatest_speed, limits.speed),
-        max_joint_acceleration_ratio=_ratio(found.greatest_acceleration, limits.acceleration),
+        max_joint_speed_deg_s=None if found.max_speed is None else tuple(shown(robot, found.max_speed).tolist()),
+        max_joint_speed_ratio=_ratio(found.max_speed, limits.speed),
+        max_joint_acceleration_ratio=_ratio(found.max_acceleration, limits.acceleration),
         joint_speed_bounded=found.speed_bounded,
         velocity_check_deg_s=float(np.degrees(found.velocity_check)),
         collisions=_stretches(motion, contacts),
-        clearance=least_clearance(along),
+        clearance=min_clearance(along),
         no_way=motion.no_way,
         fastest_s=avoided.fastest_s,
         avoidance=avoided.tried,
@@ -396,8 +393,8 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
     thresholds = NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
-    wanted, limits = wanted_of(robot, settings), limits_of(robot, settings)
-    near, scene_file = wanted.near, study.scene(name, "trajectory")
+    required, limits = proof_requirements(robot, settings), limits_of(robot, settings)
+    near, scene_file = required.near, study.scene(name, "trajectory")
     scene = load_scene(scene_file) if scene_file else None
     surroundings = Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
@@ -411,7 +408,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
     paths: list[PathSummary] = []
     programs: list[ProgramFiles] = []
     skipped: list[PathNotFollowed] = []
-    for each in listed_motions(file, planning, wanted, settings.checks_per_sample):
+    for each in listed_motions(file, planning, required, settings.checks_per_sample):
         motion = each.motion
         if motion is None:
             stops = each.ends.t if each.ends else None

@@ -19,16 +19,16 @@ from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
     Clearances,
     ClearUntil,
-    LeastClearance,
+    MinClearance,
     PairTouches,
 )
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning.motion_faults import (
     AccelerationTooGreatIfAssumed,
-    GreatestRates,
     Interval,
     LimitCause,
     LimitCheck,
+    MaxRates,
     PathOutOfReach,
     RateCause,
     RateCheck,
@@ -41,7 +41,7 @@ from er3a.planning.motion_faults import (
     singular_events,
     unreachable,
 )
-from er3a.planning.path_verdicts import PATH_VERDICTS, PathVerdict
+from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import Undecided
@@ -63,9 +63,9 @@ class Judgement:
     fast : where a joint exceeds a limit of speed, acceleration or jerk
     undecided : where the bounds leave something open
     times, q, velocity, acceleration : (N,) s and (N, n) in rad, rad/s, rad/s^2 at all points of the table
-    greatest_speed, greatest_acceleration : (n,), rad/s and rad/s^2; None where they have no bound
+    max_speed, max_acceleration : (n,), rad/s and rad/s^2; None where they have no bound
     speed_bounded : False where the exact path needs a joint speed without bound
-    velocity_check : rad/s, greatest difference between velocities through the Jacobian and by differences of angles
+    velocity_check : rad/s, largest difference between velocities through the Jacobian and by differences of angles
     """
 
     verdict: PathVerdict
@@ -78,15 +78,15 @@ class Judgement:
     q: Reals
     velocity: Reals
     acceleration: Reals
-    greatest_speed: Reals | None
-    greatest_acceleration: Reals | None
+    max_speed: Reals | None
+    max_acceleration: Reals | None
     speed_bounded: bool
     velocity_check: float
 
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Faults of a motion, and its greatest speeds and accelerations (n,), if any are known."""
+    """Faults of a motion, and its maximum speeds and accelerations (n,), if any are known."""
 
     events: list[SingularEvent]
     limits: list[Interval[LimitCause]]
@@ -125,8 +125,8 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
         q=q,
         velocity=velocity,
         acceleration=acceleration,
-        greatest_speed=found.greatest[0] if bounded and found.greatest else None,
-        greatest_acceleration=found.greatest[1] if bounded and found.greatest else None,
+        max_speed=found.greatest[0] if bounded and found.greatest else None,
+        max_acceleration=found.greatest[1] if bounded and found.greatest else None,
         speed_bounded=bool(bounded),
         velocity_check=_velocity_check(motion),
     )
@@ -149,7 +149,7 @@ def _verdict(found: _Found, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
 def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSingular, limits: JointLimits) -> _Found:
     """Faults found in one run through the motion, whose parts are made while they are wanted."""
     singular = SingularCheck(robot, near) if closed_form_missing(robot) is None else None
-    within, greatest = LimitCheck(robot), GreatestRates(robot.joints)
+    within, greatest = LimitCheck(robot), MaxRates(robot.joints)
     rates = [RateCheck(limit) for limit in limits.rates]
     for part in motion.parts():
         within.add(part)
@@ -255,12 +255,12 @@ def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
     return min(verdicts, key=PATH_VERDICTS.index)
 
 
-def least_clearance(along: ClearanceAlong) -> LeastClearance | None:
+def min_clearance(along: ClearanceAlong) -> MinClearance | None:
     """Where the arm comes nearest to anything; None where nothing could be measured."""
     least = along.least
     if least < 0 or (pair := along.pair[least]) is None:
         return None
-    return LeastClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
+    return MinClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
 
 
 def clear_until(
@@ -286,7 +286,7 @@ def clear_until(
 
     def beyond(t: Reals) -> Reals:
         """By how much (k,), m, more than the margin is kept at times (k,)."""
-        spare = bodies.least(motion.joints(t))[0] - margin
+        spare = bodies.min_distance(motion.joints(t))[0] - margin
         return np.minimum(spare, (apart(t) - kept).min(axis=1)) if joined.size else spare
 
     stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
@@ -310,7 +310,7 @@ def clear_until(
     else:
         return None
     pose, q = motion.tool(np.array([end]))[0], motion.joints(np.array([end, first]))
-    touching = bodies.surface_points(q[1], int(bodies.least(q[1:])[1][0])).mean(axis=0)
+    touching = bodies.surface_points(q[1], int(bodies.min_distance(q[1:])[1][0])).mean(axis=0)
     return ClearUntil(
         1000 * margin,
         end,

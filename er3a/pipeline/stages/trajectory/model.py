@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
+from er3a.by_value import Finding
 from er3a.collision.pairs import Pair, PairOverlaps, PairTooNear
-from er3a.findings import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
@@ -19,9 +19,8 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.avoidance.strategy_names import StrategyName
 from er3a.planning.motion_faults import LimitCause, PathOutOfReach, RateCause
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.tool_proof import Undecided
 from er3a.planning.way_around import NoWayAround
 
@@ -168,7 +167,7 @@ class BodiesOverlap:
 
     @property
     def depth_mm(self) -> float:
-        """The greatest overlap of all."""
+        """The largest overlap of all."""
         return max(each.depth_mm for each in self.touches)
 
 
@@ -184,7 +183,7 @@ class Stretch(Generic[CauseT]):
 
 
 @dataclass(frozen=True)
-class LeastClearance:
+class MinClearance:
     """Where a path comes nearest to its surroundings or the arm to itself; negative by the depth of an overlap."""
 
     least_mm: float
@@ -199,7 +198,7 @@ class ClearUntil:
 
     Attributes
     ----------
-    xyz_mm, rpy_deg : of the tool in the base frame; q_deg : in mm where a joint slides
+    xyz_mm, rpy_deg : of the tool in the base frame; q_deg : in mm for a prismatic joint
     contact_mm : where the first bodies touch, further on
     """
 
@@ -265,8 +264,8 @@ class PathSummary:
     too_fast : where a joint exceeds a limit of speed, acceleration or jerk
     undecided : where the bounds between the poses that are solved leave something open
     max_joint_speed_deg_s, max_joint_speed_ratio, max_joint_acceleration_ratio : None where speeds have no bound; speeds
-        of joints that slide (``sliding``, from 1) in mm/s
-    velocity_check_deg_s : greatest difference of joint velocities by the Jacobian and by differences of angles
+        of prismatic joints (``sliding``, from 1) in mm/s
+    velocity_check_deg_s : largest difference of joint velocities by the Jacobian and by differences of angles
     clearance : None where none could be measured
     no_way : why no motion was planned, of one that is to be
     clear_until : how far it could be used; None where it does not collide, or keeps the margin nowhere
@@ -302,7 +301,7 @@ class PathSummary:
     joint_speed_bounded: bool
     velocity_check_deg_s: float
     collisions: tuple[Stretch[BodiesOverlap], ...]
-    clearance: LeastClearance | None
+    clearance: MinClearance | None
     no_way: NoWayAround | None
     fastest_s: float | None
     avoidance: tuple[TriedStrategy, ...]

@@ -26,11 +26,11 @@ from er3a.planning.class_follow import PathEndsError, follow_by_class
 from er3a.planning.commands import Built, Command, CommandSource, PlanCommand, build
 from er3a.planning.follow import Followed
 from er3a.planning.moves import JointMove
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.sequences import JointSequence
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
-from er3a.planning.tool_proof import ToolProof, Wanted, follow_and_prove
+from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
 from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
 from er3a.program_check.check_program import CheckOptions, ProgramPart, check_program, parts_of
 from er3a.programs.languages import read_program
@@ -133,13 +133,13 @@ def motion_of(
     checks_per_sample: int,
     source: CommandSource,
     ends: Mapping[str, Reals],
-    wanted: Wanted,
+    required: ProofRequirements,
     *,
     task: PlanningTask | None = None,
 ) -> Motion:
     """Plan a path, and follow it if it is one of the tool; ``ends`` as for :func:`er3a.planning.commands.build`.
 
-    ``wanted`` is what is to be settled between the poses that are solved; ``task`` is for motions to be planned.
+    ``required`` is what is to be settled between the poses that are solved; ``task`` is for motions to be planned.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def motion_of(
         return _joint_motion(robot, entry, replace(built, joints=move), move, samples, checks)
     try:
         even = np.linspace(0.0, built.duration, FOLLOWED_AT)
-        followed, proof = follow_and_prove(robot, path, even, wanted, built.q_start, built.start_slot)
+        followed, proof = follow_and_prove(robot, path, even, required, built.q_start, built.start_slot)
     except PoseError:
         branch = getattr(entry, "start_branch", None)
         problem = f"'{branch}' has no solution at the start pose"
@@ -264,9 +264,9 @@ def near_singular(settings: TrajectorySettings) -> NearSingular:
     return NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
 
 
-def wanted_of(robot: Robot, settings: TrajectorySettings) -> Wanted:
+def proof_requirements(robot: Robot, settings: TrajectorySettings) -> ProofRequirements:
     """What is to be settled of paths of the tool."""
-    return Wanted(limits_of(robot, settings).rates, near_singular(settings))
+    return ProofRequirements(limits_of(robot, settings).rates, near_singular(settings))
 
 
 def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:
@@ -329,16 +329,18 @@ def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[L
     robot, settings, scene = study.robot(name), study.section(TrajectorySettings), study.scene(name, "trajectory")
     bodies = Bodies(robot, load_scene(scene) if scene else None)
     task = planning_of(robot, settings, bodies, study.seed)
-    return listed_motions(Path(study.entry(name).paths), task, wanted_of(robot, settings), checks_per_sample)
+    return listed_motions(Path(study.entry(name).paths), task, proof_requirements(robot, settings), checks_per_sample)
 
 
-def listed_motions(file: Path, task: PlanningTask, wanted: Wanted, checks_per_sample: int) -> Iterator[ListedMotion]:
+def listed_motions(
+    file: Path, task: PlanningTask, required: ProofRequirements, checks_per_sample: int
+) -> Iterator[ListedMotion]:
     """Plan the paths of a file.
 
     Parameters
     ----------
     task : the arm, what it must not meet and its limits, for motions that are to be planned
-    wanted : what is to be settled of paths of the tool
+    required : what is to be settled of paths of the tool
     checks_per_sample : points checked between two samples to begin with
 
     Raises
@@ -352,7 +354,7 @@ def listed_motions(file: Path, task: PlanningTask, wanted: Wanted, checks_per_sa
         for entry in planned_entries(task.robot, listed, source):
             ended = None
             try:
-                motion = motion_of(task.robot, entry, checks_per_sample, source, ends, wanted, task=task)
+                motion = motion_of(task.robot, entry, checks_per_sample, source, ends, required, task=task)
             except NotWristPartitionedError:
                 motion = None
             except PathEndsError as error:

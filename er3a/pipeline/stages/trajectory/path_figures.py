@@ -20,6 +20,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from er3a.collision.scene import Scene
+from er3a.kinematics.forward import skeleton
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.language import tr
@@ -29,7 +30,7 @@ from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turni
 from er3a.pipeline.stages.trajectory.model import (
     FASTEST,
     AvoidanceRows,
-    LeastClearance,
+    MinClearance,
     NearThresholds,
     PathChecks,
     PathSummary,
@@ -52,7 +53,6 @@ from er3a.pipeline.viewing.palette import (
     VERDICTS,
 )
 from er3a.pipeline.viewing.palette import JOINTS as COLOURS
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
@@ -260,7 +260,7 @@ def _small_measures(ax: Axes, rows: PathChecks) -> None:
 
 
 def _effort(ax: Axes, path: PathSummary, rows: PathChecks, motions: AvoidanceRows) -> None:
-    """The joints' greatest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
+    """The joints' largest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
     ax.plot(rows.t_s / rows.t_s[-1], rows.speed_ratio, color=HIGHLIGHT, label=tr("as programmed"))
     shown = [rows.speed_ratio]
     for name, colour, label in ((path.strategy, MODEL, tr("repaired")), (FASTEST, MUTED, tr("at its fastest"))):
@@ -342,7 +342,7 @@ def _legend(path: PathSummary) -> list[Line2D | Patch]:
 CLEARANCE_COLUMNS = 4
 ROW_HEIGHT = 1.5
 
-Measured = tuple[PathSummary, LeastClearance]
+Measured = tuple[PathSummary, MinClearance]
 
 
 @dataclass(frozen=True)
@@ -354,7 +354,7 @@ class ClearanceSection:
 
 
 def clearance_section(results: TrajectoryResults, most: int) -> ClearanceSection:
-    """What the section needs; at most so many paths, those with the least clearance, are drawn."""
+    """What the section needs; at most so many paths, those with the smallest clearance, are drawn."""
     paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
     if not paths:
         return ClearanceSection(None, [])
@@ -373,7 +373,7 @@ def clearance_section(results: TrajectoryResults, most: int) -> ClearanceSection
     return ClearanceSection(Picture(_curves(drawn, results), alt, caption), [_row(*measured) for measured in paths])
 
 
-def _row(path: PathSummary, least: LeastClearance) -> list[str]:
+def _row(path: PathSummary, least: MinClearance) -> list[str]:
     return [path.name, fixed(least.least_mm, 1), fixed(least.t_s, 3), say(least.between), str(least.poses_measured)]
 
 

@@ -8,7 +8,7 @@ from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.trajectory import advice, cause_text, event_word, path_text
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
 from er3a.pipeline.stages.trajectory.model import BodiesOverlap, PathSummary, Singularity, Stretch, TrajectoryResults
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 

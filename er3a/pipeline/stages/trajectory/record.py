@@ -12,6 +12,7 @@ from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 
 from er3a.files.scene_file import load_scene
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.say import say_all
@@ -23,7 +24,6 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import LABEL
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, write_recording
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 

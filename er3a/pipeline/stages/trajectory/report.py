@@ -201,7 +201,7 @@ def _figure(
 
 
 def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
-    """The rows that a curve needs: evenly spread ones, those at singular poses, and the greatest speeds."""
+    """The rows that a curve needs: evenly spread ones, those at singular poses, and the maximum speeds."""
     even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
     events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
     speed = np.nan_to_num(rows.speed_ratio)

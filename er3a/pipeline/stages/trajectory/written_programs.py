@@ -11,7 +11,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, ProgramFiles
 from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
-from er3a.planning.path_verdicts import PathVerdict
+from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
@@ -48,9 +48,11 @@ def written(
         times = motion.samples
         joints = motion.joints(times)
         known = np.isfinite(joints[:, 0])
-        told = tuple(HEAD + line for line in (*head, *map(head_line, unsafe)))
+        comments = tuple(HEAD + line for line in (*head, *map(head_line, unsafe)))
         poses = np.linalg.inv(robot.base) @ forward(robot, joints[known])
-        return {".csv": write_csv(times[known], shown(robot, joints[known]), poses, told, joint_columns(robot))}, unsafe
+        return {
+            ".csv": write_csv(times[known], shown(robot, joints[known]), poses, comments, joint_columns(robot))
+        }, unsafe
     command = motion.entry.command(CommandSource(), robot)
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
         timing = Times(motion.samples, np.arange(len(motion.samples)))
@@ -101,15 +103,15 @@ def program_files(
 
 def _repair(robot: Robot, motion: Motion, rows: AvoidanceRows, language: LanguageName) -> Mapping[str, str]:
     """The motion that repairs a path by suffix: all rows with their times as a table, else as joint moves."""
-    told = f"path {motion.entry.name} for {ascii_text(robot.title)}, repaired: {rows.strategy[0]}"
+    comment = f"path {motion.entry.name} for {ascii_text(robot.title)}, repaired: {rows.strategy[0]}"
     q = meant(robot, rows.q_deg)
     if language == "csv":
         poses = np.linalg.inv(robot.base) @ forward(robot, q)
-        return {".csv": write_csv(rows.t_s, rows.q_deg, poses, (HEAD + told,), joint_columns(robot))}
+        return {".csv": write_csv(rows.t_s, rows.q_deg, poses, (HEAD + comment,), joint_columns(robot))}
     kept = needed_points(q, STRAIGHT)
     command = JointTableCommand(q[kept], Times(rows.t_s[kept], np.arange(len(kept))))
     made = listing_of(command, robot, q[0], repair_name(motion.entry.name), motion.entry.title)
-    head = (told, f"joint moves between points of the checked motion, within {np.degrees(STRAIGHT):.3f} deg of it")
+    head = (comment, f"joint moves between points of the checked motion, within {np.degrees(STRAIGHT):.3f} deg of it")
     return write_program(made.listing, language, WriteOptions(robot, q[0], notes=made.findings, head=head)).files
 
 

@@ -337,7 +337,7 @@ def set_summaries(
         counts = counts_of(check for check in checks if check.reference_set == references.name)
         weighing = counts.independent, counts.consistency
         failed, total = (sum(getattr(each, name) for each in weighing) for name in ("failed", "total"))
-        diagnosis = diagnoses.get(references.name)  # there is none of arms with joints that slide or are coupled
+        diagnosis = diagnoses.get(references.name)  # none of arms with prismatic or coupled joints
         conclusion = diagnosis.conclusion if diagnosis else None
         found.append(
             SetSummary(

@@ -421,7 +421,7 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEviden
 
 
 def is_turning(robot: Robot) -> bool:
-    """Whether the arm is one of those that diagnosis and evidence are made for: joints that turn, one for each row."""
+    """Whether the arm is one of those that diagnosis and evidence are made for: revolute joints, one for each row."""
     return not robot.sliding.any() and robot.coupling is None
 
 

@@ -80,13 +80,13 @@ OTHER_TEXTS = {
 
 @dataclass(frozen=True)
 class EntryCell:
-    """An entry in the table: its name, its value, a mark and a class for its status, and what to tell of it."""
+    """An entry in the table: its name, its value, a mark and a class for its status, and its title."""
 
     entry: str
     value: str
     status: Status
     mark: str
-    told: str
+    title: str
 
 
 @dataclass(frozen=True)
@@ -239,8 +239,8 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
 def _cell(each: EntryEvidence | None) -> EntryCell | None:
     if each is None or each.value is None:
         return None
-    told = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
-    return EntryCell(each.entry, _value(each), each.status, MARKS[each.status], told)
+    title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
+    return EntryCell(each.entry, _value(each), each.status, MARKS[each.status], title)
 
 
 def _status(status: Status) -> str:
@@ -271,18 +271,18 @@ def _off_row(each: EntryEvidence) -> list[str]:
     """A contradicted entry: what is stated, the middle of what evidence leaves open with half its width, and how far
     apart they are."""
     link = Markup('<a href="#entry-{0}">{0}</a>').format(each.entry)
-    told = [_tool_off(each), joined(each.by, ", ") or "–"]
+    last_cells = [_tool_off(each), joined(each.by, ", ") or "–"]
     if each.value is None or each.interval is None:
-        return [link, _value(each), "–", "–", *told]
+        return [link, _value(each), "–", "–", *last_cells]
     if column_of(each.entry) == "direction":
-        return [link, _signed(each.value, 0), _signed(each.interval[0], 0), tr("turns the other way"), *told]
+        return [link, _signed(each.value, 0), _signed(each.interval[0], 0), tr("turns the other way"), *last_cells]
     stated = with_unit(_value(each), each.unit)
     if each.at_least:
-        return [link, stated, _interval(each), "–", *told]
+        return [link, stated, _interval(each), "–", *last_cells]
     low, high = each.interval
     middle, half = (low + high) / 2, (high - low) / 2
     supported = with_unit(f"{fixed(middle, 2)} ± {fixed(half, 2)}", each.unit)
-    return [link, stated, supported, with_unit(_signed(each.value - middle, 2), each.unit), *told]
+    return [link, stated, supported, with_unit(_signed(each.value - middle, 2), each.unit), *last_cells]
 
 
 def _signed(value: float, decimals: int) -> str:

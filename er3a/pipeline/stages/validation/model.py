@@ -421,7 +421,7 @@ class Conflict:
     statements: tuple[Statement, ...]
 
 
-Six = tuple[float, ...]
+Floats = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -444,16 +444,16 @@ class CorrectedTable:
     """A Denavit-Hartenberg table without its most likely fault, in m and rad; ``base`` and ``flange`` (4, 4)."""
 
     convention: Literal["standard", "modified"]
-    a: Six
-    alpha: Six
-    beta: Six
-    d: Six
-    direction: Six
-    offset: Six
-    lower: Six
-    upper: Six
-    base: tuple[Six, ...]
-    flange: tuple[Six, ...]
+    a: Floats
+    alpha: Floats
+    beta: Floats
+    d: Floats
+    direction: Floats
+    offset: Floats
+    lower: Floats
+    upper: Floats
+    base: tuple[Floats, ...]
+    flange: tuple[Floats, ...]
 
 
 @dataclass(frozen=True)

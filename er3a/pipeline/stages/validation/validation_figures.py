@@ -12,7 +12,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, TooSmallToTell
-from er3a.kinematics.forward import forward, frames
+from er3a.kinematics.forward import forward, frames, skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.diagnosis import both, level
 from er3a.pipeline.messages.language import N_, own_title, tr
@@ -33,7 +33,6 @@ from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.references.quantities import nearest_on_axis, point_of
 from er3a.robots.robot import Robot
 

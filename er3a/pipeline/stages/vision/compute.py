@@ -46,6 +46,7 @@ from er3a.pipeline.stages.vision.model import (
     NotGraspedObject,
     ObjectResult,
     OffsetResult,
+    PathRows,
     PoseEstimate,
     SampleRows,
     TableResult,
@@ -55,7 +56,6 @@ from er3a.pipeline.stages.vision.model import (
     ViewToAdd,
     VisionResults,
     VisionSummary,
-    WayRows,
 )
 from er3a.pipeline.study import Study
 from er3a.planning.timing import JointLimits
@@ -371,7 +371,7 @@ def compute(study: Study, name: str) -> VisionResults:
         verdict: Verdict[Found] = Verdict("fail", CalibrationImpossible(error.finding))
         level = study.section(VisionSettings).least_success
         summary = VisionSummary(verdict, (), task_file.title, title, level, None, ())
-        empty = (SampleRows.empty(), ErrorMapRows.empty(), WayRows.empty(), GraspPrograms.empty(), CornerRows.empty())
+        empty = (SampleRows.empty(), ErrorMapRows.empty(), PathRows.empty(), GraspPrograms.empty(), CornerRows.empty())
         return VisionResults(summary, *empty)
     picture = None if head.setup == "eye_to_hand" else np.radians(task_file.picture_deg or [])
     camera = _camera_at(robot, found, picture)
@@ -424,7 +424,7 @@ def compute(study: Study, name: str) -> VisionResults:
         summary,
         sample_rows(found, len(robot.lower)),
         error_map(found, map_task),
-        WayRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
+        PathRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
         GraspPrograms.stacked(
             grasp_programs(robot, entry.name, np.radians(task_file.home_deg), plan.chosen, motions.programs)
             for entry, plan, _ in planned
@@ -588,7 +588,7 @@ def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) 
     )
 
 
-def _ways(name: str, chosen: ChosenGrasp) -> WayRows:
+def _ways(name: str, chosen: ChosenGrasp) -> PathRows:
     """The whole motion, each point once."""
     parts: list[str] = []
     times, rows, now = [], [], 0.0
@@ -600,7 +600,7 @@ def _ways(name: str, chosen: ChosenGrasp) -> WayRows:
         rows.append(q[first:])
         now += leg.duration
     part = np.array(parts, object)
-    return WayRows(
+    return PathRows(
         target=np.full(len(part), name, object),
         part=part,
         step=np.concatenate([np.arange((part == each).sum()) for each in PARTS]),

@@ -2,17 +2,40 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from er3a.files.robot_file import Text
-from er3a.files.vision_inputs import vision_files
-from er3a.files.yaml_file import StrictModel
+from er3a.files.yaml_file import StrictModel, read_yaml
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.stage import Stage, StudyFiles
+
+
+def vision_files(path: str | Path) -> list[Path]:
+    """A vision file, its calibration set, and the tables and images of that."""
+    own = Path(path)
+    calibration = read_yaml(own).get("calibration")
+    return [own, *(calibration_files(own.parent / calibration) if isinstance(calibration, str) else [])]
+
+
+def calibration_files(path: str | Path) -> list[Path]:
+    """A calibration set's own file and the tables and images that it names."""
+    path = Path(path)
+    head: dict[str, Any] = read_yaml(path)
+    streams = head.get("streams")
+    named = [head.get("samples"), head.get("touched")]
+    named += [streams.get("flange"), streams.get("target")] if isinstance(streams, dict) else []
+    files = [path, *(path.parent / name for name in named if isinstance(name, str))]
+    if head.get("images") is not None and isinstance(head.get("samples"), str):
+        table = path.parent / head["samples"]
+        if table.is_file():
+            with table.open(encoding="utf-8-sig", newline="") as lines:
+                files += [table.parent / row["image"] for row in csv.DictReader(lines) if row.get("image")]
+    return files
 
 
 class VisionSettings(StrictModel):
@@ -20,7 +43,7 @@ class VisionSettings(StrictModel):
 
     ``least_singular_value`` : of the Jacobian with lengths divided by the wrist's reach. ``least_success`` : the
     probability of success below which an object is not graspable. ``map_cells`` : cells across the map of errors.
-    ``line_speed_mm_s`` : the tool's greatest speed on approach and retreat. Limits of the joints' rates, and the
+    ``line_speed_mm_s`` : the tool's maximum speed on approach and retreat. Limits of the joints' rates, and the
     languages in which grasps are written as programs, are those of ``trajectory``.
     """
 

@@ -109,7 +109,7 @@ class MethodResult:
 
     Attributes
     ----------
-    beyond : the greatest difference of its six numbers, in half widths of the 95 % interval
+    beyond : the largest difference of its six numbers, in half widths of the 95 % interval
     """
 
     method: MethodName
@@ -379,7 +379,7 @@ class ErrorMapRows(Table):
 
 
 @dataclass(frozen=True, eq=False)
-class WayRows(Table):
+class PathRows(Table):
     """Joint angles along the way to each object grasped, and away from it."""
 
     target: Texts = column("name of the object")
@@ -405,7 +405,7 @@ class VisionResults(Results[VisionSummary]):
 
     samples: SampleRows
     error_map: ErrorMapRows
-    ways: WayRows
+    ways: PathRows
     programs: GraspPrograms
     corners: CornerRows
 

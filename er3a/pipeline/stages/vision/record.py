@@ -135,14 +135,14 @@ def _sampled(rows: SampleRows, home: Reals) -> Run:
 def _grasped(results: VisionResults, each: ObjectResult, home: Reals) -> Run:
     """The way to an object and back."""
     ways = results.ways.take(results.ways.target == each.name)
-    told = f"{each.grasp.grasp}, success {100 * each.grasp.probability:.1f} %" if each.grasp else say(each.refusal)
+    outcome = f"{each.grasp.grasp}, success {100 * each.grasp.probability:.1f} %" if each.grasp else say(each.refusal)
     q = np.concatenate([home[None], np.radians(ways.q_deg)]) if len(ways) else np.full((1, len(home)), np.nan)
     return Run(
         name=each.name,
-        text=f"# {escaped(each.name)}\n\n{told}",
+        text=f"# {escaped(each.name)}\n\n{outcome}",
         t=STEP_S * np.arange(len(q), dtype=float),
         q=q,
-        outcome=told,
+        outcome=outcome,
         status="plain" if each.grasp else "caution",
         pause_s=SAMPLE_S,
     )

@@ -48,7 +48,7 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 from er3a.programs.languages import titles_unwritten
 from er3a.vision.table_corrections import NoCorrections
 
-LEAST_RANGE = 0.02  # of the greatest value, by which a map's colours go beyond its values
+LEAST_RANGE = 0.02  # of the largest value, by which a map's colours go beyond its values
 MOST_IMAGES = 9
 WIDEST_PX = 480
 ARROW_PX = 30.0
@@ -80,7 +80,7 @@ def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
 
 
 def image_picture(rows: CornerRows, folder: Path) -> Picture:
-    """The images with the greatest residuals: corners detected, and arrows to where arm and calibration put them."""
+    """The images with the largest residuals: corners detected, and arrows to where arm and calibration put them."""
     off = rows.by_arm_px - rows.seen_px
     size = {
         name: float(np.sqrt((off[rows.image == name] ** 2).sum(axis=1).mean())) for name in dict.fromkeys(rows.image)
@@ -177,7 +177,7 @@ def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Pictur
 
 
 def _range(values: Reals, low: str, high: str) -> dict[str, str]:
-    """The least and greatest, to be filled in; a dash where there are none."""
+    """The smallest and largest, to be filled in; a dash where there are none."""
     if not values.size:
         return {low: "–", high: "–"}
     return {low: fixed(float(values.min()), 2), high: fixed(float(values.max()), 2)}

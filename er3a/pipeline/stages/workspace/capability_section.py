@@ -16,6 +16,7 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.geometry.transforms import rpy_along
+from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, own_title, tr
@@ -43,7 +44,6 @@ from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, MUTED
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
@@ -54,7 +54,7 @@ def best_text(summary: WorkspaceSummary, placement: PlacementSummary) -> str:
     if not placement.named_places:
         return box_text(summary)
     place = placement.best
-    told = [
+    texts = [
         box_text(summary),
         tr("Collisions are judged at samples.") if place.status == "proven" else "",
         tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
@@ -62,7 +62,7 @@ def best_text(summary: WorkspaceSummary, placement: PlacementSummary) -> str:
         _nearest_bodies(place),
         tr("The box itself does not count as an obstacle."),
     ]
-    return joined(told, " ")
+    return joined(texts, " ")
 
 
 def _nearest_limit(place: PlaceSummary) -> str:
@@ -104,7 +104,7 @@ def place_row(name: str, place: PlaceSummary, capability: CapabilitySummary) -> 
         branch = tr("with joints {joints} at several values", joints=numbers(capability.held_joints))
         branch = branch if capability.held_joints else tr("at several arm angles")
     elif place.branch is None:
-        branch = tr("changes within the box") if capability.named_branches else tr("not told: branches have no names")
+        branch = tr("changes within the box") if capability.named_branches else tr("not known: branches have no names")
     elif place.status == place.branch_status:
         branch = branch_word(place.branch)
     else:
@@ -324,7 +324,7 @@ def _draw_arm(axes: Axes, robot: Robot, frame: SectionFrame, origin: Reals) -> N
 
 
 def _raster(points: Reals, steps: list[float], percent: Singles, proven: Flags) -> tuple[list[Reals], Reals, Flags]:
-    """Edges of the raster's columns and rows (m), the greatest value in each of its cells (proven ones first; -1: none
+    """Edges of the raster's columns and rows (m), the largest value in each of its cells (proven ones first; -1: none
     there), and whether one is proven."""
     low = points.min(axis=0)
     index = tuple(np.floor((points - low) / steps + 1e-3).astype(int).T)

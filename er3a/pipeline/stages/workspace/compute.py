@@ -128,7 +128,7 @@ def judge(
     ----------
     hull_volume : m^3
     touched : number of touched cells; unseen : cells that more samples would touch
-    proof : whether there is a proof that settles most; undecided_percent : what it leaves undecided, where that is told
+    proof : whether there is a proof that settles most; undecided_percent : what it leaves undecided, where known
     """
     if hull_volume == 0:
         return Verdict("caution", Flat())

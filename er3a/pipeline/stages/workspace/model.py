@@ -70,7 +70,7 @@ class VoidUnexpected:
 
 @dataclass(frozen=True)
 class VoidUncertain:
-    """An enclosed void away from the shoulder that only samples tell of."""
+    """An enclosed void away from the shoulder that only samples suggest."""
 
     litres: float
     x_mm: float
@@ -171,7 +171,7 @@ class HullTriangles(Table):
 
 @dataclass(frozen=True, eq=False)
 class ProofCells(Table):
-    """Cells of the proof: rings about axis 1, or bars along a first joint that slides (``proof.bars`` of the summary,
+    """Cells of the proof: rings about axis 1, or bars along a first prismatic joint (``proof.bars`` of the summary,
     with the frame); of these rho is x, and 360 deg are their length."""
 
     rho_m: Reals = vector("rho_{}_m", "inner and outer distance from axis 1", parts="01")
@@ -230,7 +230,7 @@ class VoidTriangles(Table):
 
 @dataclass(frozen=True, eq=False)
 class CapabilityCells(Table):
-    """Reached cells of the section, by sector of azimuth; or bars along a first joint that slides (``bar_m`` of the
+    """Reached cells of the section, by sector of azimuth; or bars along a first prismatic joint (``bar_m`` of the
     summary), of which rho is x, and 360 deg are their length."""
 
     rho_m: Reals = column("distance of the cell's centre from axis 1")
@@ -486,9 +486,9 @@ class PlaceSummary:
     ----------
     branch : configuration that serves it all, None if it changes within the box or has no name
     manipulability_m3 : least over the box and its directions; manipulability_ratio : of the arm's best
-    limit_margin_deg : least distance of joints, and of sums of joints, from their limits, None without one branch, or
-        without joints of less than a full turn
-    clearance_mm : least distance of the arm from scene and itself over the samples, None if nothing can meet
+    limit_margin_deg : smallest distance of joints, and of sums of joints, from their limits, None without one branch,
+        or without joints of less than a full turn
+    clearance_mm : smallest distance of the arm from scene and itself over the samples, None if nothing can meet
     clearance_pair : the bodies that are so near each other
     limit_joint : the joint (from 1) that comes so near its limit
     room_down_m, room_up_m : how far the box can be moved towards -x, -y, -z and +x, +y, +z, one at a time, as good

@@ -156,7 +156,7 @@ def _change_rows(summary: WorkspaceSummary) -> list[list[str]]:
 
 
 def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
-    told = [
+    texts = [
         tr(
             "Cells are bars along the slide. What is white on the right is proven unreachable all along it; blank "
             "cells on the left were merely not sampled."
@@ -169,11 +169,11 @@ def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
     ]
     enclosed = summary.enclosed_voids
     if enclosed and enclosed[0].holds_shoulder:
-        told.append(tr("The largest enclosed void surrounds the shoulder."))
+        texts.append(tr("The largest enclosed void surrounds the shoulder."))
     elif enclosed:
-        told.append(tr("The largest enclosed void is away from the shoulder."))
+        texts.append(tr("The largest enclosed void is away from the shoulder."))
     if drawn:
-        told.append(
+        texts.append(
             tr(
                 "Green are the manufacturer's labels of the wrist centre: extents touch its border, corners are single "
                 "configurations."
@@ -181,7 +181,7 @@ def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
         )
     checked, inside = number(summary.proof.points_checked), summary.proof.points_in_empty_cells
     if inside:
-        told.append(
+        texts.append(
             tr(
                 "Of {checked} recorded samples, {inside} lie in a cell proven unreachable.",
                 checked=checked,
@@ -189,8 +189,8 @@ def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
             )
         )
     else:
-        told.append(tr("Of {checked} recorded samples, none lies in a cell proven unreachable.", checked=checked))
-    return joined(told, " ")
+        texts.append(tr("Of {checked} recorded samples, none lies in a cell proven unreachable.", checked=checked))
+    return joined(texts, " ")
 
 
 def _top_caption(robot: Robot) -> str:

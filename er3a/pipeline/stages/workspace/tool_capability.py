@@ -274,7 +274,7 @@ def _placed(
 
     Parameters
     ----------
-    best : the arm's greatest manipulability, m^3
+    best : the arm's largest manipulability, m^3
     """
     asked = plan.asked
     if not asked.in_cone(np.zeros((1, 3)), task.axis, task.half_angle, task.step).shape[1]:
@@ -436,7 +436,7 @@ def _placement_summary(
     scene: Scene | None,
     margin: float,
 ) -> PlacementSummary:
-    """The placement as the summary has it; ``best`` is the arm's greatest manipulability, m^3."""
+    """The placement as the summary has it; ``best`` is the arm's largest manipulability, m^3."""
     places = placement.places
     return PlacementSummary(
         scene=scene.title if scene else None,
@@ -498,9 +498,9 @@ def _arms_at(within: Robot, free: Free, task: Task, asked: AskedOrientations, pl
 
 
 def _with_nearest(place: PlaceSummary, bodies: Bodies, q: Reals) -> PlaceSummary:
-    """A place with the least clearance of its arms (m, joints), rad, the pair that has it, and the joint nearest to a
-    limit."""
-    least, pair = bodies.least(q)
+    """A place with the smallest clearance of its arms (m, joints), rad, the pair that has it, and the joint nearest to
+    a limit."""
+    least, pair = bodies.min_distance(q)
     nearest = int(least.argmin()) if len(least) else -1
     if nearest >= 0 and np.isfinite(least[nearest]):
         place = replace(

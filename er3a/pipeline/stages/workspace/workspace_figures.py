@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from er3a.collision.scene import Scene
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import forward, skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import word
@@ -39,7 +39,6 @@ from er3a.pipeline.stages.workspace.model import (
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
-from er3a.pipeline.viewing.skeleton import skeleton
 from er3a.robots.robot import Robot
 
 DENSITY = "YlGnBu"

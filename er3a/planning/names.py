@@ -1,4 +1,4 @@
-"""What can be said of a path."""
+"""The names of verdicts on a path and of strategies, apart from what finds them, for settings and results."""
 
 from __future__ import annotations
 
@@ -20,3 +20,5 @@ PATH_VERDICTS: tuple[PathVerdict, ...] = get_args(PathVerdict)
 """The gravest first."""
 NOT_TO_BE_RUN = PATH_VERDICTS[: PATH_VERDICTS.index("undecided")]
 """Of paths that no arm should run as they are; others pass near singular poses, or leave something open."""
+
+StrategyName = Literal["slow", "branch", "via_shift", "via_tilt", "damped", "detour", "stop", "planned"]
