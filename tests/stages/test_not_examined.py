@@ -94,8 +94,8 @@ def test_a_path_that_collides_passes_by_no_allowed_contact_missing_shape_or_miss
     (tmp_path / "paths.yaml").write_text(yaml.safe_dump(content | {"paths": [line]}), encoding="utf-8")
     entry = {"paths": str(tmp_path / "paths.yaml")}
     scene = yaml.safe_load(Path("data/scenes/table_and_post.yaml").read_text(encoding="utf-8"))
-    pairs = [f"link_{k}" for k in range(1, 7)]
-    scene["collision"] = {"allow": [{"pair": [link, "table"], "reason": "A test"} for link in pairs]}
+    pairs = [[f"link_{k}", solid] for solid in ("table", "post", "lamp", "floor") for k in range(1, 7)]
+    scene["collision"] = {"allow": [{"pair": pair, "reason": "A test"} for pair in pairs]}
     (tmp_path / "allowing.yaml").write_text(yaml.safe_dump(scene), encoding="utf-8")
     robot = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
     robot["envelopes"]["capsules"] = robot["envelopes"]["capsules"][:2]
@@ -104,7 +104,7 @@ def test_a_path_that_collides_passes_by_no_allowed_contact_missing_shape_or_miss
     for subject, names, more, settings in (
         (None, (), {}, {}),
         ("obstacles", (), {}, {"scene": None}),
-        ("allowed_contacts", tuple(f"{link}/table" for link in pairs), {}, {"scene": str(tmp_path / "allowing.yaml")}),
+        ("allowed_contacts", tuple(map("/".join, pairs)), {}, {"scene": str(tmp_path / "allowing.yaml")}),
         ("uncovered_links", ("link_2", "link_3", "link_4", "link_6"), {"file": str(tmp_path / f"{ROBOT}.yaml")}, {}),
     ):
         results = trajectory(changed(study, entry | more, trajectory=quick | settings), ROBOT)
