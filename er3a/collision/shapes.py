@@ -4,7 +4,8 @@ The shapes of an arm's links are those that its file gives, else capsules guesse
 shape gives them all: a link without one has none. Links are often left without a shape because the shapes of their
 neighbours cover them (frames in a wrist, rings between two housings), and a capsule guessed along the table's lengths
 lies inside what the file draws around the next joint, so that the two would overlap in every pose. Which links have
-none is said (``ArmShapes.bare``), because nothing that they hit is seen.
+none is said (``ArmShapes.bare``), because nothing that they hit is seen; those whose lengths reach out of their
+neighbours' shapes are no frames in a wrist, and no verdict passes without them (``ArmShapes.uncovered``).
 
 The guess puts a capsule around each straight piece of a link, along its joint's axis and across to the next. Its
 radius is a share of the arm's size (the sum of all link lengths): 5.5 % at the shoulder, falling to 3 % at the wrist,
@@ -18,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout, cylinder_points
+from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout, cylinder_points, distances_from_hull
 from er3a.collision.pairs import BASE, ShapesAssumed, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts
@@ -28,6 +29,7 @@ from er3a.robots.robot import ConvexPiece, Envelope, Grade, Robot, derived
 
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
 SHORTEST = 1e-6
+LINE_POINTS, TOUCH = 25, 1e-3  # points along a piece of a link, and m, by which they may stand out
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class ArmShapes:
     grade : how far they can be relied on: as the file grades them, ``inferred`` if it doesn't or if they are guessed
     bare : numbers of links from 0 on that a file which gives shapes gives none; () for guessed shapes, which leave out
         only links without length
+    uncovered : of these, those that reach out of the shapes of the links beside them, along the table's lengths
     """
 
     capsules: tuple[Envelope, ...]
@@ -48,6 +51,7 @@ class ArmShapes:
     given: bool
     grade: Grade
     bare: tuple[int, ...]
+    uncovered: tuple[int, ...] = ()
 
     @property
     def assumed(self) -> bool:
@@ -63,7 +67,32 @@ def arm_shapes(robot: Robot) -> ArmShapes:
     source = robot.sources.get("envelopes")
     shaped = {capsule.link for capsule in robot.envelopes} | {piece.link for piece in robot.hulls}
     bare = tuple(link for link in range(robot.rows + 1) if link not in shaped)
-    return ArmShapes(robot.envelopes, robot.hulls, True, source.grade if source else "inferred", bare)
+    grade = source.grade if source else "inferred"
+    return ArmShapes(robot.envelopes, robot.hulls, True, grade, bare, tuple(k for k in bare if _uncovered(robot, k)))
+
+
+def _uncovered(robot: Robot, link: int) -> bool:
+    """Whether points of a link, along its lengths in the table, lie outside the shapes of its two neighbours.
+
+    They are looked at in one pose: a joint between two links turns about the line on which they meet.
+    """
+    T = link_frames(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))
+
+    def placed(points: Reals, k: int) -> Reals:
+        found: Reals = points @ T[k, :3, :3].T + T[k, :3, 3]
+        return found
+
+    lines = [np.linspace(c.start, c.end, LINE_POINTS) for c in default_envelopes(robot) if c.link == link]
+    points = placed(np.concatenate([np.empty((0, 3)), *lines]), link)
+    outside = np.full(len(points), np.inf)
+    beside = {link - 1, link + 1}
+    shapes = [(c.link, np.array([c.start, c.end]), c.radius) for c in robot.envelopes if c.link in beside]
+    shapes += [(h.link, np.array(h.points), h.margin) for h in robot.hulls if h.link in beside]
+    for k, corners, radius in shapes:
+        distance = np.empty(len(points))
+        distances_from_hull(points, placed(corners, k), distance)
+        outside = np.minimum(outside, distance - radius)
+    return bool((outside > TOUCH).any())
 
 
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:

@@ -58,6 +58,12 @@ class ArmAccuracyEntry(StrictModel):
     table_length_standard_deviation_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
     table_angle_standard_deviation_deg: Annotated[float, Field(ge=0, le=10)] = 0.0
 
+    @property
+    def states_all(self) -> bool:
+        """Whether it says how well the arm repeats, and how well its table is known."""
+        table = self.table_length_standard_deviation_mm, self.table_angle_standard_deviation_deg
+        return self.repeatability_mm > 0 and max(table) > 0
+
     def accuracy(self) -> ArmAccuracy:
         """In the units of the library."""
         return ArmAccuracy(

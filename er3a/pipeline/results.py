@@ -23,7 +23,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Generic, Literal, TypeVar, get_args, get_origin
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -38,7 +38,7 @@ from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import table_types
 
 FORMAT_VERSION = 8
-BESIDE = ("unexamined", "shapes")
+BESIDE = ("unexamined", "shapes", "missed")
 """What a verdict can have beside its finding."""
 SUMMARY = "summary.json"
 CHECKSUMS = "SHA256SUMS"
@@ -52,19 +52,26 @@ class Verdict(Generic[FindingT]):
     """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
 
     ``unexamined``: pairs of bodies whose collisions were not looked at because their shapes can't be right. ``shapes``:
-    on what shapes of the arm it rests, if no document gives them.
+    on what shapes of the arm it rests, if no document gives them. ``missed``: what was not examined and may turn it.
     """
 
     status: Status
     finding: FindingT
     unexamined: tuple[Pair, ...] = ()
     shapes: ShapesAssumed | None = None
+    missed: tuple[LeftOut, ...] = ()
 
     @property
-    def findings(self) -> tuple[FindingT | PairsUnexamined | ShapesAssumed, ...]:
+    def findings(self) -> tuple[FindingT | PairsUnexamined | NoPass | ShapesAssumed, ...]:
         """What it found, then what was not looked at and what was assumed, each a sentence."""
         unexamined = (PairsUnexamined(self.unexamined),) if self.unexamined else ()
-        return (self.finding, *unexamined, *((self.shapes,) if self.shapes else ()))
+        missed = (NoPass(self.missed),) if self.missed else ()
+        return (self.finding, *unexamined, *missed, *((self.shapes,) if self.shapes else ()))
+
+    def short_of(self, missed: tuple[LeftOut, ...]) -> Verdict[FindingT]:
+        """The verdict where something that may turn it was not examined: no pass, if there is anything."""
+        status: Status = "caution" if missed and self.status == "pass" else self.status
+        return replace(self, status=status, missed=missed)
 
     def without(self, unexamined: tuple[Pair, ...]) -> Verdict[FindingT]:
         """The verdict where collisions of some pairs were not looked at: no pass, if there are any."""
@@ -165,7 +172,19 @@ LeftOutSubject = Literal[
     "sampled_places",
     "between_places",
     "placed_box",
+    "uncovered_links",
+    "allowed_contacts",
+    "arm_errors",
+    "objects_out_of_view",
+    "hidden_voids",
 ]
+
+NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
+    ("uncovered_links", "allowed_contacts", "arm_errors", "objects_out_of_view", "hidden_voids")
+)
+"""What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""
+OF_MOTIONS: frozenset[LeftOutSubject] = frozenset((*NEVER_A_PASS, "obstacles"))
+"""What no verdict on motions passes without."""
 
 
 @dataclass(frozen=True)
@@ -184,15 +203,30 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
+class NoPass:
+    """What was not examined and may turn a verdict, which therefore is no pass."""
+
+    missed: tuple[LeftOut, ...]
+    code: Literal["no_pass"] = "no_pass"
+
+
+@dataclass(frozen=True)
 class Summary:
     """What all summaries begin with; a stage's own says what its verdict can be.
 
-    ``not_examined``: what settings, inputs and limits leave out of the verdict.
+    ``not_examined``: what settings, inputs and limits leave out of the verdict. ``decisive``: subjects of these without
+    which the stage's verdict is no pass.
     """
+
+    decisive: ClassVar[frozenset[LeftOutSubject]] = NEVER_A_PASS
 
     verdict: Verdict[Any]
     figures: tuple[Figure, ...]
     not_examined: tuple[LeftOut, ...] = field(default=(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        missed = tuple(each for each in self.not_examined if each.subject in self.decisive)
+        object.__setattr__(self, "verdict", self.verdict.short_of(missed))
 
 
 SummaryT = TypeVar("SummaryT", bound=Summary)

@@ -79,6 +79,7 @@ DEVIATIONS = 6.0  # of the angle between two samples; beyond, a pair is in confl
 MOST_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
 SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
+COPY_DECIMALS = 9  # of m and of rotation matrices
 FALSE_ALARMS = 0.01  # of sound sets in which a sample is called far from the fit
 BOARD_TURNS: dict[SuspectKind, tuple[str, tuple[float, ...]]] = {  # axis of the board, and deg
     "half_turn_x": ("x", (180.0,)),
@@ -218,6 +219,14 @@ def repeated_poses(samples: CalibrationSet) -> tuple[RepeatedPose, ...]:
             apart_mm, apart_deg = 1000 * np.linalg.norm(seen[:3]), np.degrees(np.linalg.norm(seen[3:]))
             found.append(RepeatedPose(samples.names[i], samples.names[first], float(apart_mm), float(apart_deg)))
     return tuple(found)
+
+
+def _copies(samples: CalibrationSet) -> Flags:
+    """Samples (N,) equal to an earlier one in both poses, which measure nothing and would narrow intervals."""
+    rows = np.concatenate([samples.flange, samples.target], axis=1).reshape(len(samples), -1).round(COPY_DECIMALS)
+    copies = np.ones(len(samples), bool)
+    copies[np.unique(rows, axis=0, return_index=True)[1]] = False
+    return copies
 
 
 MUCH_DISTANCE, MUCH_ROTATION = 0.01, np.radians(3)  # m, rad
@@ -475,7 +484,7 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     """
     _check_determined(samples)
     angles = check_angles(samples)
-    used = angles.used.copy()
+    used = angles.used & ~_copies(samples)
     suspects: list[Suspect] = list(angles.found)
     greatest, apart = _check_determined(samples.take(used))
     refined = _fitted(samples.take(used))

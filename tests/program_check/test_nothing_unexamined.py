@@ -70,6 +70,25 @@ def axes(q) -> str:
 
 
 @pytest.mark.parametrize(
+    ("line", "followed"),
+    [
+        *((f"{name}=1", True) for name in ("$OV_PRO", "$ADVANCE", "$TIMER[2]", "$FLAG[1]", "$VEL_AXIS[3]", "$OUT[4]")),
+        *((f"{name}=1", False) for name in ("$TORQUE_AXIS", "$TECH[1].MODE", "$SINGUL_POS[1]", "$SOFTN_END[1]")),
+        *((f"{name}={{X 100,Y 0,Z 0,A 0,B 0,C 0}}", False) for name in ("$CORR_T", "$ROBROOT", "$NEW_IN_KSS_9")),
+        ("$TCP_IPO=TRUE", True),
+        ("$TCP_IPO=FALSE", False),
+        ('SET_SYSTEM_DATA("$ROBROOT", 1)', False),
+    ],
+)
+def test_system_variables_that_may_shift_motions_are_no_pass(tmp_path, line, followed):
+    """Whatever is not known to leave paths as they are; ``$CORR_T`` shifts the tool while it moves."""
+    found = check(tmp_path, krl(f"$VEL_AXIS[1]=10\nPTP {axes(HOME)}\n{line}\nPTP {axes(NEAR)}"), "a.src")
+    assert found.level in (("pass", "note") if followed else ("caution",))
+    named = {code: lines for code, lines in codes(found).items() if code in ("program_not_understood", "may_move")}
+    assert list(named.values()) == ([] if followed else [[4]])
+
+
+@pytest.mark.parametrize(
     ("name", "text"),
     [
         ("a.src", f"DEF a( )\nb( )\nEND\nDEF b( )\nPTP {axes(FAR)}\nEND\nDEF b( )\nPTP {axes(NEAR)}\nEND\n"),

@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
+from er3a.collision.shapes import arm_shapes
+from er3a.files.robot_library import load_robot
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
-from er3a.pipeline.results import LeftOut, LeftOutSubject, read_results
+from er3a.pipeline.messages.say import say, say_all
+from er3a.pipeline.results import (
+    NEVER_A_PASS,
+    OF_MOTIONS,
+    LeftOut,
+    LeftOutSubject,
+    NoPass,
+    Summary,
+    Verdict,
+    read_results,
+)
 from er3a.pipeline.stages.collision.compute import compute as collision
+from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.inverse.compute import compute as inverse
 from er3a.pipeline.stages.programs.compute import compute as programs
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as trajectory
-from er3a.pipeline.stages.trajectory.model import RESULTS
+from er3a.pipeline.stages.trajectory.model import RESULTS, TrajectorySummary
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.stages.validation.compute import compute as validation
+from er3a.pipeline.stages.vision.compute import compute as vision
 from er3a.pipeline.stages.workspace.compute import compute as workspace
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.study import Study, load_study
@@ -68,6 +83,37 @@ def test_paths_name_what_their_settings_leave_out(study, tmp_path):
     assert "jerk" not in more
     assert "strategies" not in more
     assert ("obstacles" in more) == (study.scene(ROBOT, "trajectory") is None)
+
+
+@pytest.mark.long
+def test_a_path_that_collides_passes_by_no_allowed_contact_missing_shape_or_missing_scene(study, tmp_path):
+    """The line runs into the table, which is not looked at in each of three ways."""
+    content = yaml.safe_load(Path(f"data/paths/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    (line,) = (each for each in content["paths"] if each["name"] == "line_collides")
+    del line["expect"]
+    (tmp_path / "paths.yaml").write_text(yaml.safe_dump(content | {"paths": [line]}), encoding="utf-8")
+    entry = {"paths": str(tmp_path / "paths.yaml")}
+    scene = yaml.safe_load(Path("data/scenes/table_and_post.yaml").read_text(encoding="utf-8"))
+    pairs = [[f"link_{k}", solid] for solid in ("table", "post", "lamp", "floor") for k in range(1, 7)]
+    scene["collision"] = {"allow": [{"pair": pair, "reason": "A test"} for pair in pairs]}
+    (tmp_path / "allowing.yaml").write_text(yaml.safe_dump(scene), encoding="utf-8")
+    robot = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    robot["envelopes"]["capsules"] = robot["envelopes"]["capsules"][:2]
+    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(robot), encoding="utf-8")
+    quick = {"programs": [], "avoidance": "slow"}
+    for subject, names, more, settings in (
+        (None, (), {}, {}),
+        ("obstacles", (), {}, {"scene": None}),
+        ("allowed_contacts", tuple(map("/".join, pairs)), {}, {"scene": str(tmp_path / "allowing.yaml")}),
+        ("uncovered_links", ("link_2", "link_3", "link_4", "link_6"), {"file": str(tmp_path / f"{ROBOT}.yaml")}, {}),
+    ):
+        results = trajectory(changed(study, entry | more, trajectory=quick | settings), ROBOT)
+        verdict = results.summary.verdict
+        assert verdict.status == ("caution" if subject else "fail"), subject
+        assert [(each.subject, each.names) for each in verdict.missed] == ([(subject, names)] if subject else [])
+        if subject:
+            assert subjects(results)[subject].names == names
+            assert left_out_text(verdict.missed[0]) in say_all(verdict.findings)
 
 
 def test_programs_name_their_lines_and_starts(study, tmp_path):
@@ -160,6 +206,67 @@ def test_validation_of_seven_joints_names_what_diagnosis_leaves_out(study):
     found = subjects(validation(made, "lbr_iiwa_14"))
     assert "diagnosis" not in found
     assert "more_faults" in found
+
+
+@pytest.mark.long
+def test_a_proof_cut_short_takes_no_hole_for_the_shoulders(study):
+    """The article's table leaves a hole where none belongs, which few cells can't tell from the shoulder's."""
+    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "volume_points": 100}
+    little = {"directions": 12, "proof_poses": 1, "scene": None, "placement": BoxTask(cone_deg=5)}
+    article = study.model_copy(update={"robots": {"er3a_c60_article": study.robots["er3a_c60_article"]}})
+    verdicts = {}
+    for cells in (100, 2000):
+        sections = {"workspace": small | {"proof_cells": cells}, "capability": little}
+        made = {name: getattr(article, name).model_copy(update=values) for name, values in sections.items()}
+        verdicts[cells] = workspace(article.model_copy(update=made), "er3a_c60_article").summary.verdict
+    assert verdicts[2000].finding.code == "workspace.void_unexpected"
+    assert verdicts[2000].missed == ()
+    assert verdicts[100].status == "caution"
+    assert [each.subject for each in verdicts[100].missed] == ["hidden_voids"]
+
+
+@pytest.mark.long
+def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study, tmp_path):
+    for file in Path("data/vision").glob("fixed_camera*"):
+        shutil.copy(file, tmp_path)
+    content = yaml.safe_load(Path(f"data/vision/{ROBOT}.yaml").read_text(encoding="utf-8"))
+    content["objects"] = content["objects"][:1]
+    few = {"map_cells": 4}
+    for subject, names, more in (
+        (None, (), {}),
+        ("objects_out_of_view", ("can",), {"view": content["view"] | {"horizontal_deg": 5}}),
+        ("objects_out_of_view", ("can",), {"view": content["view"] | {"farthest_mm": 900}}),
+        ("arm_errors", (), {"arm": {"source": "none", "repeatability_mm": 0.02}}),
+    ):
+        (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content | more), encoding="utf-8")
+        verdict = vision(changed(study, {"vision": str(tmp_path / "vision.yaml")}, vision=few), ROBOT).summary.verdict
+        assert verdict.status == ("caution" if subject else "pass"), more
+        assert [(each.subject, each.names) for each in verdict.missed] == ([(subject, names)] if subject else [])
+
+
+def test_what_no_verdict_passes_without_turns_it_and_is_said():
+    """Whatever a stage computes, its summary makes no pass of it; of motions, not without obstacles either."""
+    import er3a.pipeline.messages.collision  # noqa: F401
+
+    for kind, decisive in ((Summary, NEVER_A_PASS), (TrajectorySummary, OF_MOTIONS)):
+        assert kind.decisive == decisive
+    for subject in LeftOutSubject.__args__:
+        for status in ("pass", "caution", "fail", "no_reference"):
+            verdict = Summary(
+                Verdict(status, FreeSpace(0.5, 1, 1, 1, 0)), (), not_examined=(LeftOut(subject, amount=3.0),)
+            ).verdict
+            assert verdict.status == ("caution" if status == "pass" and subject in NEVER_A_PASS else status)
+            assert ("no pass" in say_all(verdict.findings)) == (subject in NEVER_A_PASS)
+    many = LeftOut("allowed_contacts", tuple(f"link_{k}/table" for k in range(9)))
+    assert say(NoPass((many,))).endswith("link_5/table, 3 more).")
+
+
+@pytest.mark.parametrize(("link", "reaches_out"), [(2, True), (3, False), (4, True), (5, False), (6, True)])
+def test_a_link_without_shape_is_covered_by_its_neighbours_or_named(link, reaches_out):
+    robot = load_robot(ROBOT)
+    fewer = robot.replace(envelopes=tuple(each for each in robot.envelopes if each.link != link))
+    assert link in arm_shapes(fewer).bare
+    assert (link in arm_shapes(fewer).uncovered) == reaches_out
 
 
 @pytest.mark.long

@@ -191,6 +191,15 @@ def test_repeated_poses_are_named():
     assert (found.sample, found.first) == ("9", "4")
 
 
+def test_copies_of_samples_narrow_no_interval():
+    once = a_set("eye_to_hand", 3, 6)
+    copied = CalibrationSet("eye_to_hand", np.tile(once.flange, (3, 1, 1)), np.tile(once.target, (3, 1, 1)))
+    found = calibrate_hand_eye(copied)
+    np.testing.assert_allclose(found.half_width, calibrate_hand_eye(once).half_width, rtol=1e-6)
+    assert found.used.sum() == 6
+    assert sum(isinstance(each, RepeatedPose) for each in found.suspects) == 12
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("setup", SETUPS)
 def test_directions_say_what_is_excluded_and_what_can_not_be_told(setup):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import er3a.pipeline.messages.left_out  # noqa: F401
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import (
     BASE,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+import er3a.pipeline.messages.left_out
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import (

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeVar
 
-from er3a.pipeline.messages.say import joined, sentence, texts, word
-from er3a.pipeline.results import LeftOut, LeftOutSubject
+from er3a.pipeline.messages.say import bracketed, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.results import LeftOut, LeftOutSubject, NoPass
 
 TEXTS = texts(
     {
         "left_out.obstacles": "obstacles: no scene is given, and the arm was checked against itself only",
-        "left_out.bare_links": "what links hit to which no shape is given",
+        "no_pass": "Not examined, and therefore no pass: {missed}.",
+        "left_out.bare_links": "what links hit to which no shape is given, and which lie within those of others",
+        "left_out.uncovered_links": "what links hit to which no shape is given, and which reach out of all others'",
+        "left_out.allowed_contacts": "collisions with obstacles that the scene's file allows",
+        "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
+        "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
         "left_out.allowed_pairs": "collisions of pairs that the robot's or scene's file allows",
         "left_out.joined_pairs": "collisions of links near the joint between them",
@@ -36,7 +41,7 @@ TEXTS = texts(
         "left_out.wrist_limits": "payload, moments and inertias that the wrist allows, where no document gives them",
         "left_out.load": "tool and payload: the study gives no mass for them",
         "left_out.paths_not_run": "paths that may not be run as they are: motors and limits don't count them",
-        "left_out.torque_peaks": "torques of paths between the {amount:,.0f} times computed",
+        "left_out.torque_peaks": "torques of paths between the times computed, at least {amount:,.0f} of each",
         "left_out.program_torques": "torques of programs that are not among the paths",
         "left_out.program_loads": "torques with the loads that programs name",
         "left_out.drive_behaviour": (
@@ -75,6 +80,9 @@ TEXTS = texts(
             "collisions, in reach, voids and tool directions: arms count there that touch themselves or obstacles"
         ),
         "left_out.undecided_volume": "{amount:.3g} L that the proof of the reached volume leaves undecided",
+        "left_out.hidden_voids": (
+            "what voids lie in the {amount:.0f} % of the volume that so few proof_cells leave undecided"
+        ),
         "left_out.area": "the area that the tool point reaches: none was computed, or one of its bounds",
         "left_out.sampled_voids": "whether {amount:.0f} voids that are known from samples only are empty",
         "left_out.tool_directions": "tool directions between the {amount:,.0f} that were asked in each cell",
@@ -91,6 +99,7 @@ TEXTS = texts(
 )
 
 
+MOST_NAMED = 6  # in a sentence; the table names all
 _words: dict[LeftOutSubject, tuple[str, Mapping[str, str]]] = {}
 NameT = TypeVar("NameT", bound=str)
 
@@ -100,12 +109,20 @@ def names_in_words(subject: LeftOutSubject, code: str, words: Mapping[NameT, str
     _words[subject] = code, {str(name): text for name, text in words.items()}
 
 
-def left_out_names(found: LeftOut) -> str:
-    """Of which, in the language in use."""
+def left_out_names(found: LeftOut, most: int | None = None) -> str:
+    """Of which, in the language in use; beyond ``most`` how many more."""
     code, words = _words.get(found.subject, ("", {}))
-    return joined([word(code, words, name) for name in found.names], ", ")
+    named = [word(code, words, name) for name in found.names[:most]]
+    rest = len(found.names) - len(named)
+    return joined([*named, *([sentence("more", count=rest)] if rest else [])], ", ")
 
 
 def left_out_text(found: LeftOut) -> str:
     """What was not examined, in the language in use."""
     return sentence(f"left_out.{found.subject}", amount=found.amount)
+
+
+@say.register
+def _(found: NoPass) -> str:
+    missed = [bracketed(left_out_text(each), left_out_names(each, MOST_NAMED)) for each in found.missed]
+    return say_as(found, missed=joined(missed))

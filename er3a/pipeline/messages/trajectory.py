@@ -27,9 +27,9 @@ from er3a.planning.names import PathVerdict, StrategyName
 
 FIGURES = {
     "safe": N_("Safe paths"),
-    "singular_poses": N_("Singular poses met, on all paths"),
-    "near_passes": N_("Near-singular passes, on all paths"),
-    "colliding": N_("Paths with a collision, of all"),
+    "singular_poses": N_("Singular poses met"),
+    "near_passes": N_("Near-singular passes"),
+    "colliding": N_("Paths with a collision"),
     "max_joint_speed": N_("Highest joint speed on all paths, against its limit"),
     "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
     "speed_ratio": N_("Ratio to that joint's limit"),

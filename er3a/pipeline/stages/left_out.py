@@ -27,8 +27,15 @@ def left_out_of_collisions(
     def pairs(state: PairState) -> tuple[str, ...]:
         return tuple(f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state)
 
+    shapes, rules = arm_shapes(bodies.robot), scene.pair_rules if scene else ()
+    solids = {solid.name for solid in scene.solids} if scene else set()
     found: list[tuple[LeftOutSubject, tuple[str, ...]]] = [
-        ("bare_links", tuple(link_label(link) for link in arm_shapes(bodies.robot).bare)),
+        ("uncovered_links", tuple(link_label(link) for link in shapes.uncovered)),
+        (
+            "allowed_contacts",
+            tuple(f"{each.first}/{each.second}" for each in rules if solids & {each.first, each.second}),
+        ),
+        ("bare_links", tuple(link_label(link) for link in shapes.bare if link not in shapes.uncovered)),
         ("unexamined_pairs", tuple(pair.label for pair in bodies.unexamined)),
         ("allowed_pairs", pairs("allowed")),
         ("joined_pairs", pairs("joined")),

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.evaluation import IN_DEGREES, ProgramMemory
+from er3a.programs.evaluation import IN_DEGREES, ProgramMemory, root
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -419,7 +419,7 @@ EKI_GETFRAMEARRAY EKI_GETINT EKI_GETINTARRAY EKI_GETREAL EKI_GETREALARRAY EKI_GE
 EKI_OPEN EKI_SEND EKI_SETBOOL EKI_SETFRAME EKI_SETINT EKI_SETREAL EKI_SETSTRING EKI_UNLOCK EO ERR_CLEAR
 ERR_RAISE EXISTS_KRLDLG EXISTS_KRLMSG FORWARD GETVARSTATE GET_MSGBUFFER GET_SIG_INF GET_SYSTEM_DATA INVERSE
 IR_STOPM LK MSGDIALOG MSGINFO MSGLOG MSGNOTIFY MSGQUIT MSGSTATE P00 PULSE RESET_CD_PARAMS SET_CD_PARAMS
-SET_KRLDLG SET_KRLMSG SET_SYSTEM_DATA SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL
+SET_KRLDLG SET_KRLMSG SREAD STRADD STRCLEAR STRCOMP STRCOPY STRDECLLEN STRFIND STRLEN STRTOBOOL
 STRTOFRAME STRTOINT STRTOPOS STRTOREAL STRTOSTRING SWRITE USER_GRP VARSTATE VAR_STATE
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
@@ -431,6 +431,15 @@ SORI_TYPE SCIRC_TYPE
 """
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions behind WITH, which :func:`keep_setting` reads."""
+HARMLESS_VARIABLES_TEXT = """
+$ACCU_STATE $ACT_BASE $ACT_TOOL $ADVANCE $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
+$ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB
+$PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER
+$TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $WBOXDISABLE $WORKSPACE
+"""
+HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
+"""System variables that are followed, or set nothing but speeds, stops, watches, signals and marks; another may make
+axes soft, shift paths (``$CORR_T``, ``$TECH``) or choose other postures (``$SINGUL_POS``)."""
 ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
 """How the tool may turn on lines and arcs so that they are followed as they are meant."""
 CONTROLLER: dict[str, Value] = {
@@ -478,7 +487,11 @@ class KrlDialect:
 
     def is_followed(self, name: str, value: Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
-        return name != "$ROBROOT" and (name not in ORIENTATION_TYPES or value in ORIENTATION_TYPES[name])
+        if name in ORIENTATION_TYPES:
+            return value in ORIENTATION_TYPES[name]
+        if name in CONTROLLER:
+            return value == CONTROLLER[name]
+        return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
 
     def named(self, name: str) -> bool:
         """Tool and base keep the name of what they are set to."""

@@ -253,7 +253,7 @@ class PathJudge:
 def path_torques(
     arm: LoadedArm, motion: Motion, judged: tuple[PathVerdict, bool], samples: int, wrist: tuple[int, ...]
 ) -> PathTorques:
-    """Torques of a path at evenly spread times.
+    """Torques of a path: its table at evenly spread times, peaks and means also where the path was solved and checked.
 
     Parameters
     ----------
@@ -268,12 +268,16 @@ def path_torques(
         nothing = (float(t[-1]), (), (), None, None, (), None, None)
         absent = PathLoad(entry.name, entry.title, verdict, False, False, *nothing)
         return PathTorques(absent, asked, TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
+    timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
+    evenly, t = t, np.union1d(t, motion.t)
+    rates = np.stack(motion.rates(t), axis=1)
+    known = np.isfinite(rates).all(axis=(1, 2))
+    t, (q, qd, qdd) = t[known], rates[known].swapaxes(0, 1)
     parts = torque_parts(arm.model, q, qd, qdd)
     tau, tolerance = parts.total, arm.tolerance(q, qd, qdd)
     needed = demand(t, qd, tau)
     own = np.diagonal(arm.model.mass_matrix(q), axis1=1, axis2=2)
     payload, scale = _margins(arm, parts, t, q, qd, qdd)
-    timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
     summary = PathLoad(
         name=entry.name,
         title=entry.title,
@@ -299,7 +303,7 @@ def path_torques(
         tolerance=tolerance,
         **{name: getattr(parts, name) for name in PARTS},
         power_w=tau * qd,
-    )
+    ).take(np.isin(t, evenly))
     inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
     imbalance = power_imbalance(arm.model, parts, q, qd, qdd)
     own_load = arm.load if summary.program_load_kg is not None else None

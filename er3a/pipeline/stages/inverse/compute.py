@@ -505,9 +505,10 @@ def _figures(
     targets: Sequence[TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None
 ) -> tuple[Figure, ...]:
     position, orientation = worst
-    solved = sum(target.chosen_deg is not None for target in targets)
+    asked = [target for target in targets if target.expect in (None, "reached")]  # demonstrations are counted apart
+    solved = sum(target.chosen_deg is not None for target in asked)
     return (
-        Figure("targets_solved", solved, "", of=len(targets)),
+        Figure("targets_solved", solved, "", of=len(asked)),
         *(_of_random_poses(trips) if trips else ()),
         Figure("worst_position_residual", position * 1000, "mm"),
         Figure("worst_orientation_residual", float(np.degrees(orientation)), "deg"),

@@ -551,7 +551,7 @@ def _fails(path: PathSummary) -> bool:
 
 def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tuple[Figure, ...]:
     asked = [path for path in paths if path.expect in (None, "safe")]  # demonstrations are counted apart
-    events = [event for path in paths for event in path.singularities]
+    events = [event for path in asked for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]
     agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)
     speeds = [
@@ -560,7 +560,7 @@ def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tup
         for joint, (speed, limit) in enumerate(zip(path.max_joint_speed_deg_s or (), limits.speed_deg_s), 1)
     ]
     speed, limit, unit = max(speeds, key=lambda each: each[0] / each[1], default=(None, None, "deg/s"))
-    colliding = sum(bool(path.collisions) for path in paths)
+    colliding = sum(bool(path.collisions) for path in asked)
     return (
         Figure("safe", sum(path.verdict == "safe" for path in asked), "", of=len(asked)),
         Figure("singular_poses", sum(event.crossing for event in events), ""),

@@ -89,6 +89,7 @@ from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
 MARGIN = 0.25  # of the objects' extent
 LEAST_HALF = 0.2  # m, to each side of the objects' middle
+NO_BOARD = [1.0, 1.0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -402,7 +403,7 @@ def compute(study: Study, name: str) -> VisionResults:
         calibration=calibration,
         objects=objects,
         not_examined=(
-            *_left_out(calibration),
+            *_left_out(calibration, task_file),
             *left_out_of_collisions(bodies, scene, 1000 * DEPTH),
             *left_out_of_rates(np.isfinite(robot.speed), motions.jerk_deg_s3 is not None),
             LeftOut("torques"),
@@ -414,7 +415,7 @@ def compute(study: Study, name: str) -> VisionResults:
         accuracy=task_file.arm.accuracy(),
         T_base_camera=camera,
         picture=picture,
-        view=task_file.view.view(head.board_mm or [1.0, 1.0]),
+        view=task_file.view.view(head.board_mm or NO_BOARD),
         places=np.array(list(places.values())),
         T_object_tool=task_file.objects[0].grasps[0].grasp().T_object_tool,
         camera_covariance=np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0),
@@ -434,8 +435,14 @@ def compute(study: Study, name: str) -> VisionResults:
     )
 
 
-def _left_out(found: CalibrationResult) -> Iterator[LeftOut]:
-    """What the calibration does not rest on, and what nothing checks it against."""
+def _left_out(found: CalibrationResult, file: VisionFile) -> Iterator[LeftOut]:
+    """What the calibration does not rest on, what nothing checks it against, and what grasps leave open."""
+    places = np.array([each.pose()[:3, 3] for each in file.objects])
+    seen = in_sight(file.view.view(NO_BOARD), places)
+    if hidden := tuple(each.name for each, visible in zip(file.objects, seen) if not visible):
+        yield LeftOut("objects_out_of_view", hidden)
+    if not file.arm.states_all:
+        yield LeftOut("arm_errors")
     if found.simulated:
         yield LeftOut("real_camera")
     if found.boardless:

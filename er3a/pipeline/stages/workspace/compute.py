@@ -111,6 +111,9 @@ def _labels(robot: Robot) -> list[EnvelopeRow]:
     return [row for row in rows if isinstance(row, EnvelopeRow)]
 
 
+COARSE = 0.15  # of the volume: a proof that leaves more undecided has been seen to take a hole for the shoulder's
+
+
 def judge(
     hull_volume: float,
     voids: Sequence[Void],
@@ -288,7 +291,7 @@ def _summary(
         capability=tool.capability,
         placement=tool.placement,
         not_examined=(
-            *_left_out(settings, volume, surface, voids, tool),
+            *_left_out(settings, proven, surface, voids, tool),
             *left_out_of_collisions(bodies_of(robot, scene), scene),
             *left_out_without_tool(robot),
         ),
@@ -296,12 +299,15 @@ def _summary(
 
 
 def _left_out(
-    settings: WorkspaceSettings, volume: Volume, surface: Surface | None, voids: Sequence[Void], tool: ToolCapability
+    settings: WorkspaceSettings, proven: Proven, surface: Surface | None, voids: Sequence[Void], tool: ToolCapability
 ) -> Iterator[LeftOut]:
     """What samples, budgets of proofs and the kind of arm leave out."""
     yield LeftOut("joint_vectors", amount=settings.samples)
-    if surface is None and volume.upper > volume.lower:
-        yield LeftOut("undecided_volume", amount=1000 * (volume.upper - volume.lower))
+    lower, upper = proven.proof.bounds
+    if surface is None and upper > lower:
+        yield LeftOut("undecided_volume", amount=1000 * (upper - lower))
+    if surface is None and proven.arm is not None and proven.proof.width > COARSE:
+        yield LeftOut("hidden_voids", amount=100 * proven.proof.width)
     if surface and (surface.lower is None or surface.upper is None):
         yield LeftOut("area")
     if sampled_voids := sum(void.status != "proven_empty" for void in voids):
