@@ -427,8 +427,8 @@ def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may
 
 
 def _normals_of_near(arms: tuple[Mechanism, Mechanism], near: Flags, normals: Reals) -> Reals:
-    """Senses (m - 1,) of normals; those of nearly parallel axes by lengths measured within the arm, because a normal far
-    away can point anywhere."""
+    """Senses (m - 1,) of normals; those of nearly parallel axes by lengths measured within the arm, for one far away
+    can point anywhere."""
     product = arms[0].a * arms[1].a
     return np.where(near & (product != 0), np.sign(product), normals)
 

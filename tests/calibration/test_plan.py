@@ -80,6 +80,9 @@ def test_what_is_touched_is_touched_by_proposed_poses(kind, random):
     found = plan(robot, rows, 5)
     new = er3a.forward(robot, meant(robot, np.array([each.pose for each in found.proposals])))[:, :3, 3]
     assert len(new) == (10 if kind == "pair" else 5)
+    scales = [each.entry for each in found.held if each.code == "sets_scale"]
+    assert len(scales) == (kind in ("place", "plane"))
+    assert not {*scales, "offset1"} & {*found.settled, *found.lacking}
     if kind == "place":
         assert new == pytest.approx(np.tile(target, (5, 1)), abs=1e-4)
     elif kind == "plane":
