@@ -228,6 +228,7 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert told["output"] is None
     text = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "mine.yaml")]).stdout
     assert f"held back: 20 positions, {told['held_back']['mean_mm']:.4g} mm off on average" in text
+    assert f"at worst (row {told['held_back']['worst_row']})" in text
     assert "tried: J3 once a turn" in text
     assert load_robot(tmp_path / "mine.yaml").joints == 7
 
