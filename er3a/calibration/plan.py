@@ -192,6 +192,7 @@ def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObser
     if any(each and each[0] == "pair" for each in kinds):
         kinds = dict.fromkeys(each if each and each[0] != "pair" else ("pair", "") if each else None for each in kinds)
     q = meant(robot, np.round(quasi_random_points(low, high, CANDIDATES)))
+    q = q[((q >= robot.lower) & (q <= robot.upper)).all(axis=1)]
     q = q[clearance(robot, q, None).distance > 0]
     x = seen.positions(robot)
     options: list[tuple[Proposal, ...]] = []

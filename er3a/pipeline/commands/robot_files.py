@@ -232,7 +232,7 @@ def calibrate(
         return
     print(lines_of(found))
     if distances is not None:
-        print(held_back_line(others, distances))
+        print(held_back_line(rows, others, distances))
     for written in (output, html, rrd):
         if written:
             print(f"{written}: written")

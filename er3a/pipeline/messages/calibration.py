@@ -111,10 +111,16 @@ def plan_record(found: Plan) -> dict[str, object]:
     }
 
 
-def held_back_line(others: Sequence[Measurement], distances: Reals) -> str:
-    """How far the model is from positions that the fit has not seen, mm."""
-    mean, worst, row = distances.mean(), distances.max(), others[int(distances.argmax())].row
-    return f"held back: {len(distances)} positions, {mean:.4g} mm off on average, {worst:.4g} mm at worst (row {row})"
+def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement], distances: Reals) -> str:
+    """How far the model is from positions that the fit has not seen, mm, and where that is no place to rely on it."""
+    worst = others[int(distances.argmax())]
+    ranges = zip(worst.pose, zip(*(each.pose for each in fitted)))
+    beyond = [f"J{k}" for k, (own, seen) in enumerate(ranges, 1) if not min(seen) <= own <= max(seen)]
+    where = f"row {worst.row}" + (f", beyond all fitted poses in {', '.join(beyond)}" if beyond else "")
+    return (
+        f"held back: {len(distances)} positions, {distances.mean():.4g} mm off on average, {distances.max():.4g} mm at "
+        f"worst ({where})"
+    )
 
 
 def term_name(term: TriedTerm | TermEstimate) -> str:
