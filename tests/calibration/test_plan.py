@@ -30,7 +30,7 @@ def test_blocks_that_add_most_are_those_of_a_brute_force(random):
 
 def test_proposed_poses_settle_what_a_calibration_settles_with_them(random):
     bench = Bench("six", random)
-    bench.robot = bench.robot.replace(upper=bench.robot.upper - np.radians(0.4))  # limits that are no whole degrees
+    bench.robot = bench.robot.replace(upper=bench.robot.upper - np.radians(0.1))  # limits that are no whole degrees
     q = np.clip(bench.joints(6), -0.4, 0.4)
     poses = np.degrees(q).tolist()
     rows = [
