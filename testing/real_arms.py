@@ -14,6 +14,7 @@ from er3a.calibration.calibrate import Calibration, calibrate, choose_level
 from er3a.calibration.cross_validation import parts_of
 from er3a.calibration.fit import covariance_by_poses, fit
 from er3a.calibration.observations import Measurement, PointObservations, observed
+from er3a.calibration.parameters import corrected
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from testing.plain_calibration import distances, measured_arm, plain_fit
@@ -88,13 +89,14 @@ def halves(name: str, splits: int, seed: int) -> tuple[tuple[str, ...], NDArray[
     """
     robot, seen = points(name)
     kept, random = choose_level(robot, seen).kept, np.random.default_rng(seed)
+    whole = corrected(robot, kept, fit(robot, kept, seen).amounts)  # to start from
     count = len(seen.row_values)
     inside = np.zeros((splits, len(kept)), dtype=bool)
     for split in range(splits):
         first = random.permutation(count) < count // 2
         values, squares = [], []
         for half in (seen.take(first), seen.take(~first)):
-            found = fit(robot, kept, half)
+            found = fit(whole, kept, half)
             values.append(found.amounts)
             covariance, freedom = covariance_by_poses(found, half.pose_of)
             squares.append(scipy.special.stdtrit(freedom, 0.975) ** 2 * np.diag(covariance))

@@ -25,7 +25,18 @@ from er3a.calibration.cross_validation import (
     choose_terms,
     left_out,
 )
-from er3a.calibration.fit import NO_EFFECT, SCALE, Fit, Subspace, covariance_by_poses, fit, jacobian, subspace
+from er3a.calibration.fit import (
+    SCALE,
+    Fit,
+    Subspace,
+    covariance_by_poses,
+    fit,
+    held_with,
+    jacobian,
+    scale_of,
+    subspace,
+    without_scale,
+)
 from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
 from er3a.calibration.outcomes import (
     INTERVAL_95,
@@ -48,8 +59,6 @@ from er3a.references.reference import ReferenceSet
 from er3a.robots.robot import Robot
 
 SHOWN_POSES = 3
-TURNS_ALL = Parameter("offset", 1)
-"""Turns all points alike, which is nothing to points that are seen against each other alone."""
 CLOSE = 0.9
 MOST_SCATTER = 3.0
 FAR_OUT = 6.0
@@ -82,9 +91,7 @@ class Level:
     @property
     def held(self) -> tuple[outcomes.Held, ...]:
         """Why the others keep their values."""
-        if self.scale is None:
-            return self.subspace.held
-        return (*self.subspace.held, outcomes.MovesNothing(TURNS_ALL.name), outcomes.SetsScale(self.scale.name))
+        return (*self.subspace.held, *held_with(self.scale))
 
     @property
     def kept(self) -> list[Parameter]:
@@ -105,12 +112,11 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
         raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
     rich = observations.rich(robot)
     placed = placements_of(observations.free)
-    scale = _scale(robot, observations) if isinstance(observations, PointObservations) else None
+    scale = scale_of(robot, observations) if isinstance(observations, PointObservations) else None
     more: list[MorePositions] = []
     for name in LEVELS[::-1]:
         for first in (placed, ()) if placed else ((),):
-            without = (scale, TURNS_ALL) if scale else ()
-            parameters = (*first, *(entry for entry in parameters_of(robot, name) if entry not in without))
+            parameters = (*first, *without_scale(parameters_of(robot, name), scale))
             here, best = subspace(robot, parameters, observations), subspace(robot, parameters, rich)
             spare = len(observations) - len(here.kept) - getattr(observations, "dropped", 0)
             if len(best.kept) == len(here.kept) and spare > 0:
@@ -118,16 +124,6 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
             more.append(_what_more(robot, name, parameters, (here, best), observations))
     problem = f"{len(observations)} coordinates determine too little; positions to be added: {more[-1].least} at least"
     raise CalibrationError(more[-1], problem)
-
-
-def _scale(robot: Robot, observations: PointObservations) -> Parameter | None:
-    """The longest length of the table that moves the points; None where coordinates were measured."""
-    if observations.has_scale:
-        return None
-    lengths = parameters_of(robot, "lengths")
-    effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
-    moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
-    return max(moving, key=lambda entry: abs(entry.nominal(robot)), default=None)
 
 
 def _what_more(

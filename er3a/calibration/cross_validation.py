@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+import scipy.sparse
 from scipy.cluster.vq import kmeans2
 
 from er3a.calibration.fit import DEPENDENT, Fit, jacobian
@@ -247,26 +248,24 @@ class _RippleSearch:
     def __init__(self, here: Robot, observations: PointObservations):
         x, rows = observations.row_values, np.flatnonzero(~here.sliding)
         effect = 1000 * effects(here, x, observations.points(here))[:, rows]
-        self._pose_of = observations.pose_of
         self._effect = effect.transpose(0, 2, 1)[observations.seen] / observations.deviation_mm[:, None]
+        count = len(observations)
+        self._by_pose = scipy.sparse.csr_array((np.ones(count), (observations.pose_of, np.arange(count))))
         angle = x[:, rows].T[:, None] * np.array(RIPPLES)[:, None]
-        self._shapes = np.stack([np.sin(angle), np.cos(angle)], axis=2)
-        self._rows, self._count = rows, len(x)
+        shapes = np.stack([np.sin(angle), np.cos(angle)], axis=2)
+        squares = (self._by_pose @ self._effect**2).T[:, None, None]
+        self._own = (shapes * squares) @ shapes.swapaxes(2, 3)
+        self._own += DEPENDENT * squares.sum(axis=-1)[..., None] * np.eye(2)
+        self._rows, self._shapes = rows, shapes.reshape(len(rows), -1, len(x))
 
     def best(self, J: Reals, rest: Reals) -> list[JointTerm]:
         """One for each joint; J (n, k), whose columns they come beside, and what is to be explained, (n,)."""
         span = np.linalg.qr(J)[0]
-        left, found = rest - span @ (span.T @ rest), []
-        for row, effect, shapes in zip(self._rows, self._effect.T, self._shapes):
-            own, square = self._by_pose(effect * left), self._by_pose(effect**2)
-            taken = shapes @ np.stack([self._by_pose(effect * column) for column in span.T], axis=1)
-            whole = (shapes * square) @ shapes.transpose(0, 2, 1)
-            gram = whole - taken @ taken.transpose(0, 2, 1) + DEPENDENT * square.sum() * np.eye(2)
-            along = shapes @ own
-            explained = np.einsum("tk,tk->t", along, np.linalg.solve(gram, along[..., None])[..., 0])
+        beside, found = np.column_stack([rest - span @ (span.T @ rest), span]), []
+        for row, effect, shapes, own in zip(self._rows, self._effect.T, self._shapes, self._own):
+            along = (shapes @ (self._by_pose @ (effect[:, None] * beside))).reshape(len(RIPPLES), 2, -1)
+            left, taken = along[..., 0], along[..., 1:]
+            gram = own - taken @ taken.swapaxes(1, 2)
+            explained = np.einsum("tk,tk->t", left, np.linalg.solve(gram, left[..., None])[..., 0])
             found.append(JointTerm("ripple", int(row) + 1, RIPPLES[int(explained.argmax())]))
         return found
-
-    def _by_pose(self, values: Reals) -> Reals:
-        sums: Reals = np.bincount(self._pose_of, weights=values, minlength=self._count).astype(float)
-        return sums

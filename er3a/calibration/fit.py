@@ -18,8 +18,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.calibration.observations import Observations, PointObservations
-from er3a.calibration.outcomes import CalibrationError, Held, MovesNothing, NoCorrectionFits, NotToldApart
-from er3a.calibration.parameters import Parameter, corrected, parallel_pairs
+from er3a.calibration.outcomes import (
+    CalibrationError,
+    Held,
+    MovesNothing,
+    NoCorrectionFits,
+    NotToldApart,
+    SetsScale,
+)
+from er3a.calibration.parameters import Parameter, corrected, parallel_pairs, parameters_of
 from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
@@ -33,6 +40,8 @@ SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE = 1e-6  # of the weighted differences, of measured points
 HALVINGS = 12
 LEAST_OWN = 1e-9
+TURNS_ALL = Parameter("offset", 1)
+"""Turns all points alike, which is nothing to points that are seen against each other alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +88,27 @@ def subspace(robot: Robot, parameters: Sequence[Parameter], observations: Observ
         held.append(MovesNothing(parameters[k].name) if still else _confounded_with(robot, parameters, k, kept, J))
     singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
     return Subspace(tuple(kept), tuple(held), singular_values)
+
+
+def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
+    """The longest length of the table that moves the points, which is taken as it is; None where coordinates or lengths
+    were measured."""
+    if observations.has_scale:
+        return None
+    lengths = parameters_of(robot, "lengths")
+    effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
+    moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
+    return max(moving, key=lambda entry: abs(entry.nominal(robot)), default=None)
+
+
+def without_scale(parameters: Sequence[Parameter], scale: Parameter | None) -> tuple[Parameter, ...]:
+    """Those that can be estimated beside a length that sets the scale, if one does."""
+    return tuple(each for each in parameters if scale is None or each not in (scale, TURNS_ALL))
+
+
+def held_with(scale: Parameter | None) -> tuple[Held, ...]:
+    """Why the others can't."""
+    return (MovesNothing(TURNS_ALL.name), SetsScale(scale.name)) if scale else ()
 
 
 def _confounded_with(robot: Robot, parameters: Sequence[Parameter], k: int, kept: list[int], J: Reals) -> NotToldApart:
@@ -144,20 +174,23 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     """
     C = found.covariance
     order = np.argsort(pose_of, kind="stable")
+    starts, counts = np.unique(pose_of[order], return_index=True, return_counts=True)[1:]
     middle = np.zeros_like(C)
     sizes, pulls = [], []
-    for rows in np.split(order, np.flatnonzero(np.diff(pose_of[order])) + 1):
-        J = found.J[rows]
-        size, axes = np.linalg.eigh(np.eye(len(rows)) - J @ C @ J.T)
-        weight = (axes / np.sqrt(np.maximum(size, LEAST_OWN))) @ axes.T
-        push = J.T @ weight @ found.after[rows]
-        middle += np.outer(push, push)
+    for count in np.unique(counts):
+        rows = order[starts[counts == count][:, None] + np.arange(count)]
+        J = found.J[rows]  # (poses, count, k + c)
+        size, axes = np.linalg.eigh(np.eye(count) - J @ C @ J.swapaxes(1, 2))
+        weight = (axes / np.sqrt(np.maximum(size, LEAST_OWN))[:, None]) @ axes.swapaxes(1, 2)
+        push = (J.swapaxes(1, 2) @ weight @ found.after[rows][..., None])[..., 0]
+        middle += push.T @ push
         shares = weight @ J @ C
-        sizes.append((shares**2).sum(axis=0))
-        pulls.append(J.T @ shares)
-    own, pull = np.array(sizes), np.array(pulls)  # (P, k + c), (P, k + c, k + c)
-    drawn = np.einsum("pik,ij,pjk->pk", pull, C, pull)
-    both = np.einsum("ij,pjk,plk->kil", C, pull, pull)
+        sizes.append((shares**2).sum(axis=1))
+        pulls.append(J.swapaxes(1, 2) @ shares)
+    own, pull = np.concatenate(sizes), np.concatenate(pulls)  # (P, k + c), (P, k + c, k + c)
+    drawn = np.einsum("pik,pik->pk", pull, C @ pull)
+    by_number = pull.transpose(2, 1, 0)
+    both = C @ (by_number @ by_number.transpose(0, 2, 1))
     squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
     freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, LEAST_OWN * (own**2).sum(axis=0))
     return np.asarray(C @ middle @ C, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)

@@ -193,6 +193,8 @@ class PointObservations:
     def relative(self, xyz: Reals) -> Reals:
         """What is observed of points (P, 3), m: see ``touched``."""
         found = xyz.copy()
+        if not self.kinds:
+            return found
         for kind, rows in self.groups():
             own = xyz[rows]
             if kind == "place":
@@ -241,18 +243,18 @@ class PointObservations:
     def predict(self, robot: Robot, parameters: Sequence[Parameter], amounts: Reals) -> Reals:
         """Values (H, n), mm, by the robot with each row of amounts (H, p), in m and rad, added to its table, base and
         tool."""
-        own, base_inverse = tables_of(robot), np.linalg.inv(robot.base)
+        own, base_inverse, points = tables_of(robot), np.linalg.inv(robot.base), self.points(robot)
+        placing = np.array([not parameter.joint for parameter in parameters], dtype=bool)
         step = max(1, AT_ONCE // max(len(self.row_values), 1))
         values = np.empty((len(amounts), len(self)))
         for start in range(0, len(amounts), step):
             part = amounts[start : start + step]
             T = frames_of(moved(join([own] * len(part)), parameters, part), robot, self.row_values)[:, :, -1]
             for k, row in enumerate(part):
-                S, shift = placed(parameters, row)
+                S, shift = placed(parameters, row) if row[placing].any() else (np.eye(4), np.zeros(3))
+                xyz = np.einsum("pij,pj->pi", T[k, :, :3, :3], points + self.on_tool[:, None] * shift)
                 world = robot.base @ S @ base_inverse
-                points = self.points(robot) + self.on_tool[:, None] * shift
-                xyz = np.einsum("pij,pj->pi", T[k, :, :3, :3], points) + T[k, :, :3, 3]
-                xyz = xyz @ world[:3, :3].T + world[:3, 3]
+                xyz = (xyz + T[k, :, :3, 3]) @ world[:3, :3].T + world[:3, 3]
                 values[start + k] = MM * self.relative(xyz)[self.seen]
         return values
 

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.calibration.fit import SCALE, jacobian, subspace
+from er3a.calibration.fit import SCALE, held_with, jacobian, scale_of, subspace, without_scale
 from er3a.calibration.observations import (
     PLACEMENTS,
     Measurement,
@@ -114,7 +114,8 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
     assert isinstance(seen, PointObservations)
     if not seen.deviation_known:
         seen = seen.with_deviation(ASSUMED_MM)
-    parameters = (*placements_of(seen.free), *parameters_of(robot, "all_entries"))
+    scale = scale_of(robot, seen)
+    parameters = (*placements_of(seen.free), *without_scale(parameters_of(robot, "all_entries"), scale))
     options = _options(robot, measurements, seen)
     every = _with(robot, measurements, [each for option in options for each in option], seen)
     now, able = subspace(robot, parameters, seen), subspace(robot, parameters, every)
@@ -125,7 +126,7 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
     return Plan(
         settled=tuple(parameters[k].name for k in now.kept),
         lacking=tuple(parameters[k].name for k in able.kept if k not in now.kept),
-        held=able.held,
+        held=(*able.held, *held_with(scale)),
         proposals=proposals,
         beyond=_beyond(measurements, proposals),
         widths=_widths(robot, parameters, (seen, now.kept), then),
@@ -191,6 +192,7 @@ def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObser
     if any(each and each[0] == "pair" for each in kinds):
         kinds = dict.fromkeys(each if each and each[0] != "pair" else ("pair", "") if each else None for each in kinds)
     q = meant(robot, np.round(quasi_random_points(low, high, CANDIDATES)))
+    q = q[((q >= robot.lower) & (q <= robot.upper)).all(axis=1)]
     q = q[clearance(robot, q, None).distance > 0]
     x = seen.positions(robot)
     options: list[tuple[Proposal, ...]] = []

@@ -15,7 +15,8 @@ Signs are counted out. Everything else is linear once the directions agree: tran
 Axes less than ``NEARLY_PARALLEL`` apart have common normals far away, which errors of measurement move by metres.
 They are compared in two forms, and the one with fewer differences counts: by their normals, which is exact, and by
 where the next axis crosses the plane across this one (Hayati's beta), which does not magnify errors. There they count
-as parallel, as long as a shift along one stays on the other to within the tolerances.
+as parallel, as long as a shift along one stays on the other to within the tolerances. Of axes that are parallel in one
+of the two arms alone, the second form is all there is.
 
 References
 ----------
@@ -42,7 +43,6 @@ Parts = tuple[Reals, Reals, Reals]
 
 EXACTLY_PARALLEL = 1e-5  # rad; below it a common normal has no digits left
 NEARLY_PARALLEL = math.radians(3.0)
-FAR = 3.0  # m; a normal so far along an axis is no part of an arm
 ON_AXIS = 1e-9  # m
 MOST_SENSES = 6
 MOST_ENTRIES = 4
@@ -180,11 +180,12 @@ def by_normals(mechanism: Mechanism) -> Mechanism:
 
 
 def without_far_normals(mechanism: Mechanism) -> Mechanism:
-    """The arm with links between nearly parallel axes measured within it."""
-    angles = mechanism.between
+    """The arm with links between nearly parallel axes measured within it, where their normal is farther along an axis
+    than all lengths a together."""
+    angles, far = mechanism.between, float(np.abs(mechanism.a).sum())
     for k in np.flatnonzero((angles > 0) & (angles < NEARLY_PARALLEL)):
         d = mechanism.d
-        if abs(d[k]) > FAR or (k + 1 < len(d) and abs(d[k + 1]) > FAR):
+        if max(abs(d[k]), abs(d[k + 1])) > far:
             mechanism = _measured_at(mechanism, int(k), 0.0)
     return mechanism
 
@@ -405,16 +406,18 @@ def _links_differ(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> b
 
 
 def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True) -> Match | None:
-    angles = np.maximum(one.between, other.between)
-    near = angles < NEARLY_PARALLEL
+    most = np.maximum(one.between, other.between)
+    near = (most > EXACTLY_PARALLEL) & (most < NEARLY_PARALLEL)
+    lone = near & (np.minimum(one.between, other.between) < EXACTLY_PARALLEL)
     exact = by_normals(one), by_normals(other)
+    local = without_far_normals(one), without_far_normals(other)
     best: Match | None = None
     for senses, normals in _likely_senses(*exact, tolerances, may_differ=may_differ):
-        pairs = [(exact[0], with_senses(exact[1], senses, normals))]
-        if (near & (angles > EXACTLY_PARALLEL)).any():
-            local = without_far_normals(one), without_far_normals(other)
-            pairs.append(_measured_alike(local[0], with_senses(local[1], senses, normals)))
-            pairs.append((one, with_senses(other, senses, normals)))
+        pairs = [] if lone.any() else [(exact[0], with_senses(exact[1], senses, normals))]
+        if near.any():
+            turned = with_senses(local[1], senses, _normals_of_near(local, near, normals))
+            pairs.append(_measured_alike(local[0], turned))
+            pairs.append((one, with_senses(other, senses, _normals_of_near((one, other), near, normals))))
         for first, second in pairs:
             for found in _settled(first, second, senses, tolerances, may_differ=may_differ):
                 if best is None or found.rank < best.rank:
@@ -422,6 +425,13 @@ def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may
         if best is not None and (not may_differ or best.rank[0] == best.layers == 0):
             break
     return best
+
+
+def _normals_of_near(arms: tuple[Mechanism, Mechanism], near: Flags, normals: Reals) -> Reals:
+    """Senses (m - 1,) of normals; those of nearly parallel axes by lengths measured within the arm, for one far away
+    can point anywhere."""
+    product = arms[0].a * arms[1].a
+    return np.where(near & (product != 0), np.sign(product), normals)
 
 
 def _measured_alike(one: Mechanism, other: Mechanism) -> tuple[Mechanism, Mechanism]:

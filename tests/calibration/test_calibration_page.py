@@ -41,6 +41,7 @@ def test_the_page_hands_out_the_corrected_robot(written):
     page = (written / "page.html").read_text(encoding="utf-8")
     found = re.search(r'href="data:text/plain;base64,([^"]+)" download="mine.yaml"', page)
     assert found is not None
+    assert f"er3a compare {DATA / 'wam.yaml'} mine.yaml" in page
     (written / "given").mkdir()
     (written / "given/mine.yaml").write_text(base64.b64decode(found[1]).decode(), encoding="utf-8")
     given, mine = (er3a.load_robot(written / name) for name in ("given/mine.yaml", "mine.yaml"))

@@ -30,6 +30,7 @@ def test_blocks_that_add_most_are_those_of_a_brute_force(random):
 
 def test_proposed_poses_settle_what_a_calibration_settles_with_them(random):
     bench = Bench("six", random)
+    bench.robot = bench.robot.replace(upper=bench.robot.upper - np.radians(0.1))  # limits that are no whole degrees
     q = np.clip(bench.joints(6), -0.4, 0.4)
     poses = np.degrees(q).tolist()
     rows = [
@@ -80,6 +81,9 @@ def test_what_is_touched_is_touched_by_proposed_poses(kind, random):
     found = plan(robot, rows, 5)
     new = er3a.forward(robot, meant(robot, np.array([each.pose for each in found.proposals])))[:, :3, 3]
     assert len(new) == (10 if kind == "pair" else 5)
+    scales = [each.entry for each in found.held if each.code == "sets_scale"]
+    assert len(scales) == (kind in ("place", "plane"))
+    assert not {*scales, "offset1"} & {*found.settled, *found.lacking}
     if kind == "place":
         assert new == pytest.approx(np.tile(target, (5, 1)), abs=1e-4)
     elif kind == "plane":

@@ -21,6 +21,7 @@ from er3a.files.by_name import load_measurements
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.pipeline.cli import app
+from er3a.pipeline.messages.calibration import held_back_line
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import GRAVITY
 from testing.plain_calibration import distances, measured_arm, plain_fit
@@ -228,8 +229,16 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert told["output"] is None
     text = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "mine.yaml")]).stdout
     assert f"held back: 20 positions, {told['held_back']['mean_mm']:.4g} mm off on average" in text
+    assert f"at worst (row {told['held_back']['worst_row']})" in text
     assert "tried: J3 once a turn" in text
     assert load_robot(tmp_path / "mine.yaml").joints == 7
+
+
+def test_a_worst_position_beyond_all_fitted_poses_is_named():
+    rows = [Measurement(row, (10.0 * row, -10.0 * row), "tool", (0.0, 0.0, 0.0)) for row in range(2, 6)]
+    off = np.array([0.1, 0.3])
+    assert held_back_line(rows[1:], [rows[2], rows[0]], off).endswith("(row 2, beyond all fitted poses in J1, J2)")
+    assert held_back_line(rows, rows[:2], off).endswith("0.3 mm at worst (row 3)")
 
 
 def reached(bench: Bench, target: np.ndarray, normal: np.ndarray | None, count: int) -> np.ndarray:

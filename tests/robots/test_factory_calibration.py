@@ -87,6 +87,44 @@ def test_a_controllers_own_file_is_the_same_arm_with_small_numbers(tmp_path, ran
     assert compared.geometry.same
 
 
+# A UR5's and a UR3's, as their owners published them (ros-industrial-attic/ur_modern_driver, issue 179; a script for an
+# arm whose axes 3 and 4 are 12 mrad off): table, delta_theta, delta_a, delta_d, delta_alpha.
+OTHERS = {
+    "ur5": (
+        ([0, -425, -392.25, 0, 0, 0], [89.159, 0, 0, 109.15, 94.65, 82.3]),
+        [2.077509786e-05, 0.968215715555, -1.856853850148, 0.888647901450, 5.661068149e-05, -7.463107641e-05],
+        [0.000393621050, 0.184093300397, 0.144939533007, -6.432974036e-05, 7.767090401e-06, 0],
+        [4.002630978e-05, 278.244144925623573, -183.695513914913732, -94.5471513669751289, 0.000304782682, 0.000123738],
+        [-0.000271624944, 0.00125856505456124258, -0.00322052070697146503, 0.000651530165, -0.000587004657, 0],
+    ),
+    "ur3": (
+        (A, D),
+        [4.618040646e-05, -0.0596917792801850075, 0.187982530479293558, -0.128421417771249463, 1.8692e-05, -3.7087e-05],
+        [3.746454691e-05, 0.000432751256, 0.001515463734, 3.547393913e-05, 5.124090782e-05, 0],
+        [0.000223224170, -6.29131988413453058, 8.56941731705468257, -2.27804644471935935, -7.3139e-05, 0.000410720],
+        [0.000118200678, 0.0023051124802664618, 0.0120016019438704737, 0.000466335408, -0.000233982646, 0],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_calibrated_arm_is_compared_with_its_nominal_table_by_small_numbers(name, tmp_path):
+    (a, d), *deltas = OTHERS[name]
+    keys = "delta_theta", "delta_a", "delta_d", "delta_alpha"
+    path = tmp_path / "calibration.conf"
+    path.write_text("\n".join(f"{key} = {delta!r}" for key, delta in zip(keys, deltas)) + "\n", encoding="utf-8")
+    table = nominal().replace(a=np.array(a) / 1000, d=np.array(d) / 1000)
+    arm = load_factory_calibration(path, table)
+    assert np.abs([*arm.a, *arm.d]).max() < 0.5
+    found = er3a.compare(arm, table)
+    assert found.verdict == "other_arm"
+    assert "alpha3" in {each.entry for each in found.geometry.differences}
+    for each in found.geometry.differences:
+        assert abs(each.difference) < (3 if each.unit == "mm" else 1)
+    assert found.zero.same
+    assert found.aligned_mm < 5
+
+
 @pytest.mark.parametrize("stretch", [1.0, 30.0])
 def test_a_table_whose_d_cancel_is_read_as_csv_and_as_robot_file(stretch, tmp_path, random):
     columns = published(stretch)

@@ -206,7 +206,7 @@ def calibrate(
         check_poses(rows, arm, file)
         _print_plan(arm, rows, plan, [each.value for each in fixed or ()], as_json)
         return
-    others = load_measurements(held_back, arm) if held_back else None
+    others = load_measurements(held_back, arm) if held_back else ()
     try:
         with shown_work(f"{robot}: corrections are estimated"):
             source = file or load_references(measurements, arm)
@@ -228,11 +228,11 @@ def calibrate(
     if rrd:
         record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
-        print_json({"output": str(output) if output else None, **calibration_record(found, distances)})
+        print_json({"output": str(output) if output else None, **calibration_record(found, others, distances)})
         return
     print(lines_of(found))
     if distances is not None:
-        print(held_back_line(distances))
+        print(held_back_line(rows, others, distances))
     for written in (output, html, rrd):
         if written:
             print(f"{written}: written")

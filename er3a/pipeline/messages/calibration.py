@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
+from er3a.calibration.observations import Measurement
 from er3a.calibration.plan import Plan
 from er3a.calibration.residuals import ResidualStructure
 from er3a.numerics.arrays import Reals
@@ -110,10 +111,16 @@ def plan_record(found: Plan) -> dict[str, object]:
     }
 
 
-def held_back_line(distances: Reals) -> str:
-    """How far the model is from positions that the fit has not seen, mm."""
-    mean, worst = distances.mean(), distances.max()
-    return f"held back: {len(distances)} positions, {mean:.4g} mm off on average, {worst:.4g} mm at worst"
+def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement], distances: Reals) -> str:
+    """How far the model is from positions that the fit has not seen, mm, and where that is no place to rely on it."""
+    worst = others[int(distances.argmax())]
+    ranges = zip(worst.pose, zip(*(each.pose for each in fitted)))
+    beyond = [f"J{k}" for k, (own, seen) in enumerate(ranges, 1) if not min(seen) <= own <= max(seen)]
+    where = f"row {worst.row}" + (f", beyond all fitted poses in {', '.join(beyond)}" if beyond else "")
+    return (
+        f"held back: {len(distances)} positions, {distances.mean():.4g} mm off on average, {distances.max():.4g} mm at "
+        f"worst ({where})"
+    )
 
 
 def term_name(term: TriedTerm | TermEstimate) -> str:
@@ -199,12 +206,14 @@ def _coefficients(term: TermEstimate) -> str:
     return ", ".join(f"{as_text(value, '+.3f')} +- {1.96 * error:.3f}" for value, error in pairs) + " (1/1000)"
 
 
-def calibration_record(found: Calibration, distances: Reals | None = None) -> dict[str, object]:
+def calibration_record(
+    found: Calibration, others: Sequence[Measurement] = (), distances: Reals | None = None
+) -> dict[str, object]:
     """A calibration as plain data, for another program; corrections in mm and deg with half their 95 % interval.
 
     Parameters
     ----------
-    distances : of positions held back, mm
+    others, distances : positions held back, and how far they are from the model, mm
     """
     return {
         "level": found.level,
@@ -225,7 +234,12 @@ def calibration_record(found: Calibration, distances: Reals | None = None) -> di
         "beyond": _beyond(found.beyond) if found.beyond else None,
         "held_back": None
         if distances is None
-        else {"positions": len(distances), "mean_mm": float(distances.mean()), "worst_mm": float(distances.max())},
+        else {
+            "positions": len(distances),
+            "mean_mm": float(distances.mean()),
+            "worst_mm": float(distances.max()),
+            "worst_row": others[int(distances.argmax())].row,
+        },
     }
 
 

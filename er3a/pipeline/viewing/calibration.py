@@ -102,7 +102,7 @@ def write_calibration(
     ----------
     robot : the table that it started from
     command : that made it
-    files : what it was made from
+    files : what it was made from: the robot's file, if it is no name, and the measurements
     corrected : what the robot file holds, with the file's name
     recording : its recording, if there is one
     held_back : distances (P,), mm, at positions that the fit has not seen
@@ -111,6 +111,7 @@ def write_calibration(
     text = yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True))
     comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
     residuals = found.beyond.residuals if found.beyond else found.residuals
+    table = str(files[0]) if len(files) > 1 else robot.name
     with house_style():
         page.render(
             Path(__file__).with_name("calibration.html.j2"),
@@ -134,9 +135,7 @@ def write_calibration(
             tried=_tried(found),
             layers=layer_rows(comparison),
             headline=headline(comparison),
-            compare_command=shlex.join(
-                ["er3a", "compare", robot.name, f"{corrected.name}.yaml", "--html", "compared.html"]
-            ),
+            compare_command=shlex.join(["er3a", "compare", table, f"{corrected.name}.yaml", "--html", "compared.html"]),
             corrected=text,
             corrected_name=f"{corrected.name}.yaml",
             corrected_address=page.text_address(text),
