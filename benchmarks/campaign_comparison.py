@@ -39,7 +39,7 @@ from testing.published_tables import (
     write_csv,
 )
 
-ARMS, SEED = sized(250), 20261123
+ARMS, SEED = sized(60), 20261123
 LEFT_MM = 8.0  # that entries which agree to 0.1 deg, and stay as they are printed, can leave
 
 HEAD = """# Is this table that arm: random arms, and published tables

@@ -15,7 +15,7 @@ from testing.real_arms import ARMS, PARTS, Unseen, halves, load, unseen
 TITLES = {"ur5": "UR5", "wam": "WAM"}
 PUBLISHED = {"ur5": 0.1549, "wam": 2.9178}
 REPEATABILITY = {"ur5": 0.1, "wam": 2.0}
-SPLITS, SEED = sized(200), 20261123
+SPLITS, SEED = sized(100), 20261123
 TRIED_PARTS = sized(PARTS)
 
 
