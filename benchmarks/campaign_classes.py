@@ -23,9 +23,9 @@ from er3a.kinematics.classes.six_revolute import prepared, solve_six_revolute
 from testing.arms import links_of_rows
 from testing.evidence import sized
 
-POSES = sized(2000, 400)
+POSES = sized(800, 400)
 SEED, ROUNDS = 20261121, 15
-SPECIAL_ARMS, SINGULAR = POSES // 50, POSES // 400
+SPECIAL_ARMS, SINGULAR = POSES // 32, POSES // 200
 H = np.pi / 2
 UR5 = ([0, -0.425, -0.39225, 0, 0, 0], [H, 0, 0, H, -H, 0], [0.089159, 0, 0, 0.10915, 0.09465, 0.0823])
 CRX = ([0, 0.71, 0, 0, 0, 0], [-H, np.pi, -H, H, -H, np.pi], [0, 0, 0, -0.54, 0.15, -0.16])

@@ -25,8 +25,8 @@ from testing.known_faults import (
 )
 
 ROBOTS = ("er3a_c60", "er3_600")
-NOISE_MM, DRAWS, RIGHT_DRAWS, BLIND_DRAWS, SEED = 0.5, sized(3), sized(150), sized(30), 20261120
-SIZES, NOISY_SIZES, PAIRS, PAIRS_BEYOND = sized(8), sized(4), sized(100), 3.0
+NOISE_MM, DRAWS, RIGHT_DRAWS, BLIND_DRAWS, SEED = 0.5, sized(1), sized(60), sized(20), 20261120
+SIZES, NOISY_SIZES, PAIRS, PAIRS_BEYOND = sized(5), sized(2), sized(50), 3.0
 
 HEAD = """# Diagnosis: faults put into each trustworthy table
 

@@ -15,7 +15,7 @@ from testing.evidence import sized
 from testing.singular_poses import CLASSES, admissible_slots, family_holds, joints_near, tolerance, turned
 
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
-POSES, SEED = sized(2000), 20261120
+POSES, SEED = sized(1000), 20261120
 
 
 def judged(task: tuple[str, str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -86,8 +87,10 @@ def test_demonstrations_are_counted_apart_and_expectations_that_are_not_met_fail
         "inverse": "demonstrations, which fail as expected: 2",
         "collision": "expected: fail",
     }
+    not_for_it = replace(NOT_FOR_IT, expected="fail")  # has come to no other verdict
     for level in ("caution", "fail"):
-        assert [each.stage for each in (GOOD, MEANT, HOLDS_MEANT, NOT_MET) if each.counts(level)] == ["collision"]
+        counted = [each.stage for each in (GOOD, MEANT, HOLDS_MEANT, NOT_MET, not_for_it) if each.counts(level)]
+        assert counted == ["collision"]
 
 
 def test_what_counts_from_which_level_on():

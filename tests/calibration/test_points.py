@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import er3a
 from er3a.calibration.fit import Fit, covariance_by_poses
-from er3a.calibration.observations import Measurement
+from er3a.calibration.observations import Measurement, PointObservations
 from er3a.calibration.outcomes import NotToldApart
 from er3a.calibration.terms import JointErrors, JointTerm, candidates
 from er3a.dynamics.arm_model import arm_model
@@ -293,6 +293,31 @@ def test_what_is_touched_at_unknown_places_corrects_a_table(kind, random, tmp_pa
         if each.name in ("a2", "a3"):
             true = truth["a"][each.parameter.joint - 1] * ratio * 1000
             assert each.nominal + each.correction == pytest.approx(true, abs=3 * each.half_width)
+
+
+@pytest.mark.parametrize("kind", ["place", "plane", "bar"])
+def test_small_shifts_change_what_is_observed_by_its_derivative(kind, random):
+    """Of points at a place, in a plane, and on a ball about a socket at a length that is not known."""
+    away = random.normal(size=(20, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    on = {"place": 0 * away, "plane": away * [1, 1, 0], "bar": 0.3 * away}[kind] + [0.4, 0.1, 0.2]
+    whole = np.ones((20, 3), bool)
+    whole[:, 1:] = kind == "place"
+    seen = PointObservations(
+        on,
+        whole[:, 0],
+        whole,
+        np.zeros(whole.sum()),
+        np.ones(whole.sum()),
+        False,
+        np.arange(20),
+        (),
+        np.zeros(20, int),
+        (kind,),
+    )
+    shift, step = random.normal(size=(20, 3)), 1e-6
+    slope = (seen.relative(on + step * shift) - seen.relative(on - step * shift)) / (2 * step)
+    np.testing.assert_allclose(slope[whole], seen.relative_shift(shift, on)[whole], atol=1e-4)
 
 
 DISTANCES = {

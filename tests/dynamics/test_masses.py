@@ -88,6 +88,11 @@ def test_the_sum_against_the_manufacturers_weight(arm):
     assert findings(27.0) == []  # link 6 is missing, so less is no fault
     (off,) = findings(15.0)
     assert (off.sum_kg, off.weight_kg, off.complete) == (pytest.approx(20.06), 15.0, False)
+    flange = LinkMass(6, MassBody(0.1, inertia=(1e-4, 1e-4, 1e-4, 0, 0, 0)))
+    arm = arm.replace(masses=replace(arm.masses, links=(*arm.masses.links, flange)))
+    assert [each.complete for each in findings(27.0)] == [True]
+    arm = arm.replace(masses=replace(arm.masses, links=tuple(each for each in arm.masses.links if each.link)))
+    assert findings(27.0) == []  # the base is missing
 
 
 def test_what_no_body_can_be():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pinocchio
@@ -12,7 +13,7 @@ import pytest
 
 import er3a
 from er3a.dynamics.arm_model import arm_model
-from er3a.dynamics.margins import parameters, torque_tolerance
+from er3a.dynamics.margins import load_tolerance, parameters, torque_tolerance
 from er3a.dynamics.torques import accelerations, power_imbalance, torque_parts
 from er3a.errors import Er3aError, PoseError, RobotError, ShapeError
 from er3a.kinematics.chain import link_parts
@@ -390,6 +391,14 @@ def test_the_regressor_gives_the_torques_and_the_tolerance_bounds_them():
         other = arm.replace(masses=Masses(tuple(links)))
         off = np.abs(er3a.torques(other, q, qd, qdd, load) - tau)
         assert (off <= 1.25 * half + 1e-3).all()
+    # The worst of a load alone is reached where its mass and centre are off in all coordinates.
+    reached = np.zeros_like(tau)
+    for signs in product((-1, 1), repeat=4):
+        shifted = tuple(np.array(load.centre) + 0.004 * np.array(signs[1:]))
+        mass = load.mass + 0.1 * signs[0]
+        changed = Load(mass, shifted, tuple(mass / load.mass * value for value in load.inertia))
+        reached = np.maximum(reached, np.abs(er3a.torques(arm, q, qd, qdd, changed) - tau))
+    np.testing.assert_allclose(load_tolerance(model, q, qd, qdd, "official"), reached, rtol=0.1, atol=0.01)
 
 
 def test_friction_of_a_joint_that_only_rounding_moves():

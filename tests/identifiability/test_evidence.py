@@ -143,12 +143,13 @@ def test_every_interval_holds_its_value_and_every_status_has_its_reason():
             assert each.by or each.status in ("open", "given")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("entry", "by", "status"),
     [
-        pytest.param("d4", 0.15, "settled_up_to_signs", marks=pytest.mark.long),
-        pytest.param("d4", 0.5, "contradicted", marks=pytest.mark.long),
-        pytest.param("alpha3", 180.0, "contradicted", marks=pytest.mark.long),
+        ("d4", 0.15, "settled_up_to_signs"),
+        ("d4", 0.5, "contradicted"),
+        ("alpha3", 180.0, "contradicted"),
         ("lower1", 10.0, "contradicted"),
     ],
 )

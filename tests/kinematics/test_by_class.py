@@ -11,7 +11,7 @@ from er3a.files.robot_library import load_robot
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics import by_class
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import checked_parameters, parameters_of, task_mask, to_rows
+from er3a.kinematics.by_class import parameters_of, task_mask, to_rows
 from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -148,8 +148,8 @@ def test_parameters_of_redundant_arms(random):
     panda, _ = ARMS["redundant"]
     assert [(each.code, each.joint) for each in parameters_of(panda)] == [("locked_joint", 6)]
     q = random.uniform(-2, 2, 7)
-    values = checked_parameters(panda, None, q[None], 1)
-    found = inverse_batch(panda, forward(panda, q)[None], redundancy=values)
+    turned = panda.replace(direction=np.append(np.ones(6), -1.0), offset=np.append(np.zeros(6), 0.4))
+    found = inverse_batch(turned, forward(turned, q)[None], redundancy=q[6:])
     assert np.nanmin(np.abs(wrap_to_pi(found.q[0] - q)).max(axis=1)) < 1e-6
 
 

@@ -49,6 +49,14 @@ def test_factors_at_the_zero_pose(name):
     assert abs(factors.elbow) == pytest.approx(from_line, abs=1e-12)
 
 
+def test_measures_of_an_arm_that_slides_do_not_depend_on_its_size(random):
+    small = make_arm(a=[0.1, 0, 0.2, 0, 0.05, 0], d=[0.3, 0, 0, 0.25, 0, 0.1]).replace(sliding=np.arange(6) == 2)
+    large, q = small.replace(a=3 * small.a, d=3 * small.d), random.uniform(-1, 1, (20, 6))
+    one, other = conditioning(small, q, 0.4), conditioning(large, np.where(small.slides, 3 * q, q), 1.2)
+    np.testing.assert_allclose(other.smallest_singular_value, one.smallest_singular_value, rtol=1e-9)
+    np.testing.assert_allclose(other.manipulability, one.manipulability, rtol=1e-9)
+
+
 def test_factors_change_sign_across_each_singularity(robot):
     q = np.array([0.1, 0.2, -0.1, 0.4, 0.0, 0.3])
     wrist = determinant_factors(robot, q + np.outer([-1e-3, 1e-3], np.eye(6)[4])).wrist

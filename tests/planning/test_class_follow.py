@@ -176,6 +176,7 @@ BENT = [  # joints at the start, deg; where the line ends: m, and quaternion (sc
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("start", "point", "turn"), BENT)
 def test_arm_angle_bends_more_often_where_a_parabola_leaves_the_limits(start, point, turn):
     q, end = np.radians(start), np.eye(4)

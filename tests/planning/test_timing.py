@@ -85,5 +85,6 @@ def test_unknown_speeds_are_assumed_and_known_ones_kept():
     assumed = np.radians([90.0] * 6)
     known, unknown = (joint_limits(load_robot(name), assumed, 0.5) for name in ("er3_600", "er3a_c60"))
     np.testing.assert_allclose(np.degrees(known.speed), [400, 300, 520, 500, 530, 840])
+    assert [each.speed_assumed.tolist() for each in (known, unknown)] == [[False] * 6, [True] * 6]
     np.testing.assert_allclose(unknown.speed, assumed)
     np.testing.assert_allclose(unknown.acceleration, assumed / 0.5)

@@ -374,6 +374,11 @@ def test_calc_functions_use_the_arm(tmp_path):
     body += "MoveAbsJ CalcJointT(t,gripper\\WObj:=table),@;"
     joints = move(tmp_path, body, robot=ROBOT)
     np.testing.assert_allclose(joints.base.pose @ joints.target.pose, flange, atol=1e-9)
+    beside, aside = "fixed:=[FALSE,[[0,0,120],[1,0,0,0]]", "fixed:=[TRUE,[[50,0,120],[0,1,0,0]]"
+    held = move(
+        tmp_path, body.replace("table),@", "table),v100,fine,fixed"), data=DATA.replace(beside, aside), robot=ROBOT
+    )
+    np.testing.assert_allclose(held.base.pose @ held.target.pose, flange @ held.tool.pose, atol=1e-9)
 
 
 QUARTERS = [  # confdata, joints in deg, whether they have it
@@ -435,6 +440,7 @@ def test_of_several_solutions_the_one_with_the_configuration_is_taken(tmp_path):
         program = read_program(saved(tmp_path, f"{supervised} {word} {impossible},@;"))
         codes = {each.finding.code for each in check_program(program, ROBOT, CheckOptions(start=np.zeros(6))).findings}
         assert ("configuration_not_met" in codes) == (not supervised)
+        assert bool(motions(execute(program))[-1].target.configuration) == (not supervised)
 
 
 def test_a_line_that_arrives_in_another_configuration_is_named(tmp_path):

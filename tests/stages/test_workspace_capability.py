@@ -183,6 +183,7 @@ def test_a_tool_that_points_elsewhere_is_told_so():
     assert context["best_text"] == ""
 
 
+@pytest.mark.long
 def test_cells_whose_middles_all_lie_out_of_reach_are_no_error():
     robot = load_robot("er3_600")
     done = tool_capability(robot, settings(), 3.0, proven=prove_robot(robot, 200, 500, 1))

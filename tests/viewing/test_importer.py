@@ -22,6 +22,7 @@ def called(file: Path) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run(command, capture_output=True, cwd=ROOT, check=False)
 
 
+@pytest.mark.long
 def test_a_robot_file_becomes_a_recording_in_which_each_joint_moves(tmp_path):
     done = called(robot_path("er3_600"))
     assert done.returncode == 0, done.stderr
@@ -36,7 +37,7 @@ def test_a_robot_file_becomes_a_recording_in_which_each_joint_moves(tmp_path):
     ("name", "text", "code"),
     [
         ("config.yaml", "kind: study\n", NOT_MINE),
-        ("notes.txt", "", NOT_MINE),
+        pytest.param("notes.txt", "", NOT_MINE, marks=pytest.mark.long),
         ("arm.yaml", "kind: robot\n", 1),
     ],
 )

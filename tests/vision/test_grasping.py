@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise, repeat
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from er3a.files.hand_eye_file import load_hand_eye
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.stages.vision.compute import grasp_programs
 from er3a.planning.timing import joint_limits
@@ -27,7 +29,7 @@ from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, GraspUnlikely, NoTransfer, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.next_view import board_visible, next_view
-from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error
+from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error, table_covariance
 from testing.camera_cells import CARRIED, FIXED, FOLDER, SCENE, seen_from
 from testing.hand_eye_sets import pose
 
@@ -115,9 +117,10 @@ def test_an_object_is_graspable_only_at_the_probability_asked_for(cell):
     target = file.objects[0].detected()
     T = made.X @ target.T_camera_object
 
-    def plan(sigma: float, level: float):
-        own = replace(task, needs=replace(NEEDS, probability=level))
-        return plan_grasp(own, target, T, lambda q: np.eye(6) * sigma**2)
+    def plan(sigma: float, level: float, others: float | None = None):
+        """With that deviation, or another one of all grasps but the first."""
+        own, sizes = replace(task, needs=replace(NEEDS, probability=level)), chain([sigma], repeat(others or sigma))
+        return plan_grasp(own, target, T, lambda q: np.eye(6) * next(sizes) ** 2)
 
     sure, wide = plan(1e-4, 0.95), plan(2e-2, 0.95)
     assert sure.chosen.probability > 0.99
@@ -126,16 +129,21 @@ def test_an_object_is_graspable_only_at_the_probability_asked_for(cell):
     assert wide.refusal.probability < 0.1
     assert wide.refusal.needed == 0.95
     assert plan(2e-2, 0.0).chosen.probability == pytest.approx(wide.refusal.probability, abs=0.05)
+    assert 0.1 < plan(3e-3, 0.95, others=2e-2).refusal.probability < 0.95  # that of the likeliest
 
 
 @pytest.mark.long
 def test_table_errors_are_those_of_tables_with_drawn_entries():
     robot, q = load_robot("er3a_c60"), np.radians([10, -30, -20, 5, -30, 10])
     accuracy = ArmAccuracy(length_deviation=1e-4, angle_deviation=2e-4)
-    from er3a.vision.point_error import table_covariance
-
     random, T = np.random.default_rng(9), forward(robot, q)
-    errors = []
+    picture = np.radians([-20, 10, 15, 0, 40, 0])
+    A, T_camera_object = forward(robot.without_tool(), picture), transform(np.array([0.02, 0.01, 0.1]), np.zeros(3))
+    found = SimpleNamespace(
+        X=transform(np.array([0.1, 0.0, 0.3]), np.radians([5, 0, 90])), covariance=np.zeros((12, 12))
+    )
+    there = found.X @ T_camera_object
+    errors, seen = [], []
     for _ in range(3000):
         lengths, angles = random.normal(0, 1e-4, (2, 6)), random.normal(0, 2e-4, (2, 6))
         other = robot.replace(
@@ -145,9 +153,11 @@ def test_table_errors_are_those_of_tables_with_drawn_entries():
             offset=robot.offset + angles[1],
         )
         errors.append(step_between(T, forward(other, q)))
-    np.testing.assert_allclose(
-        np.diag(np.cov(np.array(errors).T)), np.diag(table_covariance(robot, q, accuracy)), rtol=0.12
-    )
+        seen.append(step_between(A @ there, forward(other.without_tool(), picture) @ there))
+    expected = table_covariance(robot, q, accuracy)
+    np.testing.assert_allclose(np.diag(np.cov(np.array(errors).T)), np.diag(expected), rtol=0.12)
+    parts = seen_pose_error(found, T_camera_object, np.zeros((6, 6)), accuracy, (robot, q, picture))
+    np.testing.assert_allclose(np.diag(np.cov(np.array(seen).T)), np.diag(parts.table - expected), rtol=0.12)
 
 
 def test_the_next_view_sees_the_board_is_free_and_keeps_its_promise(cell):

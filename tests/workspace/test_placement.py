@@ -257,6 +257,37 @@ def test_an_arm_without_limits_serves_what_lies_in_its_shell(height, answer):
     assert prove_place(robot, task, centre, False, MIXED, roll_of(robot, 1), most_poses=400_000)[0] == answer
 
 
+def nearest_and_farthest(centre: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distances, m, of the points of boxes (..., 3) under a tool that points down from the shell arm's shoulder."""
+    away = np.abs(centre + np.array([0.0, 0.0, 0.1 - 0.3]))  # the wrist centre stands 0.1 m above the tool
+    return np.linalg.norm(np.maximum(away - half, 0), axis=-1), np.linalg.norm(away + half, axis=-1)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_place_is_proven_up_to_where_its_farthest_corner_leaves_the_shell(turned):
+    task = Task(np.array([0.3, 0.2, 0.1]), DOWN, 0.0, -9, 0)
+    half = np.array([0.1, 0.15, 0.05] if turned else [0.15, 0.1, 0.05])
+    height = 0.3 - 0.1 - 0.05 + np.sqrt(1 - (half[0] + 0.3) ** 2 - (half[1] + 0.1) ** 2)
+    for step, answer in ((-1e-3, PROVEN), (0.01, REFUTED)):
+        centre = np.array([0.3, -0.1, height + step])
+        assert (nearest_and_farthest(centre, half)[1] < 1) == (answer == PROVEN)
+        found, _ = prove_place(shell_arm(), task, centre, turned, MIXED, roll_of(shell_arm(), 1), most_poses=100_000)
+        assert found == answer
+
+
+def test_the_bricks_that_are_proven_are_those_that_lie_in_the_shell():
+    robot, roll = shell_arm(), roll_of(shell_arm(), 1)
+    task = Task(np.array([0.3, 0.2, 0.1]), DOWN, 0.0, -0.86, 0)
+    field = survey(robot, task, roll, 0.1)
+    proven = proven_bricks(robot, task, field, roll)
+    corner = field.origin + np.moveaxis(np.indices(proven.shape), 0, -1) * field.spacing
+    nearest, farthest = nearest_and_farthest(corner + field.spacing / 2, field.spacing / 2)
+    above = corner[..., 2] > task.lowest - 1e-9
+    assert not (proven & ~(above & (nearest > 0.2) & (farthest < 1))).any()
+    assert proven[above & (nearest > 0.21) & (farthest < 0.99)].all()
+    assert proven.sum() > 1000
+
+
 @pytest.mark.long
 def test_a_tool_aside_is_proven_by_rolls(random):
     robot = shell_arm(*NARROW, tool=TOOL_ASIDE)
