@@ -401,6 +401,10 @@ class NearSingular:
         return np.where(np.isnan(ratios[0]), -1.0, ratios.min(axis=0))
 
 
+USUAL_NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
+"""Thresholds where no study gives others."""
+
+
 def factor_of(factors: DeterminantFactors, kind: SingularityType) -> Any:
     """The determinant's factor of one type, (...,) in rad or m."""
     return getattr(factors, kind)

@@ -22,6 +22,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
+from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import plain
@@ -32,7 +33,6 @@ from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import ProofRequirements
 from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import (
-    NEAR,
     CheckOptions,
     LocatedFinding,
     MotionVerdict,
@@ -378,13 +378,13 @@ def programs_of(
     missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)
     if missing is not None:
         raise InputError(file, "paths", f"there is no path '{missing}'", f"Known: {', '.join(e.name for e in listed)}")
-    for each in listed_motions(file, task, ProofRequirements(task.limits.rates, NEAR), CHECKS_PER_SAMPLE):
+    for each in listed_motions(file, task, ProofRequirements(task.limits.rates, USUAL_NEAR), CHECKS_PER_SAMPLE):
         if only and each.listed not in only:
             continue
         if each.motion is None:
             yield PathProgram(each.name, each.outcome_unfollowed, None)
             continue
-        verdict = judge(robot, each.motion, NEAR, task.limits).verdict
+        verdict = judge(robot, each.motion, USUAL_NEAR, task.limits).verdict
         if collisions(measured(surroundings, each.motion)):
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
         if (verdict != "safe" and not unsafe) or not np.isfinite(each.motion.q[0]).all():

@@ -16,7 +16,7 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
 from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import NearSingular
+from er3a.kinematics.singularity import USUAL_NEAR, NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.planning.commands import (
     Command,
@@ -57,7 +57,6 @@ from er3a.robots.robot import Robot
 ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
 MOST_MOTIONS = 1_000
 MOST_ROUNDS = 20  # times as many motions as may differ are carried out
-NEAR = NearSingular(float(np.radians(5)), float(np.radians(5)), 0.03)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +82,7 @@ class CheckOptions(ByValue):
     start: Reals | None = None
     frames: Mapping[str, Reals] = field(default_factory=dict)
     scene: Scene | None = None
-    near: NearSingular = NEAR
+    near: NearSingular = USUAL_NEAR
     assumed_speed: Reals | None = None
     acceleration_time: float = 0.25
     penetration_tolerance: float = 0.001

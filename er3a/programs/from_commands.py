@@ -65,6 +65,7 @@ def listing_of(
     start: Reals,
     name: str = "path",
     title: str = "",
+    *,
     ends: Reals | None = None,
     load: MassBody | str | None = None,
 ) -> PathListing:

@@ -226,10 +226,6 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     void = np.array(printed.void_mm if printed.void_mm else (np.nan,) * 3)
     move, line = (_path(trajectory, name) for name in (MOVE, LINE))
     repair = next((tried.motion for tried in line.avoidance if tried.name == line.strategy), None)
-    finding = workspace.verdict.finding
-    changes = finding.single_changes if isinstance(finding, VoidUnexpected) else ()
-    least = 0.1 * printed.void_litres[0] if printed.void_litres else 0.0
-    gone = tuple(change for change in changes if change.left_litres[1] < least)
     rpy = (0.0, 90.0, 0.0), (30.0, 90.0, 30.0)
     same = [transform(np.zeros(3), np.radians(angles)) for angles in rpy]
     rounds = validation.round_trips
@@ -279,12 +275,18 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
         ranked_apart_percent=_ranked_apart_percent(robot, study.seed),
         round_trip_deg=rounds.joint_error_deg,
         round_trips=rounds.poses,
-        changes_tried=len(changes),
-        changes_gone=gone,
-        changes_meeting=tuple(
-            each for each in gone if _meets_zero_pose(with_entry(robot, each.column, each.joint, each.tried))
-        ),
+        **_changes_of_the_void(robot, workspace, printed),
     )
+
+
+def _changes_of_the_void(robot: Robot, workspace: WorkspaceSummary, printed: TableNumbers) -> dict[str, Any]:
+    """Single changes of the printed table that take its void away, and those of them that keep the pose at zero."""
+    finding = workspace.verdict.finding
+    changes = finding.single_changes if isinstance(finding, VoidUnexpected) else ()
+    least = 0.1 * printed.void_litres[0] if printed.void_litres else 0.0
+    gone = tuple(change for change in changes if change.left_litres[1] < least)
+    meeting = [each for each in gone if _meets_zero_pose(with_entry(robot, each.column, each.joint, each.tried))]
+    return {"changes_tried": len(changes), "changes_gone": gone, "changes_meeting": tuple(meeting)}
 
 
 def _summary(results: Path, robot: str, stage: str):  # type: ignore[no-untyped-def]  # the stage's own

@@ -299,7 +299,7 @@ def _write(
             code_digest(__name__, *all_messages()),
             seed=study.seed,
         ),
-        others={LANGUAGE_NAMES[code]: name for code, name in others.items()},
+        others={LANGUAGE_NAMES.get(code, code): name for code, name in others.items()},
         counts=[(status, BADGES[status], sum(row.status == status for row in rows)) for status in AGREEMENT],
         agreement_words=AGREEMENT,
         sections=[(code, title, [rows[k] for k in _of_section(code)]) for code, title in SECTIONS.items()],

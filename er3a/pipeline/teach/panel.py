@@ -14,7 +14,7 @@ from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.files.scene_file import load_scene
-from er3a.kinematics.singularity import TYPES, NearSingular, characteristic_length
+from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
 from er3a.pipeline.code_digest import code_digest
@@ -264,9 +264,6 @@ NEAR_TOUCH = 0.03  # m
 KINDS = {HULL: "hull", CYLINDER: "cylinder", HALF_SPACE: "half_space"}
 
 
-NEAR = NearSingular(wrist_rad=np.radians(5.0), elbow_rad=np.radians(5.0), shoulder_m=0.03)
-
-
 def write_teach_page(study: Study, name: str, results: Path, output: Path) -> None:
     """Write the teach panel of a robot of the study to ``output``; the verdict on its table is in ``results``."""
     validated = results / name / "validation"
@@ -292,7 +289,7 @@ def write_panel(
     *,
     command: str | None,
     provenance: Provenance,
-    near: NearSingular = NEAR,
+    near: NearSingular = USUAL_NEAR,
     scene: Scene | None = None,
     robot_pages: Sequence[str] = (),
     first_caveat: Caveat | None = None,

@@ -61,7 +61,7 @@ def written(
     if ends is not None and not np.isfinite(ends).all():
         ends = None
     load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
-    made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends, load)
+    made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends=ends, load=load)
     options = WriteOptions(robot, start, notes=(*unsafe, *made.findings), head=head)
     program = write_program(made.listing, language, options)
     return program.files, program.findings
