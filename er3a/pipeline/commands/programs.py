@@ -99,15 +99,10 @@ def check_program(
         for each in checked:
             for line in lines_of(each, verdicts):
                 print(line)
-        for each in checked:
-            for line in (cycle_line(each), not_examined_line(each)):
-                if line:
-                    print_note(line)
+        of_files = [line(each) for each in checked for line in (cycle_line, not_examined_line)]
         missed = next((each.missed for each in checked if each.missed), ())
-        for line in (shapes_line(checked), missed_line(missed)):
-            if line:
-                print_note(line)
-        print_note(summary_line(checked))
+        for line in filter(None, (*of_files, shapes_line(checked), missed_line(missed), summary_line(checked))):
+            print_note(line)
     if any(each.check is None for each in checked):
         raise typer.Exit(2)
     if any(RANKS[each.level] >= RANKS[fail_on.value] for each in checked):
