@@ -11,13 +11,14 @@ import hashlib
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
+from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.errors import InputError
@@ -25,7 +26,8 @@ from er3a.files.path_file import load_paths
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.programs import remedy_at, say
-from er3a.pipeline.results import plain
+from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
+from er3a.pipeline.stages.left_out import left_out_of_collisions
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured
 from er3a.pipeline.stages.trajectory.motion import listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, written
@@ -38,10 +40,11 @@ from er3a.program_check.check_program import (
     MotionVerdict,
     ProgramCheck,
     assumed_limits,
+    check_program,
 )
-from er3a.program_check.program_check_findings import Level
+from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.instructions import Place
-from er3a.programs.languages import WITHOUT_JOINTS, not_written
+from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
 from er3a.programs.program_findings import WriteFinding
 from er3a.programs.syntax import LanguageName
 from er3a.programs.writing import program_name
@@ -56,16 +59,39 @@ UNREADABLE = "unreadable"
 
 @dataclass(frozen=True, eq=False)
 class CheckedFile:
-    """A program file with its check, or with the error that it could not be read for."""
+    """A program file with its check, or with the error that it could not be read for.
+
+    ``missed``: what was not examined and may turn each motion's verdict, which therefore is no pass.
+    """
 
     file: Path
     check: ProgramCheck | None
     error: InputError | None = None
+    missed: tuple[LeftOut, ...] = ()
 
     @property
     def level(self) -> Level:
         """The worst of its findings; a program that can't be read fails."""
         return "fail" if self.check is None else self.check.level
+
+
+def checked_file(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
+    """Read a program and check it; no motion of it passes where obstacles or shapes are missing."""
+    try:
+        check = check_program(read_program(file), robot, options)
+    except InputError as error:
+        return CheckedFile(file, None, error)
+    missed = missed_collisions(robot, options.scene)
+    if missed:
+        verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
+        check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)
+    return CheckedFile(file, check, missed=missed)
+
+
+def missed_collisions(robot: Robot, scene: Scene | None) -> tuple[LeftOut, ...]:
+    """What a check for collisions leaves out without which nothing passes."""
+    left_out = left_out_of_collisions(bodies_of(robot, scene), scene)
+    return tuple(each for each in left_out if each.subject in NEVER_A_PASS)
 
 
 def lines_of(checked: CheckedFile, verdicts: bool = False) -> list[str]:
@@ -151,6 +177,11 @@ def shapes_line(checked: Sequence[CheckedFile]) -> str:
     return "" if found is None else say(found)
 
 
+def missed_line(missed: tuple[LeftOut, ...]) -> str:
+    """What was not examined of all motions; empty where nothing is missing."""
+    return say(NoPass(missed)) if missed else ""
+
+
 def not_examined_line(checked: CheckedFile) -> str:
     """Which lines were not examined, or not each time that they are carried out; empty if all were."""
     if checked.check is None or not checked.check.not_examined:
@@ -194,7 +225,13 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                 "language": check.execution.program.language,
                 "level": check.level,
                 "complete": check.execution.complete,
-                "not_examined": [{**_place_record(one.place), "what": one.what} for one in check.not_examined],
+                "not_examined": [
+                    *(
+                        {**_place_record(Place(each.file)), "what": one.subject, "names": one.names}
+                        for one in each.missed
+                    ),
+                    *({**_place_record(one.place), "what": one.what, "names": []} for one in check.not_examined),
+                ],
                 "shapes_assumed": check.shapes is not None,
                 "cycle": plain(check.cycle),
                 "findings": [_finding_record(one) for one in check.findings],
@@ -274,16 +311,19 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
 
 def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
     """What was not examined, as the log's notifications."""
+    found = []
+    for each in checked:
+        found += [(missed_line((one,)), Place(each.file)) for one in each.missed]
+        for one in each.check.not_examined if each.check else ():
+            found.append((f"not examined, or not each time: {one.what}", one.place))
     return [
         {
             "level": "warning",
             "descriptor": {"id": "not_examined"},
-            "message": {"text": f"not examined, or not each time: {one.what}"},
-            "locations": [_location(one.place)],
+            "message": {"text": text},
+            "locations": [_location(place)],
         }
-        for each in checked
-        if each.check is not None
-        for one in each.check.not_examined
+        for text, place in found
     ]
 
 

@@ -180,11 +180,9 @@ LeftOutSubject = Literal[
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
-    ("uncovered_links", "allowed_contacts", "arm_errors", "objects_out_of_view", "hidden_voids")
+    ("obstacles", "uncovered_links", "allowed_contacts", "arm_errors", "objects_out_of_view", "hidden_voids")
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""
-OF_MOTIONS: frozenset[LeftOutSubject] = frozenset((*NEVER_A_PASS, "obstacles"))
-"""What no verdict on motions passes without."""
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,7 @@ from er3a.vision.vision_findings import (
     DirectionStatus,
     DirectionTried,
     FarFromFit,
+    FewSamples,
     HandEyeError,
     LittleMotion,
     MoreScatter,
@@ -365,6 +366,7 @@ def _product(T: Reals, axes: str, columns: list[int]) -> Reals:
 
 
 LEAST_SAMPLES = 3
+FEW_SAMPLES = 6  # of which none is judged by the others
 EQUAL = 1e-9
 LEAST_TURN = np.radians(0.5)
 LEAST_SPREAD = np.radians(1.0)
@@ -488,7 +490,7 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     suspects: list[Suspect] = list(angles.found)
     greatest, apart = _check_determined(samples.take(used))
     refined = _fitted(samples.take(used))
-    while used.sum() > 2 * LEAST_SAMPLES and (worst := worst_sample(samples.take(used), refined)):
+    while used.sum() > FEW_SAMPLES and (worst := worst_sample(samples.take(used), refined)):
         used[np.flatnonzero(used)[worst[0]]] = False
         suspects.append(worst[1])
         greatest, apart = _check_determined(samples.take(used))
@@ -603,6 +605,8 @@ def _warnings(
     found: list[CalibrationWarning] = []
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
         found.append(LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
+    if len(samples) <= FEW_SAMPLES:
+        found.append(FewSamples(len(samples)))
     free = 6 * len(samples) - 12
     largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:

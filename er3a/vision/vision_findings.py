@@ -145,6 +145,14 @@ class LittleMotion:
 
 
 @dataclass(frozen=True)
+class FewSamples:
+    """So few samples that none is judged by the others, and that their scatter is hardly known."""
+
+    samples: int
+    code: Literal["few_samples"] = "few_samples"
+
+
+@dataclass(frozen=True)
 class MoreScatter:
     """The residuals are larger than the stated standard deviations allow."""
 
@@ -165,6 +173,7 @@ CalibrationWarning = (
     | OtherDirection
     | BoardScale
     | LittleMotion
+    | FewSamples
     | MoreScatter
 )
 

@@ -17,7 +17,7 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.instructions import ArmMotion, JointTarget, PoseTarget, numbers_of
+from er3a.programs.instructions import ArmMotion, JointTarget, PoseTarget, UnresolvedTarget, numbers_of
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 
@@ -317,6 +317,19 @@ def test_forward_kinematics_by_place_and_by_name(tmp_path, call):
     own = tool if "tcp" in call else ROBOT.tool
     wanted = forward(ROBOT.replace(base=np.eye(4), tool=own), NEAR)
     np.testing.assert_allclose(motion.target.pose, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("radius", ["", ", r=0", ", r=0.05", ", r=b"])
+def test_where_the_arm_is_behind_a_blended_motion_is_not_known(tmp_path, radius):
+    """Universal Robots, User Manual UR5/CB3 3.10, section 14.6: what follows is evaluated on entering the blend."""
+    reads = ["q = get_actual_joint_positions()\nmovej(q)", "x = get_actual_tcp_pose()\nmovel(x)"]
+    reads.append("x = get_forward_kin()\nmovel(x)")
+    for read in reads:
+        found = motions(tmp_path, f"b = socket_read_ascii_float(1)\nmovej({NEAR_TEXT}{radius})\n{read}\n")
+        known = not isinstance(found[1].target, UnresolvedTarget)
+        assert known == (radius in ("", ", r=0")), read
+    way = f"movej({NEAR_TEXT}{radius})\nmovej({FAR_TEXT})\nmovej(get_actual_joint_positions())\n"
+    np.testing.assert_allclose(motions(tmp_path, f"b = 0.1\n{way}")[2].target.joints, FAR, atol=1e-8)
 
 
 def test_inverse_kinematics_with_a_tool_of_its_own(tmp_path):

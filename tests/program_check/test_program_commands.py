@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from er3a.pipeline import (
@@ -20,6 +21,7 @@ from er3a.programs.program_findings import TargetsLeftOut
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = "data/programs/faults"
 HOME = "0,-10,-10,0,-70,0"
+SCENE = "data/scenes/table_and_post.yaml"
 
 
 @pytest.fixture(autouse=True)
@@ -84,7 +86,8 @@ def test_json_holds_verdicts_and_parameters():
 
 def test_what_is_not_examined_is_named_in_text_json_and_sarif(tmp_path):
     file, sarif = "data/programs/weld_seam.src", tmp_path / "found.sarif"
-    whole, part = check(file, "--json"), check(file, "--json", "--most-motions", "3", "--sarif", str(sarif))
+    cut = (file, "--scene", SCENE, "--most-motions", "3")
+    whole, part = check(file, "--scene", SCENE, "--json"), check(*cut, "--json", "--sarif", str(sarif))
     assert json.loads(whole.stdout)[0]["not_examined"] == []
     found = json.loads(part.stdout)[0]
     lines = [each["line"] for each in found["not_examined"]]
@@ -95,7 +98,33 @@ def test_what_is_not_examined_is_named_in_text_json_and_sarif(tmp_path):
     (log,) = json.loads(sarif.read_text())["runs"]
     notes = log["invocations"][0]["toolExecutionNotifications"]
     assert [each["locations"][0]["physicalLocation"]["region"]["startLine"] for each in notes] == lines
-    assert "not examined, or not each time: motions of lines" in check(file, "--most-motions", "3").stderr
+    assert "not examined, or not each time: motions of lines" in check(*cut).stderr
+
+
+def test_no_motion_passes_without_obstacles_shapes_or_contacts(tmp_path):
+    """The program's motions pass beside the scene; each of these could hide that they don't."""
+    file, sarif = "data/programs/weld_seam.src", tmp_path / "found.sarif"
+    scene, robot = (yaml.safe_load(Path(each).read_text()) for each in (SCENE, "data/robots/er3a_c60.yaml"))
+    scene["collision"] = {"allow": [{"pair": ["link_6", "table"], "reason": "A test"}]}
+    (tmp_path / "allowing.yaml").write_text(yaml.safe_dump(scene))
+    robot["envelopes"]["capsules"] = robot["envelopes"]["capsules"][:2]
+    (tmp_path / "er3a_c60.yaml").write_text(yaml.safe_dump(robot))
+    for arm, scene_file, expected in (
+        ("er3a_c60", SCENE, []),
+        ("er3a_c60", None, [("obstacles", [])]),
+        ("er3a_c60", str(tmp_path / "allowing.yaml"), [("allowed_contacts", ["link_6/table"])]),
+        (str(tmp_path / "er3a_c60.yaml"), SCENE, [("uncovered_links", ["link_2", "link_3", "link_4", "link_6"])]),
+    ):
+        around = ("--scene", scene_file) if scene_file else ()
+        words = ("check-program", file, "--robot", arm, "--start", HOME, *around)
+        found = json.loads(run(*words, "--json", "--sarif", str(sarif)).stdout)[0]
+        assert [(each["what"], each["names"]) for each in found["not_examined"]] == expected
+        levels = {found["level"], *(each["level"] for each in found["motions"])}
+        assert levels == {"caution" if expected else "pass"}, expected
+        (log,) = json.loads(sarif.read_text())["runs"]
+        assert len(log["invocations"][0]["toolExecutionNotifications"]) == len(expected)
+        assert run(*words, "--fail-on", "caution").exit_code == bool(expected)
+        assert ("therefore no pass" in run(*words).stderr) == bool(expected)
 
 
 def test_sarif_has_rules_places_and_fingerprints_that_stay(tmp_path):
@@ -173,7 +202,8 @@ def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch):
 
 
 def test_assumed_shapes_and_ways_from_nowhere_are_named():
-    done = run("check-program", "data/programs/weld_seam.src", "--robot", "er3a_c60", "--verdicts", "--json")
+    words = ("data/programs/weld_seam.src", "--robot", "er3a_c60", "--scene", SCENE, "--verdicts", "--json")
+    done = run("check-program", *words)
     (record,) = json.loads(done.stdout)
     assert record["shapes_assumed"] is True
     assert {each["what"] for each in record["not_examined"]} == {"way"}

@@ -16,13 +16,13 @@ from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import (
     NEVER_A_PASS,
-    OF_MOTIONS,
     LeftOut,
     LeftOutSubject,
     NoPass,
     Summary,
     Verdict,
     read_results,
+    summary_type,
 )
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
@@ -30,7 +30,7 @@ from er3a.pipeline.stages.inverse.compute import compute as inverse
 from er3a.pipeline.stages.programs.compute import compute as programs
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as trajectory
-from er3a.pipeline.stages.trajectory.model import RESULTS, TrajectorySummary
+from er3a.pipeline.stages.trajectory.model import RESULTS
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.stages.validation.compute import compute as validation
 from er3a.pipeline.stages.vision.compute import compute as vision
@@ -131,7 +131,10 @@ def test_programs_name_their_lines_and_starts(study, tmp_path):
 
 def test_free_space_names_its_samples(study, tmp_path):
     quick = {"samples": 1000, "cells_across": 4, "rounds": 0, "scene": None}
-    found = subjects(collision(changed(study, {"paths": one_path(tmp_path)}, collision=quick), ROBOT))
+    results = collision(changed(study, {"paths": one_path(tmp_path)}, collision=quick), ROBOT)
+    found = subjects(results)
+    assert [each.subject for each in results.summary.verdict.missed] == ["obstacles"]
+    assert results.summary.verdict.status == "caution"
     assert found["joint_vectors"].amount == 1000
     assert found["lost_cells"].amount >= 0
     assert found["joined_pairs"].names
@@ -176,6 +179,8 @@ def test_targets_name_what_rests_on_samples_rules_and_obstacles(study, tmp_path)
     assert ("rules" in found) == (not np.isfinite(study.robot(ROBOT).speed).all())
     assert {"obstacles", "carried", "ways_between", "bare_links", "tool"} <= found.keys()
     assert "shallow_overlaps" not in found
+    assert results.summary.verdict.status == "caution"
+    assert [each.subject for each in results.summary.verdict.missed] == ["obstacles"]
 
 
 def test_validation_names_what_no_reference_states(study, tmp_path):
@@ -245,11 +250,12 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
 
 
 def test_what_no_verdict_passes_without_turns_it_and_is_said():
-    """Whatever a stage computes, its summary makes no pass of it; of motions, not without obstacles either."""
+    """Whatever a stage computes, its summary makes no pass of it; obstacles turn no reach."""
     import er3a.pipeline.messages.collision  # noqa: F401
 
-    for kind, decisive in ((Summary, NEVER_A_PASS), (TrajectorySummary, OF_MOTIONS)):
-        assert kind.decisive == decisive
+    for stage in STAGES.values():
+        decisive = summary_type(stage.module("model").RESULTS).decisive
+        assert decisive == (NEVER_A_PASS - {"obstacles"} if stage.name == "workspace" else NEVER_A_PASS)
     for subject in LeftOutSubject.__args__:
         for status in ("pass", "caution", "fail", "no_reference"):
             verdict = Summary(

@@ -20,6 +20,7 @@ from er3a.vision.vision_findings import (
     AngleOrder,
     BoardScale,
     FarFromFit,
+    FewSamples,
     HandEyeError,
     LittleMotion,
     MoreScatter,
@@ -319,6 +320,13 @@ def test_residuals_beyond_what_is_stated_are_said():
     (found,) = calibrate_hand_eye(bad).warnings
     assert isinstance(found, MoreScatter)
     assert found.scatter == pytest.approx(3, abs=0.6)
+
+
+def test_samples_too_few_to_be_judged_by_one_another_are_said():
+    for count in (3, 6, 7):
+        found = calibrate_hand_eye(a_set("eye_in_hand", count=count))
+        assert [each.samples for each in found.warnings if isinstance(each, FewSamples)] == [count] * (count < 7)
+        assert grave_warnings(found.warnings) == ()
 
 
 def test_little_motion_is_said():

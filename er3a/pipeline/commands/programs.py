@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from er3a.errors import Er3aError, InputError
+from er3a.errors import Er3aError
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, given_files, print_json, print_note
 from er3a.programs.syntax import LanguageName
@@ -20,9 +20,7 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 if TYPE_CHECKING:
-    from er3a.pipeline.program_reports import CheckedFile
     from er3a.pipeline.progress import TimeBudget
-    from er3a.program_check.check_program import CheckOptions
     from er3a.programs.execution import KeepOn, Phase
 
 SHARE_OF_FOLLOWING = 0.5  # of the time; the rest is for checking what was followed
@@ -69,9 +67,11 @@ def check_program(
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
     from er3a.pipeline.program_reports import (
+        checked_file,
         cycle_line,
         json_of,
         lines_of,
+        missed_line,
         not_examined_line,
         sarif_of,
         shapes_line,
@@ -90,7 +90,7 @@ def check_program(
     )
     budget = TimeBudget(seconds, len(files))
     with shown_work("reading") as at:
-        checked = [_checked(file, arm, replace(options, keep_on=_until(budget, file, at))) for file in files]
+        checked = [checked_file(file, arm, replace(options, keep_on=_until(budget, file, at))) for file in files]
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     if as_json:
@@ -99,13 +99,10 @@ def check_program(
         for each in checked:
             for line in lines_of(each, verdicts):
                 print(line)
-        for each in checked:
-            for line in (cycle_line(each), not_examined_line(each)):
-                if line:
-                    print_note(line)
-        if line := shapes_line(checked):
+        of_files = [line(each) for each in checked for line in (cycle_line, not_examined_line)]
+        missed = next((each.missed for each in checked if each.missed), ())
+        for line in filter(None, (*of_files, shapes_line(checked), missed_line(missed), summary_line(checked))):
             print_note(line)
-        print_note(summary_line(checked))
     if any(each.check is None for each in checked):
         raise typer.Exit(2)
     if any(RANKS[each.level] >= RANKS[fail_on.value] for each in checked):
@@ -134,14 +131,14 @@ def write(
     from er3a.files.scene_file import load_scene
     from er3a.pipeline.messages.expectations import outcome_word
     from er3a.pipeline.messages.programs import say
-    from er3a.pipeline.program_reports import programs_of
+    from er3a.pipeline.program_reports import missed_collisions, missed_line, programs_of
     from er3a.pipeline.progress import shown_work
     from er3a.programs.program_findings import TargetsLeftOut
 
-    arm = load_robot(robot)
+    arm, around = load_robot(robot), load_scene(scene) if scene else None
     refused = 0
     with shown_work(f"{paths}: each path is judged"):
-        programs = list(programs_of(paths, arm, language, load_scene(scene) if scene else None, only, unsafe))
+        programs = list(programs_of(paths, arm, language, around, only, unsafe))
     for made in programs:
         if made.files is None:
             refused += 1
@@ -154,6 +151,8 @@ def write(
         for finding in made.findings:
             print_note(f"{made.name}: {say(finding)}")
         refused += any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
+    if line := missed_line(missed_collisions(arm, around)):
+        print_note(line)
     if refused:
         raise typer.Exit(1)
 
@@ -162,17 +161,6 @@ def _write(file: Path, text: str) -> None:
     from er3a.files.kept_files import write_atomically
 
     write_atomically(file, lambda path: path.write_text(text, encoding="utf-8"))
-
-
-def _checked(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile:
-    from er3a.pipeline.program_reports import CheckedFile
-    from er3a.program_check.check_program import check_program as check
-    from er3a.programs.languages import read_program
-
-    try:
-        return CheckedFile(file, check(read_program(file), robot, options))
-    except InputError as error:
-        return CheckedFile(file, None, error)
 
 
 def _until(budget: TimeBudget, file: Path, at: Callable[[str], None]) -> KeepOn:

@@ -177,6 +177,10 @@ TEXTS = texts(
             "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
             "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated"
         ),
+        "few_samples": (
+            "only {samples} samples: a wrong one can't be found among so few, and the intervals rest on little; add "
+            "poses, ten or more are advised"
+        ),
         "too_few_samples": "{samples} samples; {needed} are needed, and ten or more advised",
         "all_samples_equal": by(
             "stream",

@@ -12,7 +12,7 @@ import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
-from er3a.programs.evaluation import ProgramMemory
+from er3a.programs.evaluation import Position, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -61,6 +61,8 @@ PARAMETERS = {
 }
 DEFAULTS = {"movej": (1.4, 1.05), "movel": (1.2, 0.25), "movep": (1.2, 0.25), "movec": (1.2, 0.25)}
 ROBOT_BASE = NamedFrame("base", np.eye(4))
+PASSING = "%passing"  # whether the program goes on while the arm still moves to its last target
+READING = ("get_actual_", "get_target_", "get_forward_kin")  # beginnings of functions that read where the arm is
 NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
 SAME_TURN = 1e-9
 HALF_A_TURN = math.pi - 1e-6
@@ -177,8 +179,9 @@ class UrScriptDialect:
             and isinstance(each.value, Invocation)
             and each.value.function == "rpc_factory"
         )
+        reads = any(word in line for line in program.lines for word in READING)
+        self.modal = frozenset(("%tcp", "%load", *((PASSING,) if reads else ())))
 
-    modal = frozenset(("%tcp", "%load"))
     local_by_default = True
     setters = frozenset(("set_tcp", *LOADS))
     whole_division = False
@@ -262,6 +265,8 @@ class UrScriptDialect:
         radius = values.get("r", 0.0)
         blend = number(radius)
         zone = Zone("named", 0.0, shown(radius)) if blend is None else Zone("distance", blend) if blend > 0 else FINE
+        if PASSING in self.modal:
+            memory.write(PASSING, zone is not FINE)
         return ArmMotion(
             kind,
             made,
@@ -440,18 +445,27 @@ def _joints(value: Value) -> Reals | None:
 
 
 def _of_position(memory: ProgramMemory, name: str, given: dict[str, Value]) -> Value | None:
-    """Functions of where the arm stands, and of its table."""
+    """Functions of where the arm stands, and of its table.
+
+    Behind a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
+    arm is not known; the waypoint is.
+
+    References
+    ----------
+    .. [1] Universal Robots, *User Manual UR5/CB3*, version 3.10, section 14.6, conditional blend trajectories.
+    """
+    here = Position() if memory.read(PASSING) and name != "get_target_waypoint" else memory.here
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
-        return None if memory.here.joints is None else tuple(map(float, memory.here.joints))
+        return None if here.joints is None else tuple(map(float, here.joints))
     if name in ("get_actual_tcp_pose", "get_target_tcp_pose", "get_target_waypoint", "get_actual_tool_flange_pose"):
         tool = NamedFrame("flange", np.eye(4)) if name.endswith("flange_pose") else _tool(memory)
-        seen = memory.here.seen(tool, ROBOT_BASE, memory.cell.flange)
+        seen = here.seen(tool, ROBOT_BASE, memory.cell.flange)
         return None if seen is None else _record(seen)
     if name == "get_tcp_offset":
         offset = _tool(memory).pose
         return None if offset is None else _record(offset)
     if name == "get_forward_kin" and memory.cell.flange is not None:
-        joints = _joints(given["q"]) if "q" in given else memory.here.joints
+        joints = _joints(given["q"]) if "q" in given else here.joints
         tool_pose = _pose(given["tcp"]) if "tcp" in given else _tool(memory).pose
         if joints is not None and tool_pose is not None:
             return _record(memory.cell.flange(joints) @ tool_pose)

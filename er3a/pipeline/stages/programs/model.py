@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.results import OF_MOTIONS, Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime
@@ -115,8 +115,6 @@ class ProgramSummary:
 @dataclass(frozen=True)
 class ProgramsSummary(Summary):
     """Head and programs; ``scene`` is its title, None where the study names none."""
-
-    decisive = OF_MOTIONS
 
     verdict: Verdict[AllProgramsPass | SomeProgramsCaution | SomeProgramsFail | NoPrograms | ExpectationsUnmet]
     scene: str | None

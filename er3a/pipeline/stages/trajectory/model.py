@@ -15,7 +15,7 @@ from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.results import OF_MOTIONS, Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
@@ -358,8 +358,6 @@ class TrajectorySummary(Summary):
     scene : title; None where the study names none
     penetration_tolerance_mm : no overlap deeper than this goes unnoticed between points
     """
-
-    decisive = OF_MOTIONS
 
     verdict: Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]
     characteristic_length_m: float

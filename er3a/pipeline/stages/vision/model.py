@@ -9,7 +9,7 @@ from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import Held, LevelName
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import OF_MOTIONS, Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
@@ -316,8 +316,6 @@ class VisionSummary(Summary):
 
     ``least_success``: the probability of success below which an object is not graspable.
     """
-
-    decisive = OF_MOTIONS
 
     verdict: Verdict[
         CalibrationImpossible

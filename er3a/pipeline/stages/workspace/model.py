@@ -13,7 +13,7 @@ from er3a.collision.pairs import Pair
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -602,8 +602,11 @@ Placement = PlacementSummary | ToolPointsElsewhere | PlacementTooLong
 class WorkspaceSummary(Summary):
     """The stage's summary; ``pocket_block_m`` is the edge of the blocks that open pockets were looked for on.
 
-    ``surface`` is what the tool point moves on where it reaches no volume.
+    ``surface`` is what the tool point moves on where it reaches no volume. What the verdict says is of the arm's
+    lengths and limits, whatever stands around it.
     """
+
+    decisive = NEVER_A_PASS - {"obstacles"}
 
     verdict: Verdict[WorkspaceFinding]
     samples: int
