@@ -128,6 +128,16 @@ def test_a_slip_is_named_where_base_or_flange_take_up_the_turn_of_a_slide(slide,
     assert [(each.code, each.side) for each in causes] == [("a_and_d_swapped", "a")]
 
 
+@pytest.mark.parametrize(("slide", "entry"), [(False, "alpha3"), (True, "beta3")])
+def test_a_lean_of_the_next_axis_is_a_twist_unless_that_takes_two_entries(slide, entry):
+    """Of coincident axes alpha will do with other zeros of both; a slide's theta is an entry of its own."""
+    on_axis = ("P", 0, 0, 0, 0, 300) if slide else ("R", 0, 0, 200, -150, 150)
+    others = [("R", a, 90, d, -150, 150) for a, d in ((0, 100), (100, 0), (0, 50), (80, 0))]
+    right = made_of([*others[:2], on_axis, *others[2:]])
+    found = er3a.compare(right, right.replace(beta=np.radians([0, 0, 2, 0, 0])))
+    assert [(each.entry, each.a, each.b) for each in found.geometry.differences] == [(entry, 0, pytest.approx(2))]
+
+
 @pytest.mark.parametrize("row", [0, 3, 4])
 def test_a_twist_of_the_wrong_sign_is_named_where_it_only_moves_zeros(row):
     right = er3a.to_standard(er3a.load_robot("ur5e"))
