@@ -38,12 +38,12 @@ def past_an_obstacle(robot, random) -> tuple[JointMove, Scene]:
 def dense_distances(apart: Contacts, move: JointMove) -> tuple[np.ndarray, np.ndarray]:
     """Times (n,) and Coal's distances (n,) in m: even ones, and finer ones wherever the bodies are near."""
     times = np.linspace(0, 1, DENSE)
-    distances = apart.min_distance(move.joints(times)[0])
+    distances = apart.least(move.joints(times)[0])
     near = np.minimum(distances[:-1], distances[1:]) < NEAR
     between = np.linspace(times[:-1][near], times[1:][near], FINE + 1)[1:-1].T.ravel()
     if not len(between):
         return times, distances
-    times, distances = np.r_[times, between], np.r_[distances, apart.min_distance(move.joints(between)[0])]
+    times, distances = np.r_[times, between], np.r_[distances, apart.least(move.joints(between)[0])]
     order = np.argsort(times)
     return times[order], distances[order]
 
@@ -84,7 +84,7 @@ def judged(robot, random) -> tuple[int, int, int, float, float, float, int]:
         measured.append(found.measured)
         edges = [t for contact in found.contacts for t in (contact.start, contact.end) if 0 < t < 1]
         if edges:
-            worst = max(worst, float(np.abs(apart.min_distance(move.joints(np.array(edges))[0])).max()))
+            worst = max(worst, float(np.abs(apart.least(move.joints(np.array(edges))[0])).max()))
     return met, missed, invented, worst, step, float(np.mean(measured)), between
 
 

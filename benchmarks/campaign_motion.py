@@ -81,9 +81,7 @@ def query_rows(name: str) -> list[str]:
             other += reference
             both += solved and reference
             if isinstance(way, WayAround):
-                distance = float(
-                    apart.min_distance(way.motion.curve.joints(np.linspace(0, way.motion.duration, DENSE))).min()
-                )
+                distance = float(apart.least(way.motion.curve.joints(np.linspace(0, way.motion.duration, DENSE))).min())
                 touching, least = touching + (distance <= 0), min(least, distance)
         rows.append(
             f"| {name} | {title} | {QUERIES} | {found} | {other} | {100.0 * both / max(other, 1):.1f} % "
@@ -111,7 +109,7 @@ def _other_planner(apart: Contacts, robot, start, end) -> bool:
         bounds.setHigh(j, float(robot.upper[j]))
     space.setBounds(bounds)
     info = base.SpaceInformation(space)
-    info.setStateValidityChecker(lambda state: bool(apart.min_distance(np.array([state[j] for j in range(6)]))[0] > 0))
+    info.setStateValidityChecker(lambda state: bool(apart.least(np.array([state[j] for j in range(6)]))[0] > 0))
     info.setStateValidityCheckingResolution(0.005)
     info.setup()
     problem = base.ProblemDefinition(info)

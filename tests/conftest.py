@@ -24,6 +24,8 @@ from numba.core.registry import CPUDispatcher
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.classes import six_revolute
 from er3a.pipeline.cli import main
+from er3a.pipeline.stages.run import compute
+from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
 from testing.processes import run
@@ -249,6 +251,23 @@ def small_study(shared_folder: Path) -> StudyRun:
                 shutil.copytree(Path(finished) / part, folder / part)
             study.make_run("--cores", "2")
     return StudyRun(folder)
+
+
+@pytest.fixture(scope="session")
+def small_results(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str, Study], Path]:
+    """Makes a folder with a stage's results of a robot: of the finished study that SMALL_STUDY names, or computed."""
+    finished = os.environ.get("SMALL_STUDY")
+
+    def made(stage: str, name: str, study: Study) -> Path:
+        folder = tmp_path_factory.mktemp(f"{name}_{stage}") / "results"
+        there = Path(finished) / "results" / name / stage if finished else folder
+        if there.is_dir():
+            shutil.copytree(there, folder)
+        else:
+            compute(stage, study, name, folder)
+        return folder
+
+    return made
 
 
 @contextmanager

@@ -129,15 +129,15 @@ def _by_rms(squares: list[Reals], rated: Reals) -> Reals:
 
 
 def _first_root(a: Reals, b: Reals, c: Reals) -> Reals:
-    """The smallest s > 0 at which ``a s^2 + b s + c`` (c <= 0) becomes positive; inf where it never does."""
+    """The smallest s >= 0 at which ``a s^2 + b s + c`` (c <= 0) becomes positive; inf where it never does."""
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(b * b - 4 * a * c)
         half = -0.5 * (b + np.copysign(root, b))
         roots = np.stack([half / a, c / half])
-    roots = np.where(np.isfinite(roots) & (roots > 0), roots, np.inf)
+    roots = np.where(np.isfinite(roots) & (roots >= 0), roots, np.inf)
     slope = 2 * a * np.where(np.isfinite(roots), roots, 0.0) + b
     rising = np.where(slope > 0, roots, np.inf)
-    first: Reals = rising.min(axis=0)
+    first: Reals = rising.min(axis=0) + 0.0
     return first
 
 

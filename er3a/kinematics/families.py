@@ -147,6 +147,7 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
 GRID = np.radians(2.0)
 SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
 SAME_FAMILY = 1e-6  # rad; next to two singularities families that solve a pose to 1e-9 are no farther apart
+SAME_CURVE = SAME_FAMILY * np.array([1, 1, 0.2, 1, 1, 1])  # no farther apart does rounding put the roots of one elbow
 FREE_MOTION = 1e-7  # singular value below which joints move with the tool at rest
 CURVES: tuple[tuple[SingularityType, int, int], ...] = (("shoulder", 4, 0), ("elbow", 2, 1))  # slots apart, joint
 FREE_JOINT: dict[SingularityType, int] = {"shoulder": 0, "elbow": 1}
@@ -201,7 +202,7 @@ class Family(ByValue, Displayed):
         t = q[FREE_JOINT[self.kind]] - self.q0[FREE_JOINT[self.kind]]
         if not self.range[0] - SAME_FAMILY <= t <= self.range[1] + SAME_FAMILY:
             return False
-        return bool(np.abs(wrap_to_pi(self.members(t) - q)).max() < SAME_FAMILY)
+        return bool((np.abs(wrap_to_pi(self.members(t) - q)) < SAME_CURVE).all())
 
     def members(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at parameters (...,)."""
@@ -247,7 +248,8 @@ def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ..
 def _add(found: list[Family], new: list[Family]) -> None:
     for family in new:
         for k, known in enumerate(found):
-            same = known.kind == family.kind and np.abs(known.q0 - family.q0).max() < SAME_FAMILY
+            most = SAME_FAMILY if family.kind == "wrist" else SAME_CURVE
+            same = known.kind == family.kind and bool((np.abs(known.q0 - family.q0) < most).all())
             if known.kind == family.kind and known.holds(family.q0):
                 same = True
             elif same:

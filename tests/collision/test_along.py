@@ -61,6 +61,24 @@ def test_thin_obstacle_between_two_points_is_found(robot, obstacle):
     assert found.measured < 150
 
 
+def test_an_arm_that_is_back_where_it_was_may_have_been_elsewhere():
+    """Joint 1 swings out and back between the only two points, at both of which the tool is clear."""
+    robot = load_robot("er3a_c60")
+    held, axis, swing = np.radians([0, -90, 75, 0, 15, 0]), np.eye(6)[0], 0.3
+
+    def joints(t):
+        return held + swing * np.sin(np.pi * t)[:, None] * axis
+
+    def rates(start, end):
+        return [np.tile(swing * np.pi**order * axis, (len(start), 1)) for order in (1, 2)]
+
+    at = forward(robot, held + swing * axis)[:3, 3] * 1000
+    scene = scene_of(spheres=[{"name": "ball", "radius_mm": 100, "xyz_mm": at.tolist()}])
+    assert (clearance(robot, joints(ENDS), scene).distance > 0.01).all()
+    found = clearance_along(Bodies(robot, scene), joints, rates, ENDS, ENDS, 0.09)
+    assert len(found.contacts) == 1
+
+
 def test_obstacle_that_is_passed_by_is_not_met(robot):
     move, at = swing(robot)
     wire = {"name": "wire", "radius_mm": 0.2, "length_mm": 2}

@@ -11,8 +11,9 @@ import er3a
 from er3a.comparison.compare import best_of
 from er3a.files.by_name import read_arm
 from er3a.formats.urdf_tree import read_chain
-from er3a.geometry.transforms import rot_x
+from er3a.geometry.transforms import rot_x, rot_z
 from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries
+from testing.arms import made_of
 from testing.published_tables import PAIRS, best_alignment_mm, urdf_flange, urdf_path, write_csv
 from testing.readme import README
 
@@ -113,6 +114,28 @@ def test_all_alphas_negated_of_an_arm_that_is_its_own_mirror_image_is_a_matter_o
     found = er3a.compare(right.replace(alpha=-right.alpha), right)
     assert found.verdict == "same_arm"
     assert not found.directions.same
+
+
+@pytest.mark.parametrize(("slide", "end"), [(0, "base"), (3, "flange")])
+def test_a_slip_is_named_where_base_or_flange_take_up_the_turn_of_a_slide(slide, end):
+    rows = [("R", 20, 90, 100, -150, 150), ("R", 300, 0, 120, -150, 150), ("R", 250, 90, 40, -150, 150)]
+    rows.insert(slide, ("P", 0, 90, 70, 0, 300))
+    right = made_of(rows)
+    over = rot_x(np.pi / 2 * (slide == 3))  # the twist of the last row
+    other = right.replace(offset=np.where(np.arange(4) == slide, 0.3, 0.0), **{end: over.T @ rot_z(-0.3) @ over})
+    assert er3a.compare(right, other).verdict == "equal"
+    causes = er3a.compare(right.replace(a=right.d, d=right.a), other).geometry.causes
+    assert [(each.code, each.side) for each in causes] == [("a_and_d_swapped", "a")]
+
+
+@pytest.mark.parametrize(("slide", "entry"), [(False, "alpha3"), (True, "beta3")])
+def test_a_lean_of_the_next_axis_is_a_twist_unless_that_takes_two_entries(slide, entry):
+    """Of coincident axes alpha will do with other zeros of both; a slide's theta is an entry of its own."""
+    on_axis = ("P", 0, 0, 0, 0, 300) if slide else ("R", 0, 0, 200, -150, 150)
+    others = [("R", a, 90, d, -150, 150) for a, d in ((0, 100), (100, 0), (0, 50), (80, 0))]
+    right = made_of([*others[:2], on_axis, *others[2:]])
+    found = er3a.compare(right, right.replace(beta=np.radians([0, 0, 2, 0, 0])))
+    assert [(each.entry, each.a, each.b) for each in found.geometry.differences] == [(entry, 0, pytest.approx(2))]
 
 
 @pytest.mark.parametrize("row", [0, 3, 4])

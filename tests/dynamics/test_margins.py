@@ -116,6 +116,20 @@ def test_an_arm_that_cannot_stand_has_no_margin_and_unknown_limits_none(arm):
     assert max_speed_scale(TIMES, (zero, zero, zero), zero, limits()).value == np.inf
 
 
+@pytest.mark.parametrize(
+    ("at_rest", "linear", "square", "expected"),
+    [
+        (0.0, 2.0, -1.0, 1 + np.sqrt(2)),  # touches the peak at 1 and falls again, to minus the peak
+        (1.0, 2.0, -1.0, 0.0),  # stands at the peak and rises
+        (1.0, -2.0, 1.0, 2.0),  # stands at the peak, falls, and is back at 2
+    ],
+)
+def test_the_greatest_speed_scale_is_where_a_torque_leaves_its_limits(at_rest, linear, square, expected):
+    parts = [np.full((2, 1), part) for part in (at_rest, linear, square)]
+    one = DriveLimits(np.ones(1), np.full(1, np.nan), np.full(1, np.nan))
+    assert max_speed_scale(np.array([0.0, 1.0]), parts, np.zeros((2, 1)), one).value == pytest.approx(expected)
+
+
 def test_rated_torques_bound_payload_and_speed_by_the_effective_ones(arm):
     q, qd, qdd = swing()
     centre, moments = (0.02, 0.0, 0.08), (0.002, 0.002, 0.001, 0.0, 0.0, 0.0)

@@ -175,6 +175,23 @@ def test_family_is_plain_data(robot):
     assert family.q0.shape == family.direction.shape == (6,)
 
 
+def test_both_of_the_elbow_s_roots_are_told_where_joint_1_is_free(random):
+    """Arms stretched but for some 1e-7 rad with the wrist centre on axis 1, their poses as products of matrices."""
+    for bend in 10 ** random.uniform(-6.7, -6.3, 12) * random.choice([-1, 1], 12):
+        a_1, upper, forearm = random.choice([0.0, 0.1]), *random.uniform(0.3, 0.6, 2)
+        arm = make_arm(a=[a_1, upper, 0, 0, 0, 0], d=[0.3, 0, 0, forearm, 0, 0.08])
+        reach = np.hypot(upper + forearm * np.cos(bend), forearm * np.sin(bend))
+        q = random.uniform(-3, 3, 6)
+        q[1] = -np.arccos(-a_1 / reach) - np.arctan2(forearm * np.sin(bend), upper + forearm * np.cos(bend))
+        q[2] = bend - np.pi / 2
+        table = {name: getattr(arm, name)[None] for name in ("a", "alpha", "d", "offset", "direction")}
+        T = flange_by_table(table, q)
+        found = inverse(arm, T)
+        turns = [family.members(q[0] - family.q0[0]) for family in found.families if family.kind == "shoulder"]
+        assert turned(np.array(turns) - q).max(axis=1).min() < 1e-7
+        assert all(max(pose_errors(flange_by_table(table, member), T)) < 1e-9 for member in turns)
+
+
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 @pytest.mark.parametrize("second", ["elbow", "shoulder"])
 def test_a_batch_gives_the_reference_next_to_two_singularities_and_on_a_limit(name, second, random):

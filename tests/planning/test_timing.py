@@ -71,6 +71,16 @@ def test_nodes_resolve_a_sharp_bend():
     assert fastest(q, LIMITS).duration > np.pi / LIMITS.speed[3]
 
 
+def test_nodes_lie_as_closely_behind_a_corner_as_before_it():
+    def joints(t):
+        return np.stack([t, np.abs(t - 0.5), *np.zeros((4, len(t)))], axis=1)
+
+    t = np.linspace(0, 1, 21)
+    steps = np.diff(nodes_along(joints, t, joints(t), LIMITS)[0])
+    assert steps.min() < 1e-3
+    np.testing.assert_allclose(steps, steps[::-1], rtol=1e-9)
+
+
 def test_rest_and_chains():
     still = fastest(np.zeros((5, 6)), LIMITS, np.linspace(0, 2, 5))
     assert still.duration == 2.0
