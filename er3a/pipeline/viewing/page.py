@@ -331,7 +331,8 @@ def led(text: str) -> tuple[str, str]:
     ends = [found.end() for found in re.finditer(r"[.;](?= )|[。；]", text[:LED])]
     if len(text) <= WHOLE or not ends:
         return text, ""
-    return text[: ends[-1]], text[ends[-1] :].strip()
+    first, rest = text[: ends[-1]], text[ends[-1] :].strip()
+    return (first, rest) if first[-1] in ".。" else (whole_sentence(first[:-1]), whole_sentence(rest).removesuffix("."))
 
 
 def linked(text: str, links: Mapping[str, str]) -> Markup:
