@@ -332,7 +332,9 @@ def led(text: str) -> tuple[str, str]:
     if len(text) <= WHOLE or not ends:
         return text, ""
     first, rest = text[: ends[-1]], text[ends[-1] :].strip()
-    return (first, rest) if first[-1] in ".。" else (whole_sentence(first[:-1]), whole_sentence(rest).removesuffix("."))
+    if first[-1] in ".。":
+        return first, rest
+    return whole_sentence(first[:-1]), rest[:1].upper() + rest[1:]  # a clause becomes a sentence
 
 
 def linked(text: str, links: Mapping[str, str]) -> Markup:
