@@ -165,7 +165,7 @@ function newMotion() {
   Object.assign(bar, { min: String(start()), max: String(end()), step: "any" });
   const ticks = motion.events.map((event) => {
     const tick = document.createElement("button");
-    const at = (value) => (100 * (value - start())) / (end() - start() || 1);
+    const at = (value) => Math.min(100, (100 * (value - start())) / (end() - start() || 1)); // the arm may not get to the last ones
     Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
     tick.style.left = `${at(event.t)}%`;
     tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;
