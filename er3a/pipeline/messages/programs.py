@@ -570,7 +570,9 @@ def remedies(findings: Sequence[CheckFinding | FindingAt], program: Iterable[Fin
     """
     located = [each for each in findings if isinstance(each, FindingAt)]
     worst = max((RANKS[each.level] for each in located), default=0)
-    checked = [(each, ()) for each in findings if not isinstance(each, FindingAt)]
+    checked: list[tuple[CheckFinding, Sequence[Sequence[float]]]] = [
+        (each, ()) for each in findings if not isinstance(each, FindingAt)
+    ]
     checked += [(each.finding, each.joint_moves) for each in located if RANKS[each.level] == worst]
     if any(moves for _, moves in checked):
         checked = [(each, moves) for each, moves in checked if not isinstance(each, PACED)]
