@@ -697,6 +697,8 @@ class StepChecker:
             return ()
         rows = self._free(checked.placed, _as_written(found.q[found.within_limits]))
         rows = rows[np.argsort(np.abs(rows - checked.start).max(axis=1), kind="stable")][:MOST_SOLUTIONS]
+        if len(rows) and np.abs(rows[0] - checked.start).max() < SAME_JOINTS:
+            return ()  # the tool is there already: no move is needed
         straight = [(row,) for row in rows]
         vias = self._free(checked.placed, _vias(checked.placed.arm, checked.start, rows[0])) if len(rows) else ()
         round_about = [(via, rows[0]) for via in vias]

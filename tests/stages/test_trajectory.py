@@ -553,8 +553,8 @@ def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means
     path = by_name(results["er3a_c60"])["line_shoulder"]
     assert path.fastest_s < path.duration_s
     assert (
-        "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path takes "
-        f"{path.fastest_s:.2f} s" in (path_text(path))
+        "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path can take "
+        f"as little as {path.fastest_s:.2f} s in place of the {path.duration_s:.2f} s programmed" in (path_text(path))
     )
     assert "it takes at least 9.00 s" in path_text(replace(path, fastest_s=9.0))
 

@@ -160,16 +160,14 @@ def payload_text(summary: Summary | None, robot: Robot) -> str:
     bounds = [
         (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
     ]
-    wanted = ("peak", "rated") if getattr(summary, "masses", None) else ("masses",)
-    missing = [each.what for each in getattr(summary, "unknown", ()) if each.what in wanted]
+    wanted = ("masses", "peak", "rated")
+    missing = [say(each) for each in getattr(summary, "unknown", ()) if each.what in wanted]
     if bounds:
         value, path = min(bounds, key=lambda bound: bound[0])
         known = sentence("payload.bounded", kg=value, path=path.name)
-        known = joined(
-            [known, sentence("payload.partly", what=joined(map(need_word, missing), ", ")) if missing else ""], " "
-        )
+        known = joined([known, sentence("payload.partly", what=joined(missing)) if missing else ""], " ")
     elif missing:
-        known = sentence("payload.unknown", what=joined(map(need_word, missing), ", "))
+        known = sentence("payload.unknown", what=joined(missing))
     else:
         known = sentence("payload.not_examined")
     wrist = robot.masses.wrist

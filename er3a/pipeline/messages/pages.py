@@ -228,7 +228,7 @@ def next_step(
     if table == "no_reference":
         text = tr("Gather the manufacturer's data, or compare the table with a URDF by er3a compare.")
         return NextStep(text, validation)
-    return NextStep(measurement, validation) if measurement else None
+    return NextStep(measurement, f"{validation}#table-not-settled") if measurement else None
 
 
 @dataclass(frozen=True)

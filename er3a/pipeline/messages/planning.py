@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import by, joined, listed, say, say_as, texts, word
 from er3a.planning.motion_faults import (
     AccelerationTooGreat,
@@ -26,6 +26,8 @@ STRATEGIES: dict[StrategyName, str] = {
     "stop": N_("Stop before the region with an alarm"),
     "planned": N_("Use a planned joint motion instead"),
 }
+
+MOST_SHOWN = 1e6  # of an acceleration; towards a singular pose or the edge of the reach it has no bound
 
 
 TEXTS = texts(
@@ -64,11 +66,9 @@ TEXTS = texts(
         "acceleration_exceeded": "a joint needs {ratio:.2f} times its greatest acceleration",
         "too_fast": "J{joint} would need {needed_deg_s:.0f} {unit}/s; it can do {limit_deg_s:g} {unit}/s",
         "too_fast_if_assumed": "J{joint} would need {needed_deg_s:.0f} {unit}/s; {limit_deg_s:g} {unit}/s are assumed",
-        "acceleration_too_great": (
-            "J{joint} would need {needed_deg_s2:.0f} {unit}/s²; it can do {limit_deg_s2:g} {unit}/s²"
-        ),
+        "acceleration_too_great": ("J{joint} would need {needed} {unit}/s²; it can do {limit_deg_s2:g} {unit}/s²"),
         "acceleration_too_great_if_assumed": (
-            "J{joint} would need {needed_deg_s2:.0f} {unit}/s²; {limit_deg_s2:g} {unit}/s² are assumed"
+            "J{joint} would need {needed} {unit}/s²; {limit_deg_s2:g} {unit}/s² are assumed"
         ),
         "jerk_too_great#needed": "J{joint} would need {needed:.0f} {unit}/s³; its jerk limit is {able:g} {unit}/s³",
         "jerk_too_great#step": "J{joint}'s acceleration has a step; its jerk limit is {able:g} {unit}/s³",
@@ -93,13 +93,9 @@ def _(found: TooFastIfAssumed) -> str:
 
 
 @say.register
-def _(found: AccelerationTooGreat) -> str:
-    return say_as(found, unit=unit_of(found.slides))
-
-
-@say.register
-def _(found: AccelerationTooGreatIfAssumed) -> str:
-    return say_as(found, unit=unit_of(found.slides))
+def _(found: AccelerationTooGreat | AccelerationTooGreatIfAssumed) -> str:
+    needed = as_text(found.needed_deg_s2, ".0f") if found.needed_deg_s2 < MOST_SHOWN else tr("more than 1 000 000")
+    return say_as(found, unit=unit_of(found.slides), needed=needed)
 
 
 @say.register

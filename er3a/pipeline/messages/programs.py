@@ -8,6 +8,7 @@ from functools import singledispatch
 from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.collision.pairs import LinkAndSolid
 from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES, branch_word
@@ -15,14 +16,18 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.planning import unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
-from er3a.planning.motion_faults import TooFast
+from er3a.planning.motion_faults import AboveLimit, BelowLimit, TooFast
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.program_check_findings import (
+    RANKS,
     AcceleratesMoreThanAssumed,
     CheckFinding,
+    ConfigurationChanges,
     FasterThanAssumed,
+    JointJumps,
     Level,
     MeetsSingularity,
+    MotionCollides,
     NotFollowedToEnd,
     PassesSingularity,
     ZoneTooLarge,
@@ -47,12 +52,12 @@ REASONS: dict[Unresolved, str] = {
     "too_many_joints": N_("it refers to axes that the arm does not have"),
 }
 NEARER = N_("Move the target or the workpiece nearer to the arm, or tilt the tool towards the arm.")
-OTHER_SOLUTION = N_("Turn the tool otherwise at the target, or move the target or the workpiece.")
+OTHER_SOLUTION = N_(
+    "Correct the target's joint values; if it is given as a pose, turn the tool otherwise there, or move the target."
+)
 BY_HAND = N_("Watch this line at low speed on the controller, or replace it by an instruction that is understood.")
 FURTHER = N_("Give the check more time, or in a study raise most_steps, most_branches or loop_rounds of programs.")
 REMEDIES: dict[str, str] = {
-    "above_limit": OTHER_SOLUTION,
-    "below_limit": OTHER_SOLUTION,
     "slide_exceeded": OTHER_SOLUTION,
     "combination_exceeded": OTHER_SOLUTION,
     "target_out_of_reach": NEARER,
@@ -63,7 +68,6 @@ REMEDIES: dict[str, str] = {
         "If the change is not meant, give the target's configuration or joint angles; if it is, make it where there "
         "is room."
     ),
-    "joint_jumps": N_("Teach the target with this joint near to where it comes from."),
     "whole_turn": N_("Teach the target with the nearer angle, unless the turn is meant to unwind cables."),
     "arrives_otherwise": N_("Teach the target again where the line arrives."),
     "turns_at_start": N_("Begin the line beside the singular pose."),
@@ -72,7 +76,6 @@ REMEDIES: dict[str, str] = {
     "configuration_guessed": N_("Give start_deg of the program, or begin with a move to joint angles."),
     "moves_beside": BY_HAND,
     "never_reached": N_("Remove this motion, or check what leads to it as a program of its own."),
-    "motion_collides": N_("Take another tool orientation, or move what stands in the way."),
     "clear_of_assumed": N_("Give shapes from a drawing or model in the robot's file, or keep the motion farther away."),
     "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
@@ -87,9 +90,9 @@ REMEDIES: dict[str, str] = {
     "program_form_inferred": N_("Compare this element with what the controller does."),
     "external_axes_left_out": N_("Check by hand that the external axes stand as assumed."),
     "target_not_given": N_("Give the target in the program or in its data file."),
-    "frame_not_given": N_("Map the name to a frame under `frames` in the file of programs."),
+    "frame_not_given": N_("Map the name to a frame under frames in the file that lists the programs."),
     "frame_taken_as_flange": N_(
-        "Map the name to a frame under `frames` in the file of programs, if a tool is mounted."
+        "Map the name to a frame under frames in the file that lists the programs, if a tool is mounted."
     ),
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
@@ -113,12 +116,15 @@ SINGULAR: dict[EventType, str] = {
     "dependent_axes": N_("Shift or tilt the path."),
 }
 STOPPED: dict[EndKind, str] = {
-    "drifts": N_("Let the loop come back to where it began, or give it a fixed number of rounds."),
+    "drifts": N_(
+        "Let the loop come back to where it began, or give it a fixed number of rounds that stays within reach."
+    ),
     "operations": FURTHER,
     "branches": FURTHER,
     "stopped": FURTHER,
     "recursion": N_("Give the routine a condition to return."),
 }
+STAYS_MM = 1.0  # that a tool moves when it stays where it is
 PACED = (TooFast, FasterThanAssumed, AcceleratesMoreThanAssumed)
 MOST_PAIRS = 3  # that are named of a collision
 FIGURES = {
@@ -312,6 +318,26 @@ TEXTS = texts(
         "remedy.joint_move": "Go there by a joint move to ({end}) deg: it passes these checks.",
         "remedy.joint_moves": "Go there by joint moves to ({via}) deg, then ({end}) deg: they pass these checks.",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
+        "remedy.limit#above": (
+            "Give J{joint} {limit:g} {unit} at most; if the target is a pose, turn the tool otherwise there, or move "
+            "the target."
+        ),
+        "remedy.limit#below": (
+            "Give J{joint} {limit:g} {unit} at least; if the target is a pose, turn the tool otherwise there, or move "
+            "the target."
+        ),
+        "remedy.collision#solid": (
+            "Move the target away from {name} (raise it, or to the side) if the arm overlaps it there; if only the way "
+            "there does, lead the tool round it by a via point, or move {name}."
+        ),
+        "remedy.collision#links": (
+            "Take another tool orientation or configuration, or move the target: the arm hits itself."
+        ),
+        "remedy.joint_jumps#stays": (
+            "If the tool is to stay here, leave this line out; if the joint is meant to turn, turn it where there is "
+            "room."
+        ),
+        "remedy.joint_jumps#moves": "Teach the target with this joint near to where it comes from.",
         "remedy.slower": (
             "Lower the speed of this line to {percent:g} % of its own or less, and its acceleration to "
             "{acceleration:g} %."
@@ -481,8 +507,27 @@ def _(found: NotFollowedToEnd) -> str:
 
 
 @remedy.register
+def _(found: AboveLimit | BelowLimit) -> str:
+    side = "above" if isinstance(found, AboveLimit) else "below"
+    return sentence(f"remedy.limit#{side}", joint=found.joint, limit=found.limit_deg, unit=tr("deg"))
+
+
+@remedy.register
+def _(found: MotionCollides) -> str:
+    pair = found.touches[0].pair
+    if isinstance(pair, LinkAndSolid):
+        return sentence("remedy.collision#solid", name=pair.solid)
+    return sentence("remedy.collision#links")
+
+
+@remedy.register
 def _(found: TooFast | FasterThanAssumed | AcceleratesMoreThanAssumed) -> str:
     return _slower(_pace(found))
+
+
+@remedy.register
+def _(found: JointJumps) -> str:
+    return sentence("remedy.joint_jumps#stays" if found.moved_mm < STAYS_MM else "remedy.joint_jumps#moves")
 
 
 @remedy.register
@@ -517,9 +562,25 @@ def _slower(pace: float) -> str:
     return sentence("remedy.slower", percent=percent, acceleration=math.floor(percent**2 / 10) / 10)
 
 
-def remedies(findings: Iterable[CheckFinding | FindingAt]) -> list[str]:
-    """What to do about findings at one line, each thing once; of paces the lowest."""
-    checked = [(each.finding, each.joint_moves) if isinstance(each, FindingAt) else (each, ()) for each in findings]
+def remedies(findings: Sequence[CheckFinding | FindingAt], program: Iterable[FindingAt] = ()) -> list[str]:
+    """What to do about findings at one line, each thing once: about those that weigh most; of paces the lowest, and
+    none where another motion takes the line's place.
+
+    ``program``: all findings of a program that a line is of, whose loop may be what leads the line astray.
+    """
+    located = [each for each in findings if isinstance(each, FindingAt)]
+    worst = max((RANKS[each.level] for each in located), default=0)
+    checked: list[tuple[CheckFinding, Sequence[Sequence[float]]]] = [
+        (each, ()) for each in findings if not isinstance(each, FindingAt)
+    ]
+    checked += [(each.finding, each.joint_moves) for each in located if RANKS[each.level] == worst]
+    if any(moves for _, moves in checked):
+        checked = [(each, moves) for each, moves in checked if not isinstance(each, PACED)]
+    if any(isinstance(each, JointJumps) for each, _ in checked):
+        checked = [(each, moves) for each, moves in checked if moves or not isinstance(each, ConfigurationChanges)]
+    drifts = [each.finding for each in program if isinstance(each.finding, NotFollowedToEnd)]
+    if worst == RANKS["fail"]:
+        checked = [*((each, ()) for each in drifts if each.kind == "drifts"), *checked]
     paced = [each for each, _ in checked if isinstance(each, PACED)]
     slowest = min(paced, key=_pace, default=None)
     kept = [(each, moves) for each, moves in checked if not isinstance(each, PACED) or each is slowest]

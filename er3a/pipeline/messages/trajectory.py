@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.collision.pairs import LinkAndSolid
 from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import SINGULARITIES
@@ -30,7 +31,7 @@ FIGURES = {
     "singular_poses": N_("Singular poses met"),
     "near_passes": N_("Near-singular passes"),
     "colliding": N_("Paths with a collision"),
-    "max_joint_speed": N_("Highest joint speed on all paths, against its limit"),
+    "max_joint_speed": N_("Joint speed nearest its limit, on paths meant to be safe"),
     "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
     "speed_ratio": N_("Ratio to that joint's limit"),
     "velocity_check": N_("Velocity check, greatest error"),
@@ -75,8 +76,8 @@ TEXTS = texts(
         "path.harmless": "passes singular poses ({places}); joint moves are unaffected by singularities",
         "path.no_fault": "no fault",
         "path.pace#profile": (
-            "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path takes "
-            "{fastest:.2f} s"
+            "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path can take "
+            "as little as {fastest:.2f} s in place of the {programmed:.2f} s programmed"
         ),
         "path.pace#least": "it takes at least {fastest:.2f} s",
         "path.speeds#unbounded": "no finite joint speed follows the path there",
@@ -98,14 +99,20 @@ TEXTS = texts(
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
         "advice.no_way": "No avoidance strategy works: {reason}",
-        "advice.slower": (
-            "Or run all of it at {percent:.3g} % of its speed: duration_s {needed:.4g} in the path file, or the speed "
-            "in its program"
-        ),
+        "advice.slower": ("Or run all of it at {percent:.3g} % of its speed: duration_s {needed:.4g} in the path file"),
         "advice.clear_until": (
             "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm): end the path there, with the "
             "tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg (joints {q}), or move its end or the body "
             "that it hits: {pair} touch at {contact} mm"
+        ),
+        "advice.clear_until#links": (
+            "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm): end the path there, with the "
+            "tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg (joints {q}), or move the path: {pair} touch "
+            "at {contact} mm"
+        ),
+        "advice.within_reach": (
+            "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path): end it before, while joint speeds "
+            "still have a bound, or move its end or the workpiece nearer to the arm"
         ),
         "advice.chosen": "{way}: {tool}, and {time}",
         "advice.chosen#clear": "{way}: {tool}, {time}, and the arm keeps {clearance:.1f} mm of clearance",
@@ -232,7 +239,7 @@ def _at_another_pace(path: PathSummary) -> str:
         return ""
     if path.fastest_s > path.duration_s:
         return sentence("path.pace#least", fastest=path.fastest_s)
-    return sentence("path.pace#profile", fastest=path.fastest_s)
+    return sentence("path.pace#profile", fastest=path.fastest_s, programmed=path.duration_s)
 
 
 def _only_too_fast(path: PathSummary) -> bool:
@@ -310,7 +317,7 @@ def advice(path: PathSummary) -> str | None:
             return joined([no_way, _clear(path)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
-    return joined([sentence("advice.none", why=why), _clear(path)], ". ")
+    return joined([sentence("advice.none", why=why), _within_reach(path), _clear(path)], ". ")
 
 
 def _slower_throughout(path: PathSummary) -> str:
@@ -320,6 +327,14 @@ def _slower_throughout(path: PathSummary) -> str:
         return ""
     longer = PACE_MARGIN * max(1.0, speed, acceleration**0.5)
     return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
+
+
+def _within_reach(path: PathSummary) -> str:
+    """How far a path that leaves the reach could be used; empty for others."""
+    first = min(path.unreachable, key=lambda part: part.t0_s, default=None)
+    if first is None or first.s0_m <= 0:
+        return ""
+    return sentence("advice.within_reach", t=first.t0_s, far=first.s0_m * 1000)
 
 
 def _clear(path: PathSummary) -> str:
@@ -333,8 +348,10 @@ def _clear(path: PathSummary) -> str:
         "q": _numbers(last.q_deg, 2),
         "contact": _numbers(last.contact_mm, 0),
     }
-    pair = say(path.collisions[0].cause.touches[0].pair)
-    return sentence("advice.clear_until", margin=last.margin_mm, t=last.t_s, far=last.s_m * 1000, pair=pair, **parts)
+    pair = path.collisions[0].cause.touches[0].pair
+    form = "advice.clear_until" if isinstance(pair, LinkAndSolid) else "advice.clear_until#links"
+    parts["pair"] = say(pair)
+    return sentence(form, margin=last.margin_mm, t=last.t_s, far=last.s_m * 1000, **parts)
 
 
 def _numbers(values: tuple[float, ...], digits: int) -> str:

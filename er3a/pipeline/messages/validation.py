@@ -92,6 +92,12 @@ TEXTS = texts(
         "validation.left_open#at_least": (
             "Open and weak entries could put the tool off by {mm:.0f} mm and {deg:.0f} deg, or by more."
         ),
+        "validation.left_open#turned": (
+            "Open and weak entries could turn the tool where it stands, by up to {deg:.0f} deg."
+        ),
+        "validation.left_open#turned_at_least": (
+            "Open and weak entries could turn the tool where it stands, by {deg:.0f} deg, or by more."
+        ),
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
         "validation.left_open#uncontradicted": "Nothing independent contradicts the table ({checks}), but:",
         "validation.missed#contradicted": (
@@ -125,7 +131,7 @@ TEXTS = texts(
         ),
         "validation.left_open#measurement": "Most useful measurement: {next_measurement}.",
         "validation.left_open#unbounded": (
-            "{count} entries that move the tool rest on their own source alone: if it is wrong, the error has no bound."
+            "Besides, {names} rest on their own source alone: the tool could be off by any amount if it is wrong there."
         ),
         "validation.left_open#conflicting": "{count} undecided, as documents contradict each other",
         "part_found#settled": "{part}: {settled} of {entries} entries settled",
@@ -221,9 +227,11 @@ def how_far_off(found: LeftOpen) -> list[str]:
     sentences = []
     if found.off.moves:
         form = "at_least" if found.at_least else "up_to"
+        if round(found.off.mm) == 0:
+            form = "turned_at_least" if found.at_least else "turned"
         sentences.append(sentence(f"validation.left_open#{form}", mm=found.off.mm, deg=found.off.deg))
     if found.unbounded:
-        sentences.append(sentence("validation.left_open#unbounded", count=found.unbounded))
+        sentences.append(sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
     return sentences
 
 

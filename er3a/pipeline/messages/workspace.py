@@ -75,15 +75,16 @@ TEXTS = texts(
             "The tool point moves on a plane and reaches at least {lower:.4g} m² and at most {upper:.4g} m² of it."
         ),
         "workspace.void_unexpected": (
-            "An enclosed void of {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven empty."
+            "An enclosed void of at least {litres:.3g} L lies at ({x}, {y}, {z}) mm, away from the shoulder, proven "
+            "empty."
         ),
         "workspace.void_uncertain": (
             "An enclosed void of {litres:.3g} L may lie at ({x}, {y}, {z}) mm, away from the shoulder; there is no "
             "proof, and the samples can't tell."
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of {litres:.3g} L surrounds the shoulder, where the arm can't fold to; no other void "
-            "indicates a wrong joint range."
+            "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm, where the arm "
+            "can't fold to; no enclosed void elsewhere points to a wrong joint range."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
         "workspace.no_void#undecided": (
@@ -155,16 +156,18 @@ TEXTS = texts(
         "stand.between": "On a stand of {gap} mm ({least} to {most} mm) on {name}: centre at ({centre}) mm.",
         "box.unknown": "Box of {box} mm: {why}",
         "box.nowhere": "Box of {box} mm: no place was found that the tool serves throughout.",
-        "box.put#on": "Box of {box} mm (x, y, z): put it on {name}, its centre at ({centre}) mm; {reached}.",
+        "box.put#on": "Box of {box} mm (x, y, z): put it on {name}, its centre at ({centre}) mm; {reached}. "
+        "The box is not checked as an obstacle.",
         "box.put#over": (
             "Box of {box} mm (x, y, z): put it on a stand of {gap} mm ({least} to {most} mm) on {name}, its centre at "
-            "({centre}) mm; {reached}. It fits on no surface itself ({none})."
+            "({centre}) mm; {reached}. It can't stand directly on {none}. Box and stand are not checked as obstacles."
         ),
         "box.put#free": (
-            "Box of {box} mm (x, y, z): put its centre at ({centre}) mm; {reached}. No surface is known there."
+            "Box of {box} mm (x, y, z): put its centre at ({centre}) mm; {reached}. No surface is known there. The box "
+            "is not checked as an obstacle."
         ),
-        "box.proven#all": "the tool is proven to reach all of it",
-        "box.proven#upper": "the tool is proven to reach all of it from {served_from} mm above its underside on",
+        "box.proven#all": "the tool point is proven to reach all of it",
+        "box.proven#upper": "the tool point is proven to reach all of it from {served_from} mm above its underside on",
         "box.sampled#all": "the tool reaches all points sampled",
         "box.sampled#upper": "the tool reaches all points sampled from {served_from} mm above its underside on",
         "workspace.tool_points_elsewhere": (

@@ -165,7 +165,7 @@ function newMotion() {
   Object.assign(bar, { min: String(start()), max: String(end()), step: "any" });
   const ticks = motion.events.map((event) => {
     const tick = document.createElement("button");
-    const at = (value) => (100 * (value - start())) / (end() - start() || 1);
+    const at = (value) => Math.min(100, (100 * (value - start())) / (end() - start() || 1)); // the arm may not get to the last ones
     Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
     tick.style.left = `${at(event.t)}%`;
     tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;
@@ -241,6 +241,8 @@ chooser.addEventListener("change", () => goTo(chooser.value, motions.get(chooser
 bar.addEventListener("input", () => goTo(null, Number(bar.value)));
 for (const link of document.querySelectorAll("[data-t]")) {
   link.addEventListener("click", (event) => {
+    const inner = event.target.closest("a");
+    if (inner && inner !== link) return; // a link of its own within a row, as to the teach panel
     event.preventDefault();
     event.stopPropagation(); // a link to a moment within a row that leads to its end
     goTo(link.dataset.play, Number(link.dataset.t));

@@ -467,6 +467,13 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
+LISTS = {  # where a stage's page lists what it was asked to judge
+    "collision": "table-targets",
+    "inverse": "table-targets",
+    "programs": "table-programs",
+    "trajectory": "table-paths",
+    "vision": "table-objects",
+}
 PLACE_LETTERS = 160
 VOID_TAGS = ("br", "img", "input", "wbr", "hr")
 _NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
@@ -492,6 +499,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
+        lists=LISTS,
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
@@ -590,7 +598,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             (what_it_can_do(by_status), ""),
             (
                 payload_text(heads["dynamics"].summary if "dynamics" in heads else None, robot),
-                "dynamics" in heads and "dynamics.html",
+                "dynamics" in heads and "dynamics.html#payload",
             ),
             (box_text(heads["workspace"].summary) if "workspace" in heads else "", "workspace.html#placement"),
         ],

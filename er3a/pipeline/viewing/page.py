@@ -331,7 +331,10 @@ def led(text: str) -> tuple[str, str]:
     ends = [found.end() for found in re.finditer(r"[.;](?= )|[。；]", text[:LED])]
     if len(text) <= WHOLE or not ends:
         return text, ""
-    return text[: ends[-1]], text[ends[-1] :].strip()
+    first, rest = text[: ends[-1]], text[ends[-1] :].strip()
+    if first[-1] in ".。":
+        return first, rest
+    return whole_sentence(first[:-1]), rest[:1].upper() + rest[1:]  # a clause becomes a sentence
 
 
 def linked(text: str, links: Mapping[str, str]) -> Markup:

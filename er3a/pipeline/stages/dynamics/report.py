@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from er3a.pipeline.messages.dynamics import BINDING, FIGURES, quantity_word
+from er3a.pipeline.messages.dynamics import BINDING, FIGURES, payload_text, quantity_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
@@ -168,6 +168,7 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         command=run_command(study, f"{stored.robot}/dynamics.html"),
         robot=robot,
         robot_pages=study.pages(stored.robot),
+        payload=payload_text(summary, robot),
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),
         links=_links(summary),

@@ -56,13 +56,15 @@ class ListingLine:
 
 @dataclass(frozen=True)
 class ProgramSection:
-    """A program on the page, and what it says in the page's language; ``worst``: the finding that weighs most."""
+    """A program on the page, and what it says in the page's language; ``worst``: the finding that weighs most, and
+    ``to_do`` about it."""
 
     program: ProgramSummary
     status: str
     language: str
     cycle: str
     worst: Markup
+    to_do: str
     lines: list[ListingLine]
     elsewhere: list[list[str]]
 
@@ -71,6 +73,7 @@ def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     """Write the page of a robot's programs."""
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
+    solids = load_scene(scene) if scene else None
     sections = [_section(results, program) for program in summary.programs]
     render(
         Path(__file__).with_name("report.html.j2"),
@@ -81,7 +84,8 @@ def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
         robot=robot,
         robot_pages=study.pages(stored.robot),
         sections=sections,
-        player=player(robot, motions(robot, results), load_scene(scene) if scene else None),
+        player=player(robot, motions(robot, results), solids),
+        bodies=[each.name for each in solids.solids] if solids else [],
         drawing_head=drawing_head(),
     )
 
@@ -90,7 +94,7 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     own = Path(program.file).name
     found: dict[int, list[FindingAt]] = defaultdict(list)
     elsewhere = []
-    for each in program.findings:
+    for each in sorted(program.findings, key=_when):
         if each.file == own and each.line:
             found[each.line].append(each)
         else:
@@ -100,34 +104,44 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     text = results.lines.take(results.lines.program == program.name)
     rows = results.instructions.take(results.instructions.program == program.name)
     motion = results.motion.take(results.motion.program == program.name)
-    lines = _listing(program.name, text, rows, motion, found)
+    lines = _listing(program, text, rows, motion, found)
     status = STATUSES[program.outcome]
-    texts = LANGUAGES[program.language].title, cycle_text(program), _worst(program)
+    texts = LANGUAGES[program.language].title, cycle_text(program), *_worst(program)
     return ProgramSection(program, status, *texts, lines, elsewhere)
 
 
-def _worst(program: ProgramSummary) -> Markup:
-    """The first of the findings that weigh most, with its line; empty where a program passes."""
-    found = max(program.findings, key=lambda each: RANKS[each.level], default=None)
+def _when(each: FindingAt) -> float:
+    return next((time for time in (each.program_s, each.motion_s) if time is not None), np.inf)
+
+
+def _worst(program: ProgramSummary) -> tuple[Markup, str]:
+    """The first of the findings that weigh most, with its line, and what to do there; empty where a program passes."""
+    found = min(program.findings, key=lambda each: (-RANKS[each.level], _when(each)), default=None)
     if found is None or program.outcome == "pass":
-        return Markup()
+        return Markup(), ""
     remark = _remark(program.name, found)
-    return Markup(tr("line {line}: {text}", line=found.line, text=remark)) if found.line else remark
+    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
+    to_do = " ".join(remedies(here, program.findings))
+    return Markup(tr("line {line}: {text}", line=found.line, text=remark)) if found.line else remark, to_do
 
 
 def _remark(name: str, each: FindingAt) -> Markup:
     """What was found, after the moment at which it begins: a link to it where the player shows it."""
-    text = escape(bracketed(say(each.finding), f"{each.times} ×" if each.times > 1 else ""))
+    often = tr("{times} times that the line is carried out", times=each.times) if each.times > 1 else ""
+    text = escape(bracketed(say(each.finding), often))
     if each.motion_s is None:
         return text
-    at = tr("at {time} s", time=fixed(each.motion_s, 2))
+    at = tr("{time} s into this line", time=fixed(each.motion_s, 2))
+    if each.program_s is not None:
+        at = bracketed(at, tr("player: {time} s", time=fixed(each.program_s, 2)))
     shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)
     return Markup("<b>{}</b>{}{}").format(shown, tr(": "), text)
 
 
 def _listing(
-    name: str, text: Lines, rows: Instructions, motion: ProgramMotion, found: dict[int, list[FindingAt]]
+    program: ProgramSummary, text: Lines, rows: Instructions, motion: ProgramMotion, found: dict[int, list[FindingAt]]
 ) -> list[ListingLine]:
+    name = program.name
     moves: dict[int, list[int]] = defaultdict(list)
     played = {line: (t0, t1) for line, _, t0, t1 in reversed(stretches(motion))}  # the first time counts
     for i, line in enumerate(rows.line.tolist()):
@@ -145,7 +159,7 @@ def _listing(
         here = found.get(number, [])
         levels: list[Level] = [*(each.level for each in here), *rows.level[moves[number]].tolist()]
         level = worst_of(levels) if levels else None
-        remarks, to_do = [_remark(name, each) for each in here], remedies(here)
+        remarks, to_do = [_remark(name, each) for each in here], remedies(here, program.findings)
         leads = Markup(), Markup()
         if number in played:
             t0, t1 = played[number]

@@ -556,7 +556,7 @@ def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tup
     agreement = max((path.velocity_check_deg_s * 1e6 for path in bounded), default=None)
     speeds = [
         (speed, limit, "mm/s" if joint in path.sliding else "deg/s")
-        for path in bounded
+        for path in asked
         for joint, (speed, limit) in enumerate(zip(path.max_joint_speed_deg_s or (), limits.speed_deg_s), 1)
     ]
     speed, limit, unit = max(speeds, key=lambda each: each[0] / each[1], default=(None, None, "deg/s"))

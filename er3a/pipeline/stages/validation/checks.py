@@ -393,14 +393,13 @@ def verdict_of(
     if not moving or any(part.status != "settled" for part in moving):
         off = reduce(ToolOff.worse, (part.off for part in moving), NOT_OFF)
         entries = (*evidence.entries, *evidence.combinations) if evidence else ()
-        statuses = [each.status for each in entries if each.moves_tool]
         left = LeftOpen(
             **common,
             parts=parts,
             tolerance=evidence.tolerance if evidence else None,
             off=off,
             at_least=any(each.at_least for each in entries),
-            unbounded=statuses.count("consistent"),
+            unbounded=tuple(each.entry for each in entries if each.moves_tool and each.status == "consistent"),
             next_measurement=_next_measurement(evidence),
         )
         return Verdict("caution", left)
@@ -408,14 +407,14 @@ def verdict_of(
 
 
 def _next_measurement(evidence: TableEvidence | None) -> Proposal | None:
-    """What would settle the entry that leaves most open: what is open first, then by how far the tool could be off."""
+    """What would settle the entry for which the tool could be off farthest; of equals, what documents leave open."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in (*evidence.entries, *evidence.combinations)}
 
-    def gravity(proposal: Proposal) -> tuple[bool, float, float]:
+    def gravity(proposal: Proposal) -> tuple[float, float, bool]:
         each = by_name[proposal.entry]
-        return each.status == "open", each.off.mm, each.off.deg
+        return each.off.mm, each.off.deg, each.status == "open"
 
     return max(evidence.proposals, key=gravity, default=None)
 

@@ -234,7 +234,7 @@ class LeftOpen(JudgedTable):
     parts : of the table
     off : how far the tool could be off for what is weak or open, all over the joint ranges
     at_least : whether that is what was found, and more may be left open
-    unbounded : how many entries that move the tool only their own document speaks of: for these there is no bound
+    unbounded : entries that move the tool and that only their own document speaks of: for these there is no bound
     next_measurement : the one that settles the entry for which it could be off farthest
     tolerance : how far what counts as settled may leave the tool off
     """
@@ -243,7 +243,7 @@ class LeftOpen(JudgedTable):
     tolerance: Tolerance | None
     off: ToolOff
     at_least: bool
-    unbounded: int
+    unbounded: tuple[str, ...]
     next_measurement: Proposal | None
     contradiction: Contradiction | None
     code: Literal["validation.left_open"] = "validation.left_open"

@@ -134,7 +134,6 @@ def _void_row(row: int, void: VoidSummary) -> list[str]:
         word("workspace.void_kind", VOID_KINDS, void.kind),
         word("workspace.void_status", VOID_STATUS, void.status),
         tr("{low} to {high}", low=number(low, 3), high=number(high, 3)),
-        tr("not closed") if void.mesh_m3 is None else number(1000 * void.mesh_m3, 4),
         ", ".join(fixed(1000 * value, 0) for value in void.centroid_m),
         " × ".join(fixed(1000 * value, 0) for value in void.extent_m),
         say(void.cause),
