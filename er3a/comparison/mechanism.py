@@ -388,8 +388,9 @@ def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances, most_
     """Whether geometry, zeros and directions agree, with ``most_layers`` of base and flange at most."""
     least = np.where(one.sliding, tolerances.length, tolerances.angle)
     return any(
-        found.layers <= most_layers and not (found.reverses.any() or (np.abs(found.zeros) > least).any())
+        found.layers <= most_layers and not (np.abs(found.zeros) > least).any()
         for senses, normals in _likely_senses(one, other, tolerances, may_differ=False)
+        if (senses * other.direction == one.direction).all()
         for found in _settled(one, with_senses(other, senses, normals), senses, tolerances, may_differ=False)
     )
 
