@@ -226,12 +226,14 @@ class _ManyStarts:
     ----------
     reach : (2, k), how far entries were found above and below the start, in their scales
     best : for each of these the directions (n,) and amounts (k,) of the table that lies there
+    reversed : by joint (from 0) those of a table in which it turns the other way, farthest or not
     """
 
     def __init__(self, region: Region, start: OpenTable, watched: Collection[int]):
         self.region, self.start, self.watched = region, start, watched
         self.reach = np.zeros((2, len(region.entries)))
         self.best: dict[tuple[int, int], tuple[Reals, Reals]] = {}
+        self.reversed: dict[int, tuple[Reals, Reals]] = {}
 
     def try_from(self, direction: Reals, amounts: Reals, held: Flags) -> None:
         """Go from starts toward what is asked for, and keep what comes farthest."""
@@ -251,6 +253,8 @@ class _ManyStarts:
         for way, sign in enumerate((1.0, -1.0)):
             for k in np.flatnonzero(sign * apart > self.reach[way] + FAR / 2).tolist():
                 self.reach[way, k], self.best[way, k] = sign * apart[k], place
+        for joint in np.flatnonzero(place[0] != region.table.direction[0]).tolist():
+            self.reversed.setdefault(joint, place)
 
     def farthest_tables(self) -> list[tuple[Reals, Reals]]:
         """Different tables found, those first that lie farthest along most entries."""
@@ -262,7 +266,7 @@ class _ManyStarts:
     def found(self) -> list[Elsewhere]:
         """Tables found, as points of the regions with their directions; those that extremes allow as well."""
         region, found = self.region, list[Elsewhere]()
-        for direction, amounts in self.farthest_tables()[:MOST_KEPT]:
+        for direction, amounts in (*self.farthest_tables()[:MOST_KEPT], *self.reversed.values()):
             table = region.table.with_column("direction", slice(None), direction[None])
             other = Region(region.asked, table, region.entries, region.gauge)
             point = other.restarted(amounts, self.start.chi2)
