@@ -334,6 +334,7 @@ class _ManyStarts:
 
 
 FEW_STEPS = 10
+ALL_ROUND_RAD = np.pi / 3  # off its value, from which on an angle counts as open all round
 ALREADY = 1e-4  # of a scale's step, in which an entry counts as inside its interval
 
 
@@ -479,10 +480,25 @@ class Extents:
         return all(self._off(factors, end).within(self.tolerance.mm, self.tolerance.deg) for end in ends)
 
     def may_reverse(self, joint: int) -> bool:
-        """Whether a table was found whose joint (from 1) turns the other way, however its rows are written."""
+        """Whether a table was found whose joint (from 1) turns the other way, or the table's robot has rows in which it
+        does that differ, of all to which requirements react, in angles alone that were found far off."""
         self._challenge()
-        own = self.table.direction[0, joint - 1]
-        return any(each.region.table.direction[0, joint - 1] != own for each in self.elsewhere)
+        own = self.table.direction[0]
+        reversed_ = np.arange(len(own)) == joint - 1
+        if any(each.region.table.direction[0, joint - 1] != own[joint - 1] for each in self.elsewhere):
+            return True
+        if self.start is None or not self.elsewhere:
+            return False
+        every = same_robots(self.met_by)
+        same: Flags = ((every.direction != own) == reversed_).all(axis=1)
+        apart = np.abs([each.point.amounts - self.begun for each in self.elsewhere]).max(axis=0)
+        for amount, place in zip(apart, self.seen):
+            entry = self.entries[place]
+            off = (getattr(every, entry.column) - getattr(self.met_by, entry.column))[:, entry.joint - 1]
+            if entry.unit == "mm" or amount * entry.scale < ALL_ROUND_RAD:
+                off = off if entry.unit == "mm" else (off + np.pi) % (2 * np.pi) - np.pi
+                same &= np.abs(off) < REACTS
+        return bool(same.any())
 
     def free_choice(self, entry: TableNumber) -> Extent:
         """The interval of an entry that moves no tool if others are changed with it."""
