@@ -240,11 +240,11 @@ def _likely_senses(
     by_link = np.arange(links)
     normals = np.where(cost[by_link, folds, 0] <= cost[by_link, folds, 1], 1.0, -1.0)
     total = cost.min(axis=2)[by_link, folds].sum(axis=1)
-    for first, last, along in _parallel_blocks(one, parallel):
+    for first, last, along in _parallel_blocks(other, parallel):
         if first == 0 or last == m - 1 or not placed[max(first - 1, 0) : last + 1].all():
             continue
         inside = slice(first, last + 1)
-        gap = np.abs((senses[:, inside] * other.d[inside] - one.d[inside]) @ along)
+        gap = np.abs((other.d[inside] - senses[:, inside] * one.d[inside]) @ along)
         total += (gap > tolerances.length) + 1e-4 * gap
     beside = np.concatenate([np.ones((len(senses), 1)), normals, np.ones((len(senses), 1))], axis=1)
     turned = senses * other.offset + np.where(beside[:, :-1] * beside[:, 1:] < 0, np.pi, 0.0) - one.offset
@@ -388,8 +388,9 @@ def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances, most_
     """Whether geometry, zeros and directions agree, with ``most_layers`` of base and flange at most."""
     least = np.where(one.sliding, tolerances.length, tolerances.angle)
     return any(
-        found.layers <= most_layers and not (found.reverses.any() or (np.abs(found.zeros) > least).any())
+        found.layers <= most_layers and not (np.abs(found.zeros) > least).any()
         for senses, normals in _likely_senses(one, other, tolerances, may_differ=False)
+        if (senses * other.direction == one.direction).all()
         for found in _settled(one, with_senses(other, senses, normals), senses, tolerances, may_differ=False)
     )
 

@@ -226,12 +226,14 @@ class _ManyStarts:
     ----------
     reach : (2, k), how far entries were found above and below the start, in their scales
     best : for each of these the directions (n,) and amounts (k,) of the table that lies there
+    reversed : by joint (from 0) those of a table in which it turns the other way, farthest or not
     """
 
     def __init__(self, region: Region, start: OpenTable, watched: Collection[int]):
         self.region, self.start, self.watched = region, start, watched
         self.reach = np.zeros((2, len(region.entries)))
         self.best: dict[tuple[int, int], tuple[Reals, Reals]] = {}
+        self.reversed: dict[int, tuple[Reals, Reals]] = {}
 
     def try_from(self, direction: Reals, amounts: Reals, held: Flags) -> None:
         """Go from starts toward what is asked for, and keep what comes farthest."""
@@ -251,6 +253,8 @@ class _ManyStarts:
         for way, sign in enumerate((1.0, -1.0)):
             for k in np.flatnonzero(sign * apart > self.reach[way] + FAR / 2).tolist():
                 self.reach[way, k], self.best[way, k] = sign * apart[k], place
+        for joint in np.flatnonzero(place[0] != region.table.direction[0]).tolist():
+            self.reversed.setdefault(joint, place)
 
     def farthest_tables(self) -> list[tuple[Reals, Reals]]:
         """Different tables found, those first that lie farthest along most entries."""
@@ -262,7 +266,7 @@ class _ManyStarts:
     def found(self) -> list[Elsewhere]:
         """Tables found, as points of the regions with their directions; those that extremes allow as well."""
         region, found = self.region, list[Elsewhere]()
-        for direction, amounts in self.farthest_tables()[:MOST_KEPT]:
+        for direction, amounts in (*self.farthest_tables()[:MOST_KEPT], *self.reversed.values()):
             table = region.table.with_column("direction", slice(None), direction[None])
             other = Region(region.asked, table, region.entries, region.gauge)
             point = other.restarted(amounts, self.start.chi2)
@@ -330,6 +334,7 @@ class _ManyStarts:
 
 
 FEW_STEPS = 10
+ALL_ROUND_RAD = np.pi / 3  # off its value, from which on an angle counts as open all round
 ALREADY = 1e-4  # of a scale's step, in which an entry counts as inside its interval
 
 
@@ -475,10 +480,25 @@ class Extents:
         return all(self._off(factors, end).within(self.tolerance.mm, self.tolerance.deg) for end in ends)
 
     def may_reverse(self, joint: int) -> bool:
-        """Whether a table was found whose joint (from 1) turns the other way, however its rows are written."""
+        """Whether a table was found whose joint (from 1) turns the other way, or the table's robot has rows in which it
+        does that differ, of all to which requirements react, in angles alone that were found far off."""
         self._challenge()
-        own = self.table.direction[0, joint - 1]
-        return any(each.region.table.direction[0, joint - 1] != own for each in self.elsewhere)
+        own = self.table.direction[0]
+        reversed_ = np.arange(len(own)) == joint - 1
+        if any(each.region.table.direction[0, joint - 1] != own[joint - 1] for each in self.elsewhere):
+            return True
+        if self.start is None or not self.elsewhere:
+            return False
+        every = same_robots(self.met_by)
+        same: Flags = ((every.direction != own) == reversed_).all(axis=1)
+        apart = np.abs([each.point.amounts - self.begun for each in self.elsewhere]).max(axis=0)
+        for amount, place in zip(apart, self.seen):
+            entry = self.entries[place]
+            off = (getattr(every, entry.column) - getattr(self.met_by, entry.column))[:, entry.joint - 1]
+            if entry.unit == "mm" or amount * entry.scale < ALL_ROUND_RAD:
+                off = off if entry.unit == "mm" else (off + np.pi) % (2 * np.pi) - np.pi
+                same &= np.abs(off) < REACTS
+        return bool(same.any())
 
     def free_choice(self, entry: TableNumber) -> Extent:
         """The interval of an entry that moves no tool if others are changed with it."""

@@ -67,6 +67,18 @@ def test_wrong_entries_are_named(kind):
         assert er3a.compare(found.corrected, robot(other)).geometry.same
 
 
+def test_a_wrong_twist_that_makes_axes_parallel_accuses_no_length_along_them():
+    random = np.random.default_rng([3434, KINDS.index("offset_wrist"), 79])
+    arm = random_arm(random, "offset_wrist")
+    defined_elsewhere(random, arm)
+    other, _ = with_wrong_entries(random, arm)
+    assert abs(np.sin(arm.alpha[4])) == pytest.approx(1)
+    assert np.sin(other.alpha[4]) == pytest.approx(0, abs=1e-9)
+    assert random.random() < 0.7
+    found = er3a.compare(robot(arm), robot(defined_elsewhere(random, other)))
+    assert {each.entry for each in found.geometry.differences} == {"alpha3", "alpha5"}
+
+
 def article() -> er3a.Robot:
     return er3a.load_robot("er3a_c60_article")
 
