@@ -231,6 +231,11 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert f"held back: 20 positions, {told['held_back']['mean_mm']:.4g} mm off on average" in text
     assert f"at worst (row {told['held_back']['worst_row']})" in text
     assert "tried: J3 once a turn" in text
+    alone = told["held_back"]["table_mean_mm"]
+    assert alone > told["held_back"]["mean_mm"]
+    assert f"by the table alone, as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
+    table, model = told["left_out"]["mean_mm"], told["beyond"]["left_out"]["mean_mm"]
+    assert f"the table alone errs by {table:.3g} mm on average, with the terms by {model:.3g} mm." in text
     assert load_robot(tmp_path / "mine.yaml").joints == 7
 
 
