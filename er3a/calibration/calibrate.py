@@ -528,11 +528,11 @@ def _from_points(robot: Robot, every: PointObservations) -> Calibration:
     used = _without_outliers(robot, every)
     model = _model(robot, every.take(used))
     for _ in range(OUTLIER_ROUNDS):
-        again = _out_of(every, _off_mm(robot, every, model), model.off_mm) <= 1.0
+        again = _out_of(every, _off_mm(robot, every, model, used), model.off_mm) <= 1.0
         if (again == used).all() or (~again).mean() > MOST_OUT:
             break
         used, model = again, _model(robot, every.take(again))
-    distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model) ** 2))
+    distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model, used) ** 2))
     observations, terms = model.observations, model.choice.terms
     return replace(
         _result(robot, model.level, observations, model.table),
@@ -580,12 +580,24 @@ def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> 
     return out
 
 
-def _off_mm(robot: Robot, every: PointObservations, model: _Model) -> Reals:
-    """What the whole model leaves of all points, mm (n,)."""
+def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) -> Reals:
+    """What the whole model leaves of all points, mm (n,); places, planes and sockets are where those that are used (P,)
+    put them, and each of the others alone beside these."""
     here = corrected(robot, model.whole.kept, model.whole.amounts)
     errors = JointErrors(robot, model.whole.terms, model.whole.coefficients)
     shifted = every.shifted(errors.amounts(every.row_values, every.points(robot)))
-    off: Reals = shifted.predict(here, (), np.zeros((1, 0)))[0] - every.values_mm
+
+    def off_of(part: PointObservations) -> Reals:
+        off: Reals = part.predict(here, (), np.zeros((1, 0)))[0] - part.values_mm
+        return off
+
+    if not every.kinds or used.all():
+        return off_of(shifted)
+    off = np.empty(len(every))
+    off[used[every.pose_of]] = off_of(shifted.take(used))
+    for k in np.flatnonzero(~used):
+        part = shifted.take(used | (np.arange(len(used)) == k))
+        off[every.pose_of == k] = off_of(part)[part.pose_of == np.count_nonzero(used[:k])]
     return off
 
 

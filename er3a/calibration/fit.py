@@ -40,6 +40,8 @@ SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE = 1e-6  # of the weighted differences, of measured points
 HALVINGS = 12
 LEAST_OWN = 1e-9
+SLID = 10.0
+"""Times what the table leaves of touched points that joints have to slide, to set the scale."""
 TURNS_ALL = Parameter("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
 
@@ -92,13 +94,18 @@ def subspace(robot: Robot, parameters: Sequence[Parameter], observations: Observ
 
 def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     """The longest length of the table that moves the points, which is taken as it is; None where coordinates or lengths
-    were measured."""
+    were measured, or joints have slid while a place or plane was touched."""
     if observations.has_scale:
         return None
     lengths = parameters_of(robot, "lengths")
     effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
     moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
-    return max(moving, key=lambda entry: abs(entry.nominal(robot)), default=None)
+    longest = max(moving, key=lambda entry: abs(entry.nominal(robot)), default=None)
+    if longest is None:
+        return None
+    slid, off = observations.slid(robot), observations.predict(robot, (), np.zeros((1, 0)))[0]
+    least = max(SLID * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
+    return longest if np.linalg.norm(slid) < least else None
 
 
 def without_scale(parameters: Sequence[Parameter], scale: Parameter | None) -> tuple[Parameter, ...]:

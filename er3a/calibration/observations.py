@@ -268,6 +268,15 @@ class PointObservations:
         """Where the measured points are in the flange's frame (P, 3), m."""
         return np.where(self.on_tool[:, None], robot.tool[:3, 3], 0.0)
 
+    def slid(self, robot: Robot) -> Reals:
+        """By how much joints that slide have changed what is observed (n,), mm; what drops out with a place doesn't
+        count."""
+        T = frames_of(tables_of(robot), robot, self.row_values)[0]
+        ways = np.where(robot.sliding, robot.direction * self.row_values, 0.0)
+        shift = np.einsum("pmi,pm->pi", T[:, :-1, :3, 2], ways)
+        found: Reals = MM * self.relative_shift(shift, self.positions(robot))[self.seen]
+        return found
+
     def take(self, used: Flags) -> PointObservations:
         """Those of some points (P,)."""
         own = used[self.pose_of]

@@ -188,7 +188,7 @@ def calibrate(
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
-    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, lines_of
+    from er3a.pipeline.messages.calibration import calibration_record, file_text, held_back_lines, lines_of
     from er3a.pipeline.messages.say import say
 
     if words not in LANGUAGES:
@@ -214,28 +214,30 @@ def calibrate(
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
     name = output.stem if output else f"{arm.name}_calibrated"
-    corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated")
+    alone = " (table without its terms)" if found.beyond else ""
+    corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated{alone}")
     if output:
         write_robot(corrected, output)
-    distances = found.distances_mm(others) if others else None
     if html or rrd:
         from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
     if html:
         command, files = ["er3a", *sys.argv[1:]], [given for given in (Path(robot), file) if given and given.is_file()]
         shown = partial(write_calibration, command=command, files=files, corrected=corrected, recording=rrd)
         with using(words):
-            shown(arm, rows, found, html, held_back=distances)
+            shown(arm, rows, found, html, held_back=others)
     if rrd:
         record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
-        print_json({"output": str(output) if output else None, **calibration_record(found, others, distances)})
+        print_json({"output": str(output) if output else None, **calibration_record(found, others)})
         return
     print(lines_of(found))
-    if distances is not None:
-        print(held_back_line(rows, others, distances))
+    if others:
+        print("\n".join(held_back_lines(found, rows, others)))
     for written in (output, html, rrd):
         if written:
             print(f"{written}: written")
+    if output and (without := file_text(found)):
+        print(f"{output}: {without}")
 
 
 @app.command(rich_help_panel=ROBOT_FILES)

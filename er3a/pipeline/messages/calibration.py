@@ -123,6 +123,27 @@ def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement],
     )
 
 
+def held_back_lines(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
+    """Those by the model, and by the table alone if the model has terms."""
+    lines = [held_back_line(fitted, others, found.distances_mm(others))]
+    if found.beyond:
+        alone = held_back_line(fitted, others, found.without_terms().distances_mm(others))
+        lines.append(f"by the table alone, as in a robot file, {alone}")
+    return lines
+
+
+def file_text(found: Calibration) -> str | None:
+    """What a robot file lacks, and the errors at poses left out without and with it; None if there are no terms."""
+    if found.beyond is None or found.left_out is None or found.beyond.left_out is None:
+        return None
+    return tr(
+        "No robot file can hold terms beyond the table: at poses left out the table alone errs by {table:.3g} mm on "
+        "average, with the terms by {model:.3g} mm.",
+        table=found.left_out.mean_mm,
+        model=found.beyond.left_out.mean_mm,
+    )
+
+
 def term_name(term: TriedTerm | TermEstimate) -> str:
     """Such as J2 once a turn."""
     return f"J{term.joint} {term_kind(term)}"
@@ -197,7 +218,7 @@ def _beyond_lines(found: Beyond) -> list[str]:
         lines.append(f"with terms, {_left_out_line(found.left_out)}")
     if found.residuals:
         lines.append(f"with terms, {_residual_line(found.residuals)}")
-    lines.append("the robot file holds the table alone; the terms are in --json and in found.forward(q) in Python")
+    lines.append("the terms are in --json and in found.forward(q) in Python, not in a robot file")
     return lines
 
 
@@ -206,14 +227,12 @@ def _coefficients(term: TermEstimate) -> str:
     return ", ".join(f"{as_text(value, '+.3f')} +- {1.96 * error:.3f}" for value, error in pairs) + " (1/1000)"
 
 
-def calibration_record(
-    found: Calibration, others: Sequence[Measurement] = (), distances: Reals | None = None
-) -> dict[str, object]:
+def calibration_record(found: Calibration, others: Sequence[Measurement] = ()) -> dict[str, object]:
     """A calibration as plain data, for another program; corrections in mm and deg with half their 95 % interval.
 
     Parameters
     ----------
-    others, distances : positions held back, and how far they are from the model, mm
+    others : positions held back
     """
     return {
         "level": found.level,
@@ -232,14 +251,19 @@ def calibration_record(
         "residuals": _residuals(found.residuals),
         "tried": [vars(each) for each in found.tried],
         "beyond": _beyond(found.beyond) if found.beyond else None,
-        "held_back": None
-        if distances is None
-        else {
-            "positions": len(distances),
-            "mean_mm": float(distances.mean()),
-            "worst_mm": float(distances.max()),
-            "worst_row": others[int(distances.argmax())].row,
-        },
+        "held_back": _held_back(found, others) if others else None,
+    }
+
+
+def _held_back(found: Calibration, others: Sequence[Measurement]) -> dict[str, object]:
+    model, alone = found.distances_mm(others), found.without_terms().distances_mm(others)
+    return {
+        "positions": len(model),
+        "mean_mm": float(model.mean()),
+        "worst_mm": float(model.max()),
+        "worst_row": others[int(model.argmax())].row,
+        "table_mean_mm": float(alone.mean()),
+        "table_worst_mm": float(alone.max()),
     }
 
 

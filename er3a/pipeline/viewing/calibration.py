@@ -22,7 +22,7 @@ from er3a.files.robot_writer import robot_file, yaml_text
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.calibration import VERDICTS, residual_texts, term_kind
+from er3a.pipeline.messages.calibration import VERDICTS, file_text, residual_texts, term_kind
 from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import bracketed, say
@@ -94,7 +94,7 @@ def write_calibration(
     files: Sequence[Path],
     corrected: Robot,
     recording: Path | None = None,
-    held_back: Reals | None = None,
+    held_back: Sequence[Measurement] = (),
 ) -> None:
     """Render a calibration as a page.
 
@@ -105,7 +105,7 @@ def write_calibration(
     files : what it was made from: the robot's file, if it is no name, and the measurements
     corrected : what the robot file holds, with the file's name
     recording : its recording, if there is one
-    held_back : distances (P,), mm, at positions that the fit has not seen
+    held_back : positions that the fit has not seen
     """
     errors = measured_errors(robot, measurements, found)
     text = yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True))
@@ -137,6 +137,7 @@ def write_calibration(
             headline=headline(comparison),
             compare_command=shlex.join(["er3a", "compare", table, f"{corrected.name}.yaml", "--html", "compared.html"]),
             corrected=text,
+            without_terms=file_text(found),
             corrected_name=f"{corrected.name}.yaml",
             corrected_address=page.text_address(text),
             maps=_maps(errors),
@@ -173,7 +174,7 @@ def _figures(found: Calibration, errors: MeasuredErrors) -> list[ShownFigure]:
     return [ShownFigure(label, label, value, "mm", None, False) for label, value in figures]
 
 
-def _errors(found: Calibration, errors: MeasuredErrors, held_back: Reals | None) -> list[list[str]]:
+def _errors(found: Calibration, errors: MeasuredErrors, held_back: Sequence[Measurement]) -> list[list[str]]:
     left_out: dict[str, HeldOutErrors | None] = {
         "table": found.left_out,
         "model": found.beyond.left_out if found.beyond else None,
@@ -183,10 +184,10 @@ def _errors(found: Calibration, errors: MeasuredErrors, held_back: Reals | None)
         rms, own = float(np.sqrt((errors.distances_mm(model) ** 2).mean())), left_out.get(model)
         numbers = () if own is None else (own.mean_mm, own.worst_mm, own.far_mean_mm, own.far_worst_mm)
         rows.append([tr(MODELS[model]), number(rms, 3), *(number(value, 3) for value in numbers or [None] * 4)])
-    if held_back is not None:
-        mean, worst = float(held_back.mean()), float(held_back.max())
-        title = tr("held back: {count} positions", count=len(held_back))
-        rows.append([title, "–", number(mean, 3), number(worst, 3), "–", "–"])
+    for model in list(errors.differences_mm)[1:] if held_back else ():
+        off = (found if model == "model" else found.without_terms()).distances_mm(held_back)
+        title = tr("held back: {count} positions, {model}", count=len(off), model=tr(MODELS[model]))
+        rows.append([title, "–", number(float(off.mean()), 3), number(float(off.max()), 3), "–", "–"])
     return rows
 
 

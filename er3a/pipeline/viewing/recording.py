@@ -256,13 +256,11 @@ def _layout(shown: Recorded) -> rrb.Container:
     texts = rrb.Vertical(*words, name="Words")
     if len(views) > 2:
         return rrb.Grid(*views, texts, grid_columns=2, name=stage)
-    left = views[0] if len(views) == 1 else rrb.Horizontal(*views)
+    left = views[0] if len(views) == 1 else rrb.Vertical(*views)  # side by side they would cut the arm off
     if len(curves) > 1:
-        shares = [2.0 * len(views), 1.0, 1.3]
+        shares = [2.0, 1.0, 1.3]
         return rrb.Horizontal(left, rrb.Vertical(*curves, name="Curves"), texts, column_shares=shares, name=stage)
-    return rrb.Horizontal(
-        left, rrb.Vertical(*curves, *words, name="Words"), column_shares=[2.0 * len(views), 1.3], name=stage
-    )
+    return rrb.Horizontal(left, rrb.Vertical(*curves, *words, name="Words"), column_shares=[2.0, 1.3], name=stage)
 
 
 def _note_view(stage: str) -> rrb.View:
