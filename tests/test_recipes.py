@@ -476,7 +476,7 @@ assert len(er3a.inverse(robot, missed, 0 * one).q) == 0
 @pytest.mark.long
 def test_a_column_and_its_plot(carry_out):
     column = """    across_mm: Reals = column("greatest distance of its centre from the last axis")
-    weight_n: Reals = column("weight of the load at rest", heading=N_("weight"))
+    weight_n: Reals = column("weight of the load at rest", heading=N_("weight at rest"))
 """
     values = """        across_mm=1000 * diagram.across[:, :last].ravel(),
         weight_n=gravity * np.repeat(diagram.mass, last),
@@ -519,7 +519,7 @@ rows.write(Path("rows.parquet"))
 assert DiagramRows.read(Path("rows.parquet").read_bytes()) == rows
 assert pq.read_schema("rows.parquet").field("weight_n").metadata[b"unit"] == b"N"
 assert "weight of the load at rest" in data_dictionary()
-for code, label in (("en", "weight (N)"), ("zh", "weight（N）")):
+for code, label in (("en", "weight at rest (N)"), ("zh", "weight at rest（N）")):
     language.use(code)
     (axes,) = weight_figure(rows).axes
     assert axes.get_ylabel() == label

@@ -124,7 +124,7 @@ def test_part_of_a_study_has_verdicts_an_index_and_a_report(study, tmp_path, mon
     write_index(study, results, reports)
     page = (reports / "index.html").read_text(encoding="utf-8")
     assert "Not examined yet: workspace, collision, inverse, trajectory, dynamics." in page
-    assert re.findall(r'href="er3_600/(\w+)\.html"', page) == [
+    assert re.findall(r'href="er3_600/(\w+)\.html', page) == [
         "teach",
         "validation",
         "validation",

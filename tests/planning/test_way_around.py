@@ -62,7 +62,7 @@ def test_planned_motions_touch_nothing_and_keep_their_limits(title, random):
         found += 1
         q, velocity, acceleration = way.motion.curve.rates(np.linspace(0, way.motion.duration, DENSE))
         np.testing.assert_allclose(q[[0, -1]], [start, end], atol=1e-12)
-        assert apart.min_distance(q).min() > 0
+        assert apart.least(q).min() > 0
         assert (q <= ROBOT.upper + 1e-9).all()
         assert (q >= ROBOT.lower - 1e-9).all()
         assert (np.abs(velocity) <= LIMITS.speed * (1 + 1e-9)).all()
@@ -76,7 +76,7 @@ def test_the_straight_move_between_them_would_touch(random):
     scene = load_scene("data/scenes/table_and_post.yaml")
     one = task(scene)
     start, end = blocked(one.bodies, random)
-    assert contacts_of(ROBOT, scene).min_distance(np.linspace(start, end, DENSE)).min() < 0
+    assert contacts_of(ROBOT, scene).least(np.linspace(start, end, DENSE)).min() < 0
 
 
 @pytest.mark.long

@@ -72,7 +72,7 @@ def test_no_overlap_of_a_triangle_goes_unnoticed(seed):
         found = zone_clearance(BODIES, corners, 0.001)
         told.add(type(found))
         shares = rng.dirichlet(np.ones(3), 300)
-        least = min(BODIES.told(BODIES.distances(BODIES.ends(q), every)).min() for q in shares @ corners)
+        least = min(BODIES.counted(BODIES.distances(BODIES.ends(q), every)).min() for q in shares @ corners)
         if found is None:
             assert least >= -0.001
         elif isinstance(found, ZoneNotSettled):
@@ -127,7 +127,7 @@ def test_no_overlap_of_a_way_between_two_lines_goes_unnoticed(seed, turn):
                 assert len(solved), "a way that is proven is reached"
             if len(solved):
                 near = solved[np.abs(solved - q).max(axis=1).argmin()]
-                least = min(least, BODIES.told(BODIES.distances(BODIES.ends(near), every)).min())
+                least = min(least, BODIES.counted(BODIES.distances(BODIES.ends(near), every)).min())
         if found is None:
             assert least >= -0.001
         elif isinstance(found, ZoneNotSettled):

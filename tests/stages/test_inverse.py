@@ -184,7 +184,7 @@ def test_unreachable_target_is_a_verdict(computed):
     assert (target.reason.code, target.obstacle.code) == ("no_solution", "reach_missing")
     assert target.obstacle.gap_mm == min(unsolved.why.gap_mm for unsolved in target.unsolved)
     assert (target.outcome, target.expect) == ("unreachable", "unreachable")
-    assert (verdict.status, verdict.finding.code) == ("pass", "inverse.all_solved")
+    assert (verdict.status, verdict.finding.code) == ("caution", "inverse.all_solved")  # no scene was looked at
     assert ("too_far", "unreachable") in {(one.name, one.found) for one in verdict.finding.demonstrations}
     assert "meant to be faulty and found so: " in say(verdict.finding)
     arm, near = load_robot(name), target.neighbours
@@ -232,9 +232,9 @@ def test_round_trips_tell_when_the_solver_fails(monkeypatch):
     assert trips.worst_position > 1e-5
 
 
-def test_all_targets_solved_is_a_pass_and_none_a_fail(tmp_path):
+def test_all_targets_solved_is_a_caution_without_a_scene_and_none_a_fail(tmp_path):
     one = {"name": "a", "xyz_mm": [350, 150, 200], "rpy_deg": [180, 0, 0]}
-    for xyz, status in (([350, 150, 200], "pass"), ([3500, 150, 200], "fail")):
+    for xyz, status in (([350, 150, 200], "caution"), ([3500, 150, 200], "fail")):
         file = tmp_path / f"{status}.yaml"
         file.write_text(json.dumps({"kind": "targets", "targets": [one | {"xyz_mm": xyz}]}), encoding="utf-8")
         study = make_study(er3_600={"targets": str(file), "paths": "unused.yaml"})

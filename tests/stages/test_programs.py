@@ -109,7 +109,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     assert "the tool TOOL_DATA[7] is not given" in html
     program = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == "outside_limits")
     found = next(each for each in program.findings if each.finding.code == "above_limit")
-    assert f'data-play="outside_limits" data-t="{found.program_s}">at {found.motion_s:.2f} s</a>' in html
+    assert f'data-play="outside_limits" data-t="{found.program_s}">{found.motion_s:.2f} s into this line' in html
     assert "Go there by a joint move to (" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 
