@@ -66,7 +66,7 @@ ROOMS = {
     "Beneath": ("numerics",),
 }
 TABLE = ("| module | what it is about |", "|---|---|")
-ALONE = ("errors", "findings", "by_value", "public")
+ALONE = ("errors", "by_value", "public")
 
 
 def first_sentence(text: str | None) -> str:
