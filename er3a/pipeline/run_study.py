@@ -374,6 +374,6 @@ def _snakemake(words: list[str]) -> bool:
         return bool(args_to_api(asked, parser))
     except SystemExit as end:
         return end.code in (0, None)
-    except Exception as error:
+    except Exception as error:  # of any of its plugins: shown as Snakemake shows its own
         print_exception(error)
         return False

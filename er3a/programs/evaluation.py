@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import operator
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, TypeGuard
+from typing import TypeGuard
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from er3a.programs.syntax import (
     Member,
     Move,
     Opaque,
+    Program,
     Record,
     Solved,
     Unary,
@@ -182,23 +184,66 @@ BITWISE: Mapping[str, Callable[[int, int], int]] = {
 """Of whole numbers, bit by bit; of anything else they are not defined."""
 
 
-class Functions(Protocol):
-    """What a language adds to evaluation."""
+class Dialect(ABC):
+    """A language, as a run needs it: what most languages have stands here, each says what differs.
 
-    whole_division: bool
-    first_index: int
+    Attributes
+    ----------
+    modal : variables that motions depend on without naming them
+    local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
+    setters : functions that are not in the program, move nothing, and set what motions depend on
+    whole_division : whether two whole numbers have a whole quotient
+    first_index : of a list's first element
+    """
 
-    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
-        """The value of a function that is not in the program."""
+    modal: frozenset[str] = frozenset()
+    local_by_default: bool = False
+    setters: frozenset[str] = frozenset()
+    whole_division: bool = False
+    first_index: int = 1
 
-    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
-        """The value of ``[...]`` or ``p[...]``."""
+    def __init__(self, program: Program) -> None:  # noqa: B027 - most languages need nothing of it
+        """For the program that is run, whose declarations a language may need."""
 
-    def product(self, left: Value, right: Value) -> Value:
-        """``left : right``, of two positions."""
+    def is_signal(self, name: str) -> bool:
+        """Whether an assignment to this name sets an output."""
+        return False
+
+    def is_followed(self, name: str, value: Value) -> bool:
+        """Whether motions are followed as a variable asks that is set to a value."""
+        return True
+
+    def named(self, name: str) -> bool:
+        """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""
+        return False
 
     def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """The value of a name that the language itself gives, if it does: a frame, where the arm stands."""
+        return None
+
+    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
+        """The value of ``[...]`` or ``p[...]``."""
+        return values
+
+    def product(self, left: Value, right: Value) -> Value:
+        """``left : right``, of two positions."""
+        return Unclear("a product")
+
+    @abstractmethod
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
+        """The value of a function that is not in the program."""
+
+    @abstractmethod
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
+        """The motion, from where the arm stands."""
+
+    @abstractmethod
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
+        """A call of a function that is not in the program; None if it only sets variables."""
+
+    @abstractmethod
+    def harmless(self, call: Invocation) -> bool:
+        """Whether a function that is not in the program neither moves the arm nor sets what motions depend on."""
 
 
 class ProgramMemory:
@@ -214,7 +259,7 @@ class ProgramMemory:
     cell : what is known of the cell
     """
 
-    def __init__(self, functions: Functions, cell: Cell):
+    def __init__(self, functions: Dialect, cell: Cell):
         self.functions, self.cell = functions, cell
         self.here = Position(cell.start)
         self.shared: dict[str, Value] = {}
@@ -442,39 +487,3 @@ def _unary(sign: str, value: Value) -> Value:
         return Unclear(f"{sign} ...")
     assert isinstance(value, (int, float))
     return -value if sign == "-" else value
-
-
-class Dialect(Functions, Protocol):
-    """A language, as a run needs it.
-
-    Attributes
-    ----------
-    modal : variables that motions depend on without naming them
-    local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
-    setters : functions that are not in the program, move nothing, and set what motions depend on
-    """
-
-    modal: frozenset[str]
-    local_by_default: bool
-    setters: frozenset[str]
-
-    def begin(self, memory: ProgramMemory) -> None:
-        """Variables that are there from the start."""
-
-    def is_signal(self, name: str) -> bool:
-        """Whether an assignment to this name sets an output."""
-
-    def is_followed(self, name: str, value: Value) -> bool:
-        """Whether motions are followed as a variable asks that is set to a value."""
-
-    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
-        """The motion, from where the arm stands."""
-
-    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
-        """A call of a function that is not in the program; None if it only sets variables."""
-
-    def harmless(self, call: Invocation) -> bool:
-        """Whether a function that is not in the program neither moves the arm nor sets what motions depend on."""
-
-    def named(self, name: str) -> bool:
-        """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""

@@ -514,7 +514,6 @@ class Machine:
         """Follow all ways."""
         memory = ProgramMemory(self.dialect, self.cell)
         memory.beside = changed_beside(self.program, self.dialect)
-        self.dialect.begin(memory)
         for each in self.program.data:
             self._assign(memory, each)
         entry = self.program.routines.get(self.program.entry)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.evaluation import IN_DEGREES, ProgramMemory, root
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -34,7 +34,6 @@ from er3a.programs.syntax import (
     Expression,
     Invocation,
     Move,
-    Program,
     Record,
     Unclear,
     Value,
@@ -466,20 +465,12 @@ class Settings(NamedTuple):
     load: MassBody | str | None
 
 
-class KrlDialect:
+class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
     modal = frozenset((*MODAL, *MODAL_DATA))
-    local_by_default = False
     setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
-    first_index = 1
-
-    def __init__(self, program: Program):
-        pass
-
-    def begin(self, memory: ProgramMemory) -> None:
-        """No variable is there from the start."""
 
     def is_signal(self, name: str) -> bool:
         """Outputs."""
@@ -512,10 +503,6 @@ class KrlDialect:
             degrees = [math.degrees(each) for each in memory.here.joints]
             return Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees)))
         return None
-
-    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
-        """KRL has no lists."""
-        return values
 
     def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """Mathematics in degrees, and inverse frames."""

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
-from er3a.programs.evaluation import Position, ProgramMemory
+from er3a.programs.evaluation import Dialect, Position, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -74,7 +74,6 @@ from er3a.programs.syntax import (
     Doing,
     Invocation,
     Move,
-    Program,
     Record,
     Unclear,
     Value,
@@ -174,44 +173,15 @@ JOINTS_OF = "%JOINTS_OF"
 UNCLEAR = Unclear("")
 
 
-class RapidDialect:
+class RapidDialect(Dialect):
     """RAPID, as a run needs it."""
 
     modal = frozenset(MODAL)
-    local_by_default = False
     setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF", "GRIPLOAD"))
-    whole_division = False
-    first_index = 1
-
-    def __init__(self, program: Program):
-        pass
-
-    def begin(self, memory: ProgramMemory) -> None:
-        """No variable is there from the start."""
-
-    def is_signal(self, name: str) -> bool:
-        """Signals are set by instructions."""
-        return False
-
-    def is_followed(self, name: str, value: Value) -> bool:
-        """No variable asks for anything."""
-        return True
-
-    def named(self, name: str) -> bool:
-        """Tools and work objects keep the names of their variables."""
-        return False
 
     def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """Speeds, zones, tool and work object that every controller has."""
         return predefined(name)
-
-    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
-        """Aggregates."""
-        return values
-
-    def product(self, left: Value, right: Value) -> Value:
-        """There is none."""
-        return Unclear("a product")
 
     def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """Mathematics, positions, where the arm stands; what is not known, or called otherwise, is unclear."""

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from er3a.programs.evaluation import IN_DEGREES, ProgramMemory
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -28,7 +28,6 @@ from er3a.programs.syntax import (
     Expression,
     Invocation,
     Move,
-    Program,
     Record,
     Unclear,
     Value,
@@ -44,44 +43,14 @@ NO_BASE = "wobj0"
 LIBRARIES = ("tcpip.", "io.", "fidbus.", "str.", "log.")
 
 
-class RplDialect:
+class RplDialect(Dialect):
     """RPL, as a run needs it."""
 
-    modal: frozenset[str] = frozenset()
-    local_by_default = False
-    setters: frozenset[str] = frozenset()
     whole_division = True
-    first_index = 1
-
-    def __init__(self, program: Program):
-        pass
-
-    def begin(self, memory: ProgramMemory) -> None:
-        """No variable is there from the start."""
 
     def is_signal(self, name: str) -> bool:
         """Outputs, and what goes to the field bus."""
         return name.startswith(("io.", "fidbus."))
-
-    def is_followed(self, name: str, value: Value) -> bool:
-        """No variable asks for anything."""
-        return True
-
-    def named(self, name: str) -> bool:
-        """Tools are named in each motion."""
-        return False
-
-    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
-        """There is none."""
-        return None
-
-    def product(self, left: Value, right: Value) -> Value:
-        """There is none."""
-        return Unclear("a product")
-
-    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
-        """RPL has no lists."""
-        return values
 
     def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """Points, OFFSET, some mathematics."""

@@ -12,7 +12,7 @@ import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
-from er3a.programs.evaluation import Position, ProgramMemory
+from er3a.programs.evaluation import Dialect, Position, ProgramMemory
 from er3a.programs.instructions import (
     FINE,
     ArmMotion,
@@ -162,7 +162,7 @@ PLAIN: dict[str, Callable[..., float]] = {
 }
 
 
-class UrScriptDialect:
+class UrScriptDialect(Dialect):
     """URScript, as a run needs it.
 
     Attributes
@@ -184,31 +184,11 @@ class UrScriptDialect:
 
     local_by_default = True
     setters = frozenset(("set_tcp", *LOADS))
-    whole_division = False
     first_index = 0
-
-    def begin(self, memory: ProgramMemory) -> None:
-        """No variable is there from the start."""
-
-    def is_signal(self, name: str) -> bool:
-        """Signals are set by functions."""
-        return False
-
-    def is_followed(self, name: str, value: Value) -> bool:
-        """No variable asks for anything."""
-        return True
-
-    def named(self, name: str) -> bool:
-        """Tools have no names."""
-        return False
 
     def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """Numbers of the language."""
         return math.pi if name == "MATH_PI" else None
-
-    def product(self, left: Value, right: Value) -> Value:
-        """There is none."""
-        return Unclear("a product")
 
     def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
         """``[...]``, and ``p[...]`` with six numbers."""
