@@ -9,6 +9,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -177,3 +178,13 @@ def test_pieces_of_work_share_what_is_left_of_the_time():
     budget = TimeBudget(100.0, 4)
     parts = [end - start for start, end in (budget.next_piece() for _ in range(4))]
     assert parts == pytest.approx([25, 33.3, 50, 100], rel=0.01), "what one does not use is the others'"
+
+
+def test_compiling_takes_none_of_the_time(monkeypatch):
+    compiled = [5.0]
+    monkeypatch.setattr("er3a.pipeline.progress.compile_seconds", lambda: sum(compiled))
+    monkeypatch.setattr("er3a.pipeline.progress.time", SimpleNamespace(monotonic=lambda: 100.0 + sum(compiled)))
+    budget = TimeBudget(30.0, 2)
+    first = budget.next_piece()
+    compiled.append(40.0)
+    assert budget.next_piece() == (first[0], first[0] + 30.0)
