@@ -38,25 +38,29 @@ def write(name: str, text: str, line: str) -> None:
     page.write_text(f"{before}{start}\n{text}\n{end}{after}", encoding="utf-8")
 
 
-def _carried_out(name: str, share: float) -> bool:
-    """Run one campaign in a process of its own, and write its page unless only a share of it was tried."""
-    start = time.monotonic()
+def _carried_out(name: str, share: float) -> float | None:
+    """Run one campaign in a process of its own, and write its page unless only a share of it was tried.
+
+    Returns
+    -------
+    processor time (s) that it took, with its own processes; None if it failed
+    """
     line = "" if share < 1 else made_from(name, 0)
     command = [sys.executable, "-m", "benchmarks.campaigns", "--table", name]
     done = subprocess.run(
         command, env=os.environ | {SHARE: f"{share:g}"}, capture_output=True, text=True, encoding="utf-8", check=False
     )
-    seconds = time.monotonic() - start
-    told = "failed" if done.returncode else "done"
     with _WRITING:
-        print(f"{name}: {told} in {seconds:.0f} s", flush=True)
         if done.returncode:
-            print(done.stderr[-3000:], file=sys.stderr, flush=True)
-        elif line:
-            write(name, done.stdout, line.replace("in 0 s", f"in {seconds:.0f} s"))
+            print(f"{name}: failed\n{done.stderr[-3000:]}", file=sys.stderr, flush=True)
+            return None
+        text, _, seconds = done.stdout.rstrip().rpartition("\n")
+        print(f"{name}: done in {seconds} s of processor time", flush=True)
+        if line:
+            write(name, text, line.replace("in 0 s", f"in {seconds} s"))
         else:
-            print(done.stdout, flush=True)
-    return done.returncode == 0
+            print(text, flush=True)
+    return float(seconds)
 
 
 def main(words: Sequence[str]) -> int:
@@ -66,7 +70,7 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument("--again", action="store_true", help="also those whose pages tell of the code that is here")
     parser.add_argument("--share", type=float, default=1.0, help="of the cases; below 1 no page is written")
     parser.add_argument("--jobs", type=int, default=2, help="campaigns at a time")
-    parser.add_argument("--table", metavar="NAME", help="print a campaign's text and nothing else")
+    parser.add_argument("--table", metavar="NAME", help="print a campaign's text, and its processor time in s")
     asked = parser.parse_args(words)
     if unknown := sorted({*asked.names, *([asked.table] if asked.table else [])} - {*CAMPAIGNS}):
         print(f"error: no campaign '{unknown[0]}'; known: {', '.join(CAMPAIGNS)}", file=sys.stderr)
@@ -74,7 +78,7 @@ def main(words: Sequence[str]) -> int:
     if asked.table:
         with redirect_stdout(sys.stderr):  # rows as they come are progress; the page holds them once
             text = import_module(f"benchmarks.campaign_{asked.table}").table()
-        print(text)
+        print(f"{text.rstrip()}\n{sum(os.times()[:4]):.0f}")
         return 0
     kept = {each.campaign for each in evidence() if is_of_this_code(each)} if asked.share == 1 else set()
     names = [name for name in asked.names or CAMPAIGNS if asked.again or name not in kept]
@@ -90,8 +94,10 @@ def main(words: Sequence[str]) -> int:
         beside = [name for name in names if name not in ALONE]
         ended = dict(zip(beside, pool.map(lambda name: _carried_out(name, asked.share), beside)))
     ended |= {name: _carried_out(name, asked.share) for name in names if name in ALONE}
-    failed = [name for name, well in ended.items() if not well]
-    print(f"{len(ended)} campaigns in {time.monotonic() - start:.0f} s; failed: {', '.join(failed) or 'none'}")
+    failed = [name for name, busy in ended.items() if busy is None]
+    wall, spent = time.monotonic() - start, sum(filter(None, ended.values()))
+    print(f"{len(ended)} campaigns in {wall:.0f} s, {spent:.0f} s of processor time")
+    print(f"failed: {', '.join(failed) or 'none'}")
     return 1 if failed else 0
 
 

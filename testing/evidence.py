@@ -40,7 +40,10 @@ PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliabi
 CAMPAIGNS = (*PAGES, *PARTS)
 COUNTING = ("er3a", "testing", "benchmarks", "data", "config", "workflow", "profiles", "Snakefile", "requirements")
 SHARE = "CAMPAIGN_SHARE"
-LINE = "Made from er3a {version} at commit `{commit}` ({date}) by `make campaigns ARGS={name}`, in {seconds:.0f} s."
+LINE = (
+    "Made from er3a {version} at commit `{commit}` ({date}) by `make campaigns ARGS={name}`, in {seconds:.0f} s "
+    "of processor time."
+)
 _NAMED = re.compile(r"^Made from er3a \S+ at commit `([0-9a-f]+)` \([\d-]+\) by `make campaigns ARGS=(\w+)`", re.M)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -89,14 +90,21 @@ def _toolbox_poses(made, q: np.ndarray) -> np.ndarray:
     return np.array([made.fkine(row).A for row in q])
 
 
-def urdf_files(folder: Path) -> Iterator[UrdfFile | tuple[str, str]]:
-    """Every URDF of both packages; xacro is expanded into ``folder``. Name and reason for those that can't be."""
+def urdf_files(folder: Path, wanted: Callable[[str], bool] = lambda name: True) -> Iterator[UrdfFile | tuple[str, str]]:
+    """URDFs of both packages; xacro is expanded into ``folder``. Name and reason for those that can't be.
+
+    Parameters
+    ----------
+    wanted : whether a file is, by its name
+    """
     shared = Path(str(find_spec("pinocchio").origin)).parents[4] / "share" / "example-robot-data" / "robots"
     for path in sorted(shared.rglob("*.urdf")):
-        yield UrdfFile(str(path.relative_to(shared)), path)
+        if wanted(name := str(path.relative_to(shared))):
+            yield UrdfFile(name, path)
     data = Path(str(find_spec("rtbdata").origin)).parent
     for path in sorted([*data.rglob("*.urdf"), *data.rglob("*.xacro")]):
-        name = str(path.relative_to(data))
+        if not wanted(name := str(path.relative_to(data))):
+            continue
         if path.suffix == ".xacro":
             if not re.search(r"<robot[^>]*\bname=", path.read_text(encoding="utf-8")):
                 continue  # a part that others include
@@ -111,13 +119,20 @@ def urdf_files(folder: Path) -> Iterator[UrdfFile | tuple[str, str]]:
 
 
 def _expanded(path: Path, data: Path) -> str:
-    from xacrodoc import XacroDoc, packages
+    from xacrodoc import XacroDoc
+
+    _make_packages_known(data)
+    return XacroDoc.from_file(str(path)).to_urdf_string()
+
+
+@cache
+def _make_packages_known(data: Path) -> None:
+    from xacrodoc import packages
 
     for folder in sorted({found.parent for found in data.rglob("package.xml")} | {*data.glob("xacro/*/*/urdf")}):
         packages.update_package_cache({folder.name if folder.name != "urdf" else folder.parent.name: folder})
     for folder in (*data.glob("xacro/*"), *data.glob("xacro/*/*"), *data.glob("armer_xarm/data/xacro")):
         packages.update_package_cache({folder.name: folder})
-    return XacroDoc.from_file(str(path)).to_urdf_string()
 
 
 def chains_of(file: UrdfFile, most: int = 8) -> Iterator[tuple[str, UrdfImport] | tuple[str, InputError]]:

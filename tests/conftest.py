@@ -110,10 +110,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _no_usage_statistics() -> Iterator[None]:
-    """Rerun's programs that tests start collect none."""
+def _ask_nobody() -> Iterator[None]:
+    """Rerun's programs that tests start collect no statistics; Snakemake's plugin waits for no Slurm.
+
+    Where Slurm's client is installed and no controller answers, each start of Snakemake would wait 9 s for it.
+    """
     with without_statistics() as environment, pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CONFIG_HOME", environment["XDG_CONFIG_HOME"])
+        patch.setenv("SLURM_CONF", os.devnull)
         yield
 
 
@@ -150,12 +154,12 @@ Call = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture
 def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Call:
-    """Calls ``er3a`` with some words in the project's folder, as a person would, but in this process."""
+    """Calls ``er3a`` with some words in a folder (the project's), as a person would, but in this process."""
 
-    def called(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    def called(*words: str | Path, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
         command = ["er3a", *map(str, words)]
         with monkeypatch.context() as patch, warnings.catch_warnings():
-            patch.chdir(ROOT)
+            patch.chdir(folder)
             patch.setattr(sys, "argv", command)
             patch.delenv("FORCE_COLOR", raising=False)
             warnings.simplefilter("default")
@@ -222,9 +226,10 @@ def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return shared
 
 
-def leave_one_robot(study: Path) -> None:
-    """Take the other robots out of a study file, and leave the rest of its text as it is."""
+def leave_one_robot(study: Path, stages: tuple[str, ...]) -> None:
+    """Take the other robots, and its other stages, out of a study file, and leave the rest of its text as it is."""
     text = study.read_text(encoding="utf-8")
+    text = text.replace(f"  {ROBOT}:\n", f"  {ROBOT}:\n    stages: [{', '.join(stages)}]\n")
     for name in ROBOTS:
         if name != ROBOT:
             text = re.sub(rf"^  {name}:\n(    .*\n)+", "", text, flags=re.MULTILINE)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -135,21 +136,18 @@ def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(call, 
 
 
 @pytest.mark.long
-def test_a_second_run_does_nothing_and_ends_with_1_for_findings_and_with_2_for_an_input(small_study):
-    def run(study: str, level: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "er3a", "run", "--study", study, "--fail-on", level]
-        return processes.run(command, cwd=small_study.folder, env=small_study.environment() | {"NO_COLOR": "1"})
-
+def test_a_second_run_does_nothing_and_ends_with_1_for_findings_and_with_2_for_an_input(call, small_study):
     cases = list(ElementTree.parse(small_study.folder / "reports/junit.xml").iter("testcase"))
     stages = load_study(small_study.folder / STUDY).stages
     assert len(cases) == sum(len(stages(robot)) for robot in small_study.robots)
     found = [case for case in cases if case.find("failure") is not None or case.find("system-out") is not None]
     assert found, "the small study should have something to tell"
-    done = run(STUDY, "caution")
+    command = [sys.executable, "-m", "er3a", "run", "--study", STUDY, "--fail-on", "caution"]
+    done = processes.run(command, cwd=small_study.folder, env=small_study.environment() | {"NO_COLOR": "1"})
     assert done.returncode == 1, done.stderr
     assert "Nothing to be done" in done.stdout + done.stderr
     assert "\x1b" not in done.stdout + done.stderr
-    done = run("nowhere.yaml", "fail")
+    done = call("run", "--study", "nowhere.yaml", "--fail-on", "fail")
     assert (done.returncode, done.stderr) == (2, "error: nowhere.yaml: there is no such file. Check the path\n")
 
 
@@ -180,3 +178,13 @@ def test_pieces_of_work_share_what_is_left_of_the_time():
     budget = TimeBudget(100.0, 4)
     parts = [end - start for start, end in (budget.next_piece() for _ in range(4))]
     assert parts == pytest.approx([25, 33.3, 50, 100], rel=0.01), "what one does not use is the others'"
+
+
+def test_compiling_takes_none_of_the_time(monkeypatch):
+    compiled = [5.0]
+    monkeypatch.setattr("er3a.pipeline.progress.compile_seconds", lambda: sum(compiled))
+    monkeypatch.setattr("er3a.pipeline.progress.time", SimpleNamespace(monotonic=lambda: 100.0 + sum(compiled)))
+    budget = TimeBudget(30.0, 2)
+    first = budget.next_piece()
+    compiled.append(40.0)
+    assert budget.next_piece() == (first[0], first[0] + 30.0)

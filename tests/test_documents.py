@@ -6,8 +6,6 @@ import json
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -203,7 +201,7 @@ def assert_make_words(target: str, words: list[str]) -> None:
 
 
 @pytest.mark.long
-def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(tmp_path):
+def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(call, tmp_path):
     found = {command for page in PAGES for command in commands(page) if command.startswith("er3a ")}
     lines = [shlex.split(line)[1:] for line in sorted(found)]
     assert {verb for verb, *_ in lines} <= STANDS_FOR.keys() | OF_A_STUDY
@@ -219,8 +217,7 @@ def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(tmp_path
         of_verb = [words for own, *words in lines if own == verb and (len(words) >= named_only or verb == "--help")]
         assert of_verb, verb
         for words in of_verb:
-            command = [sys.executable, "-m", "er3a", verb, *(stands_for.get(word, word) for word in words)]
-            done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+            done = call(verb, *(stands_for.get(word, word) for word in words), folder=tmp_path)
             told = verb in ("program", "compare")  # of a path that is unsafe on purpose, and of arms that differ
             assert done.returncode == int(told), (verb, words, done.stderr)
     assert list((tmp_path / "programs").glob("*.src"))

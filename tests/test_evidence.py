@@ -66,7 +66,7 @@ def test_a_page_is_made_again_when_code_has_changed_since_its_commit(campaign, c
     write(campaign, "a new text", made_from(campaign, 12.3, copy))
     text = pages.page_of(campaign, copy).read_text(encoding="utf-8")
     assert "a new text" in text
-    assert re.search(rf"er3a {re.escape(er3a.__version__)} at commit `\w+` \(20.*ARGS={campaign}`, in 12 s\.", text)
+    assert re.search(rf"er3a {re.escape(er3a.__version__)} at commit `\w+` \(20.*ARGS={campaign}`, in 12 s of\s", text)
     assert standing(copy, campaign)
     git(copy, "commit", "-qam", "the page")
     assert standing(copy, campaign), "a page's own commit is no change of the code"

@@ -17,6 +17,8 @@ import fcntl
 import hashlib
 import os
 import re
+import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -63,6 +65,31 @@ def inner_kernel(function: Function) -> Function:
     return _compiled(function, _InnerKernel, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
 
+def compile_seconds() -> float:
+    """Wall time (s) for which this thread has waited for kernels: compiled by itself or another process, or loaded."""
+    return _waited.seconds
+
+
+class _Waited(threading.local):
+    depth, seconds = 0, 0.0
+
+
+_waited = _Waited()
+
+
+@contextmanager
+def _counted() -> Iterator[None]:
+    """Count the time of a block, once where such blocks lie in each other."""
+    start = time.monotonic()
+    _waited.depth += 1
+    try:
+        yield
+    finally:
+        _waited.depth -= 1
+        if not _waited.depth:
+            _waited.seconds += time.monotonic() - start
+
+
 def _compiled(function: Function, kind: type[_Kernel], **wrappers: bool) -> Function:
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return function
@@ -76,7 +103,7 @@ class _Kernel(CPUDispatcher):
     _cache: Any
 
     def compile(self, sig: Any) -> Any:
-        with _alone(self._cache, self.py_func.__qualname__):
+        with _counted(), _alone(self._cache, self.py_func.__qualname__):
             return super().compile(sig)  # type: ignore[no-untyped-call]
 
     def get_call_template(self, args: Any, kws: Any) -> Any:

@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from er3a.numerics.jit import compile_seconds
+
 EVERY_S = 10.0
 
 
@@ -81,15 +83,20 @@ def shown_work(what: str) -> Iterator[Callable[[str], None]]:
         teller.join()
 
 
+def work_clock() -> float:
+    """Seconds of a clock that stands still while kernels are compiled, as they are once on a machine."""
+    return time.monotonic() - compile_seconds()
+
+
 class TimeBudget:
     """Seconds that some pieces of work may take together; each may take an equal part of what is left."""
 
     def __init__(self, seconds: float, pieces: int):
-        self.pieces, self.end = pieces, time.monotonic() + seconds
+        self.pieces, self.end = pieces, work_clock() + seconds
 
     def next_piece(self) -> tuple[float, float]:
-        """When the next piece begins and when it has to end, by :func:`time.monotonic`."""
-        now = time.monotonic()
+        """When the next piece begins and when it has to end, by :func:`work_clock`."""
+        now = work_clock()
         part = max(self.end - now, 0.0) / max(self.pieces, 1)
         self.pieces -= 1
         return now, now + part

@@ -367,9 +367,10 @@ def test_shapes_guessed_from_a_table_accuse_only_what_is_off_by_orders_of_magnit
 def test_known_faults_of_published_urdfs_are_named_and_sound_ones_are_not(tmp_path):
     """The UR5's wrist has inertias of a far greater body; KUKA's files give each link 2 kg; the others are sound."""
     found, sound = {}, ("vx300s.urdf", "urdf/z1.urdf", "xarm7.urdf", "robots/kinova.urdf")
-    for file in urdf_files(tmp_path):
-        name = next((each for each in (*sound, "ur5_robot", "kr16_2") if each in str(file)), None)
-        if name and isinstance(file, UrdfFile):
+    names = (*sound, "ur5_robot", "kr16_2")
+    for file in urdf_files(tmp_path, lambda name: any(each in name for each in names)):
+        if isinstance(file, UrdfFile):
+            name = next(each for each in names if each in file.name)
             robot = import_urdf(file.path, snap=True).robot
             found[name] = {(type(each), each.link) for each in mass_findings(robot)}
     assert found["ur5_robot"] >= {(UnlikelyInertia, link) for link in (4, 5, 6)}

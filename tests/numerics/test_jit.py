@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.jit import compile_seconds, inner_kernel, kernel
 from testing.small_study import ROOT
 
 
@@ -26,6 +26,15 @@ def test_constants_make_no_versions_of_their_own():
     assert _cubes_and_squares(3.0) == 36.0
     _cubes_and_squares.recompile()  # what the disk kept was loaded without the kernels that it calls
     assert len(_power.signatures) == 1
+
+
+def test_waiting_for_kernels_is_counted_and_their_work_is_not():
+    before = compile_seconds()
+    _cubes_and_squares.recompile()
+    waited = compile_seconds()
+    assert waited > before
+    _cubes_and_squares(2.0)
+    assert compile_seconds() == waited
 
 
 def test_an_inner_kernel_is_not_called_from_python():

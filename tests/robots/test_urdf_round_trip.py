@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -243,9 +244,9 @@ def test_bodies_beside_those_that_a_joint_holds_are_no_error_of_the_shapes(tmp_p
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory) -> list[tuple[str, UrdfFile, UrdfImport]]:
-    """Every chain of the URDFs that packages bring, three of each file with several."""
-    found = []
-    for file in urdf_files(tmp_path_factory.mktemp("expanded")):
+    """Chains of every third URDF that packages bring, three of each file with several; the fleet's campaign has all."""
+    found, turn = [], cycle((True, False, False))
+    for file in urdf_files(tmp_path_factory.mktemp("expanded"), lambda name: next(turn)):
         if isinstance(file, UrdfFile):
             try:
                 found.append((file.name, file, import_urdf(file.path)))
@@ -266,9 +267,9 @@ def _has_joints(path: Path) -> bool:
 
 @pytest.mark.long
 def test_the_fleet_comes_back_and_moves_as_it_did(fleet, random, tmp_path):
-    assert len(fleet) > 150
+    assert len(fleet) > 50
     compared = 0
-    for name, file, imported in fleet[::3]:
+    for name, file, imported in fleet:
         robot = imported.robot
         path = exported(robot, tmp_path)
         again = import_urdf(path)

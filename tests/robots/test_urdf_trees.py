@@ -203,8 +203,8 @@ PACKAGED = {
 
 @pytest.fixture(scope="module")
 def packaged(tmp_path_factory):
-    found = urdf_files(tmp_path_factory.mktemp("expanded"))
-    return {each.name: each.path for each in found if isinstance(each, UrdfFile) and each.name in PACKAGED}
+    found = urdf_files(tmp_path_factory.mktemp("expanded"), PACKAGED.__contains__)
+    return {each.name: each.path for each in found if isinstance(each, UrdfFile)}
 
 
 @pytest.mark.long

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -57,7 +56,7 @@ def check_program(
         int, typer.Option(help="how many motions are checked; of the rest the targets", min=1)
     ] = 1_000,
     seconds: Annotated[
-        float, typer.Option(help="time for all files; what is not examined then is named", min=1)
+        float, typer.Option(help="time for all files, compiling aside; what is not examined then is named", min=1)
     ] = 30.0,
     fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings from this level on")] = FailOn.fail,
     as_json: AsJson = False,
@@ -165,13 +164,15 @@ def _write(file: Path, text: str) -> None:
 
 def _until(budget: TimeBudget, file: Path, at: Callable[[str], None]) -> KeepOn:
     """Whether a file's part of the time is not over; ``at`` shows how far its check is."""
+    from er3a.pipeline.progress import work_clock
+
     start, end = budget.next_piece()
     ends = {"following": start + SHARE_OF_FOLLOWING * (end - start), "checking": end}
 
     def keep_on(phase: Phase, done: int, of: int) -> bool:
         of_all = f" of {of:,}" if of else ""
         at(f"{file}: {phase}, step {done:,}{of_all}")
-        return time.monotonic() < ends[phase]
+        return work_clock() < ends[phase]
 
     return keep_on
 
