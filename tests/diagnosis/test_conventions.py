@@ -52,18 +52,21 @@ def poses_of(arm: er3a.Robot, count: int) -> list[Reference]:
 
 
 @pytest.mark.long
-def test_conventions_are_named_by_poses_alone():
-    right = er3a.load_robot("er3a_c60")
-    offset = right.offset + np.radians([0, 37, -90, 90, 0, 0])
-    wrong = right.replace(offset=offset, direction=right.direction * np.array([1, 1, -1, 1, 1, 1]))
-    best = er3a.diagnose(wrong, poses_of(right, 12))[0]
+@pytest.mark.parametrize("name", ["er3a_c60", "lbr_iiwa_14"])
+def test_conventions_are_named_by_poses_alone(name):
+    right = er3a.load_robot(name)
+    offset, direction, a = right.offset.copy(), right.direction.copy(), right.a.copy()
+    offset[1:4] += np.radians([37, -90, 90])
+    direction[2] *= -1
+    a[1:3] += 0.03, 0.02
+    wrong, stated = right.replace(offset=offset, direction=direction), poses_of(right, 12)
+    best = er3a.diagnose(wrong, stated)[0]
     assert best.explains
     assert all(isinstance(fault, CONVENTIONS) for fault in best.faults)
-    q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, 6))
+    q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, right.joints))
     off = er3a.forward(best.corrected, q)[:, :3, 3] - er3a.forward(right.without_tool(), q)[:, :3, 3]
     assert np.abs(off).max() * MM < 1.0
-    a = wrong.a + np.array([0, 0.03, 0.02, 0, 0, 0])
-    assert not er3a.diagnose(wrong.replace(a=a), poses_of(right, 12))[0].explains
+    assert not er3a.diagnose(wrong.replace(a=a), stated)[0].explains
 
 
 def test_poses_that_are_shown_outside_of_limits_are_a_matter_of_limits():
