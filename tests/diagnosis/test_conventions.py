@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere, CountedFromGround, WrongLimit, entry_of
+from er3a.diagnosis.faults import (
+    CONVENTIONS,
+    BaseElsewhere,
+    CountedFromGround,
+    FlangeElsewhere,
+    WrongLimit,
+    entry_of,
+)
 from er3a.geometry.transforms import rot_z, translation
 from er3a.references.quantities import MM, Limit, PointCoordinate, PoseOutside
 from er3a.references.reference import Reference
@@ -37,6 +44,15 @@ def test_conventions_are_named_whatever_their_number(name, seed):
     q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, 6))
     stated = er3a.forward(right, q)[:, :3, 3] * MM
     assert np.abs(er3a.forward(best.corrected, q)[:, :3, 3] * MM - stated).max() < 1.0
+
+
+@pytest.mark.parametrize("shift_mm", [(15, 0, 0), pytest.param((0, 20, 100), marks=pytest.mark.long)])
+def test_a_flange_defined_elsewhere_is_no_wrong_last_row(shift_mm):
+    right = er3a.to_standard(er3a.load_robot("er3_600"))
+    flange = right.flange @ translation(*np.array(shift_mm) / MM)
+    (fault,) = er3a.diagnose(right.replace(flange=flange), "er3_600")[0].faults
+    assert isinstance(fault, FlangeElsewhere)
+    assert fault.shift_mm == pytest.approx([-c for c in shift_mm], abs=0.1)
 
 
 def poses_of(arm: er3a.Robot, count: int) -> list[Reference]:

@@ -63,7 +63,7 @@ def test_poses_of_ten_joints_are_compared_however_they_are_written(tmp_path, col
     joints = ",".join(f"q{joint}_deg" for joint in range(1, 11))
     header = f"name,point,{joints},x_mm,y_mm,z_mm,uncertainty_mm,{columns},uncertainty_deg,{BEHIND}"
     (tmp_path / "positions.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
-    (tmp_path / "documents.csv").write_text("name,title,publisher,derived_from\nsheet,Sheet,,\n", encoding="utf-8")
+    (tmp_path / "documents.csv").write_text("name,title,publisher,derived_from\nsheet,Sheet,KUKA,\n", encoding="utf-8")
     stated = load_references(tmp_path, arm).checkable
     expected, uncertainty = expected_of(stated)
     assert np.all(np.abs(predict(arm, stated) - expected) <= uncertainty)
