@@ -1,5 +1,5 @@
-"""Arms by name or file, whatever kind of file describes them; and a URDF as a reference set, for tables that others made
-to be held against."""
+"""Arms by name or file, whatever kind of file describes them; and a URDF as a reference set, for tables that others
+made to be held against."""
 
 from __future__ import annotations
 
