@@ -224,7 +224,8 @@ def _likely_senses(
     m, links = len(one.d), len(one.a)
     senses = 1.0 - 2.0 * np.array(list(itertools.product((0, 1), repeat=m)))
     near = (one.between < NEARLY_PARALLEL) & (other.between < NEARLY_PARALLEL)
-    parallel = other.between < np.where(near, NEARLY_PARALLEL, EXACTLY_PARALLEL)
+    both_lean = near & (np.minimum(one.between, other.between) > EXACTLY_PARALLEL)
+    parallel = other.between < np.where(both_lean, NEARLY_PARALLEL, EXACTLY_PARALLEL)
     inexact = near & (np.maximum(one.between, other.between) > EXACTLY_PARALLEL)
     placed = ~_beside_a_slide(one.sliding)
     cost, angles_off = np.empty((2, links, 2, 2))  # by link, fold and sense of the normal
@@ -236,6 +237,7 @@ def _likely_senses(
             counted = angles_off[:, fold, side] + ((gap > tolerances.length) & ~inexact & placed)
             cost[:, fold, side] = counted + 1e-4 * off + 1e-4 * gap
     either = ((np.floor(cost) == 1).all(axis=2) | ~placed[:, None]) & (angles_off.sum(axis=2) == 1)
+    either |= both_lean[:, None] & (angles_off == 0).all(axis=2)
     folds = (senses[:, :-1] * senses[:, 1:] < 0).astype(int)
     by_link = np.arange(links)
     normals = np.where(cost[by_link, folds, 0] <= cost[by_link, folds, 1], 1.0, -1.0)
@@ -413,6 +415,7 @@ def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may
     exact = by_normals(one), by_normals(other)
     local = without_far_normals(one), without_far_normals(other)
     best: Match | None = None
+    best_rank: tuple[float, ...] = ()
     for senses, normals in _likely_senses(*exact, tolerances, may_differ=may_differ):
         pairs = [] if lone.any() else [(exact[0], with_senses(exact[1], senses, normals))]
         if near.any():
@@ -421,8 +424,10 @@ def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may
             pairs.append((one, with_senses(other, senses, _normals_of_near((one, other), near, normals))))
         for first, second in pairs:
             for found in _settled(first, second, senses, tolerances, may_differ=may_differ):
-                if best is None or found.rank < best.rank:
-                    best = found
+                entries, layers, *sizes = found.rank
+                rank = entries, layers, float(first is not one), *sizes  # of equals in the entries that are printed
+                if best is None or rank < best_rank:
+                    best, best_rank = found, rank
         if best is not None and (not may_differ or best.rank[0] == best.layers == 0):
             break
     return best

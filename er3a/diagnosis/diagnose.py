@@ -404,6 +404,7 @@ def _may_be_chosen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> bool:
     if not hypotheses or not hypotheses[0].explains:
         return True
     ends = {f"{column}{row}" for column in ("d", "offset") for row in (1, robot.rows)}
+    ends |= {f"{column}{1 if robot.convention == 'modified' else robot.rows}" for column in ("a", "alpha")}
     return all(entry_of(fault) in ends for fault in hypotheses[0].faults)
 
 

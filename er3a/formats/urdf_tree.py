@@ -30,7 +30,6 @@ from typing import Protocol
 
 import numpy as np
 import scipy
-from scipy.spatial.transform import Rotation
 
 from er3a.collision.distances import cylinder_points
 from er3a.collision.meshes import ConvexPieces, hull_of, link_pieces
@@ -715,7 +714,8 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
             _geometry(link, "collision", translation(*point), "sphere", radius=repr(capsule.radius))
         if length:
             T = translation(*ends.mean(axis=0))
-            T[:3, :3] = Rotation.align_vectors(ends[1:] - ends[:1], [[0, 0, 1]])[0].as_matrix()
+            turn = scipy.spatial.transform.Rotation.align_vectors(ends[1:] - ends[:1], [[0, 0, 1]])[0]
+            T[:3, :3] = turn.as_matrix()
             _geometry(link, "collision", T, "cylinder", radius=repr(capsule.radius), length=repr(length))
     if meshes is None:
         return

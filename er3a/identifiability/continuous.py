@@ -334,7 +334,6 @@ class _ManyStarts:
 
 
 FEW_STEPS = 10
-ALL_ROUND_RAD = np.pi / 3  # off its value, from which on an angle counts as open all round
 ALREADY = 1e-4  # of a scale's step, in which an entry counts as inside its interval
 
 
@@ -390,6 +389,7 @@ class Extents:
         self.met = self.start is None or self.start.open
         self._extended: dict[bytes, Reached] = {}
         self._challenged = False
+        self._half_turns: dict[int, bool] = {}
         self.elsewhere: list[Elsewhere] = []
         if self.start is not None and self.met:
             self.seen = sorted({*self.speaking, *seen_entries(asked, table, self.entries)})
@@ -481,7 +481,8 @@ class Extents:
 
     def may_reverse(self, joint: int) -> bool:
         """Whether a table was found whose joint (from 1) turns the other way, or the table's robot has rows in which it
-        does that differ, of all to which requirements react, in angles alone that were found far off."""
+        does that differ, of all to which requirements react, in angles alone that are open by half a turn: what is left
+        of such an angle about its value and what is left about half a turn from it meet."""
         self._challenge()
         own = self.table.direction[0]
         reversed_ = np.arange(len(own)) == joint - 1
@@ -489,16 +490,22 @@ class Extents:
             return True
         if self.start is None or not self.elsewhere:
             return False
-        every = same_robots(self.met_by)
-        same: Flags = ((every.direction != own) == reversed_).all(axis=1)
-        apart = np.abs([each.point.amounts - self.begun for each in self.elsewhere]).max(axis=0)
-        for amount, place in zip(apart, self.seen):
+        rows = same_robots(self.met_by)
+        rows = rows[((rows.direction != own) == reversed_).all(axis=1)]
+        for place in sorted(self.seen, key=lambda place: self.entries[place].unit != "mm"):
             entry = self.entries[place]
-            off = (getattr(every, entry.column) - getattr(self.met_by, entry.column))[:, entry.joint - 1]
-            if entry.unit == "mm" or amount * entry.scale < ALL_ROUND_RAD:
-                off = off if entry.unit == "mm" else (off + np.pi) % (2 * np.pi) - np.pi
-                same &= np.abs(off) < REACTS
-        return bool(same.any())
+            off = (getattr(rows, entry.column) - getattr(self.met_by, entry.column))[:, entry.joint - 1]
+            off = off if entry.unit == "mm" else (off + np.pi) % (2 * np.pi) - np.pi
+            differs = np.abs(off) > REACTS
+            if differs.any() and not (entry.unit == "deg" and self._is_open_by_half_a_turn(place)):
+                rows = rows[~differs]
+        return len(rows) > 0
+
+    def _is_open_by_half_a_turn(self, place: int) -> bool:
+        if place not in self._half_turns:
+            low, high, *_ = self._found(np.eye(len(self.entries))[place])
+            self._half_turns[place] = (high - low) * self.entries[place].scale >= np.pi
+        return self._half_turns[place]
 
     def free_choice(self, entry: TableNumber) -> Extent:
         """The interval of an entry that moves no tool if others are changed with it."""

@@ -122,7 +122,7 @@ def _load_libraries() -> None:
         for verb in ("compute", "report"):
             with suppress(ImportError):  # the job that needs it says so
                 stage.module(verb)
-    for module in ("cli", "viewing.index", "teach.panel"):
+    for module in ("cli", "stages.run", "viewing.index", "teach.panel"):
         import_module(f"er3a.pipeline.{module}")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import er3a
 from er3a.comparison.compare import best_of
-from er3a.files.by_name import read_arm
+from er3a.files.arm_file import read_arm
 from er3a.formats.urdf_tree import read_chain
 from er3a.geometry.transforms import rot_x, rot_z
 from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries

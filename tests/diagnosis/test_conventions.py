@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.diagnosis.faults import CONVENTIONS, BaseElsewhere, CountedFromGround, WrongLimit, entry_of
+from er3a.diagnosis.faults import (
+    CONVENTIONS,
+    BaseElsewhere,
+    CountedFromGround,
+    FlangeElsewhere,
+    WrongLimit,
+    entry_of,
+)
 from er3a.geometry.transforms import rot_z, translation
 from er3a.references.quantities import MM, Limit, PointCoordinate, PoseOutside
 from er3a.references.reference import Reference
@@ -39,6 +46,15 @@ def test_conventions_are_named_whatever_their_number(name, seed):
     assert np.abs(er3a.forward(best.corrected, q)[:, :3, 3] * MM - stated).max() < 1.0
 
 
+@pytest.mark.parametrize("shift_mm", [(15, 0, 0), pytest.param((0, 20, 100), marks=pytest.mark.long)])
+def test_a_flange_defined_elsewhere_is_no_wrong_last_row(shift_mm):
+    right = er3a.to_standard(er3a.load_robot("er3_600"))
+    flange = right.flange @ translation(*np.array(shift_mm) / MM)
+    (fault,) = er3a.diagnose(right.replace(flange=flange), "er3_600")[0].faults
+    assert isinstance(fault, FlangeElsewhere)
+    assert fault.shift_mm == pytest.approx([-c for c in shift_mm], abs=0.1)
+
+
 def poses_of(arm: er3a.Robot, count: int) -> list[Reference]:
     """What a pendant shows: flange positions at random joint values, and nothing of the axes."""
     stated, random = list[Reference](), np.random.default_rng(7)
@@ -52,18 +68,21 @@ def poses_of(arm: er3a.Robot, count: int) -> list[Reference]:
 
 
 @pytest.mark.long
-def test_conventions_are_named_by_poses_alone():
-    right = er3a.load_robot("er3a_c60")
-    offset = right.offset + np.radians([0, 37, -90, 90, 0, 0])
-    wrong = right.replace(offset=offset, direction=right.direction * np.array([1, 1, -1, 1, 1, 1]))
-    best = er3a.diagnose(wrong, poses_of(right, 12))[0]
+@pytest.mark.parametrize("name", ["er3a_c60", "lbr_iiwa_14"])
+def test_conventions_are_named_by_poses_alone(name):
+    right = er3a.load_robot(name)
+    offset, direction, a = right.offset.copy(), right.direction.copy(), right.a.copy()
+    offset[1:4] += np.radians([37, -90, 90])
+    direction[2] *= -1
+    a[1:3] += 0.03, 0.02
+    wrong, stated = right.replace(offset=offset, direction=direction), poses_of(right, 12)
+    best = er3a.diagnose(wrong, stated)[0]
     assert best.explains
     assert all(isinstance(fault, CONVENTIONS) for fault in best.faults)
-    q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, 6))
+    q = np.random.default_rng(1).uniform(right.lower, right.upper, (50, right.joints))
     off = er3a.forward(best.corrected, q)[:, :3, 3] - er3a.forward(right.without_tool(), q)[:, :3, 3]
     assert np.abs(off).max() * MM < 1.0
-    a = wrong.a + np.array([0, 0.03, 0.02, 0, 0, 0])
-    assert not er3a.diagnose(wrong.replace(a=a), poses_of(right, 12))[0].explains
+    assert not er3a.diagnose(wrong.replace(a=a), stated)[0].explains
 
 
 def test_poses_that_are_shown_outside_of_limits_are_a_matter_of_limits():

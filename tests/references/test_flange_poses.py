@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 import er3a
 from er3a.errors import InputError
+from er3a.files.arm_file import write_urdf_references
 from er3a.files.reference_sets import check_reference_file, load_references
 from er3a.files.robot_library import load_robot
-from er3a.files.urdf_references import write_urdf_references
 from er3a.formats.urdf import export_urdf
 from er3a.geometry.transforms import rot_x, rot_z, translation
 from er3a.identifiability.evidence import evidence_of
@@ -48,6 +48,28 @@ def test_every_way_of_writing_an_orientation_is_the_same(tmp_path, columns):
     assert apart.magnitude() < 1e-5
     assert 0 < row.uncertainty_deg < 1e-3
     assert {each.unit for each in row.references()} == {"deg"}
+
+
+@pytest.mark.parametrize("columns", WRITTEN)
+def test_poses_of_ten_joints_are_compared_however_they_are_written(tmp_path, columns):
+    arm, rows = some_arm(10), []
+    for k in range(4):
+        q = np.random.default_rng(k).uniform(-90, 90, 10).round(2)
+        T = er3a.forward(arm, np.radians(q))
+        turn = Rotation.from_matrix(T[:3, :3])
+        ways = turn.as_euler("xyz", True), turn.as_quat(scalar_first=True), turn.as_rotvec(True), T[:3, :3].T.ravel()
+        values = [*q, *1000 * T[:3, 3], 0.05, *dict(zip(WRITTEN, ways))[columns], 0.02]
+        rows.append(f"p{k},flange,{','.join(f'{v:.8f}' for v in values)},s,official,sheet")
+    joints = ",".join(f"q{joint}_deg" for joint in range(1, 11))
+    header = f"name,point,{joints},x_mm,y_mm,z_mm,uncertainty_mm,{columns},uncertainty_deg,{BEHIND}"
+    (tmp_path / "positions.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    (tmp_path / "documents.csv").write_text("name,title,publisher,derived_from\nsheet,Sheet,KUKA,\n", encoding="utf-8")
+    stated = load_references(tmp_path, arm).checkable
+    expected, uncertainty = expected_of(stated)
+    assert np.all(np.abs(predict(arm, stated) - expected) <= uncertainty)
+    offset = arm.offset + np.radians(1.0) * (np.arange(10) == 9)
+    missed = np.abs(predict(arm.replace(offset=offset), stated) - expected) > uncertainty
+    assert any(each.unit == "deg" for each, own in zip(stated, missed) if own)
 
 
 @pytest.mark.parametrize(

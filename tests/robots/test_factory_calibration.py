@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import er3a
 from er3a.errors import InputError
-from er3a.files.by_name import read_arm
+from er3a.files.arm_file import read_arm
 from er3a.files.factory_calibration import load_factory_calibration
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_robot, robot_of

@@ -40,7 +40,7 @@ def compare(
 ):
     """Is this table that arm? Geometry, zero, directions, base, flange; which entries differ. Exit code 1 if any do."""
     from er3a.comparison.compare import best_of
-    from er3a.files.by_name import read_arm, read_arms
+    from er3a.files.arm_file import read_arm, read_arms
     from er3a.robots.robot import to_modified, to_standard
 
     for option, value in (("--tolerance-mm", tolerance_mm), ("--tolerance-deg", tolerance_deg)):

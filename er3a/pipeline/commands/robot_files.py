@@ -60,8 +60,8 @@ def import_urdf(
     as_json: AsJson = False,
 ):
     """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
+    from er3a.files.arm_file import write_urdf_references
     from er3a.files.robot_writer import write_robot
-    from er3a.files.urdf_references import write_urdf_references
     from er3a.formats.urdf import import_urdf as read_urdf
     from er3a.formats.urdf_tree import plain_urdf
     from er3a.robots.robot import robot_name

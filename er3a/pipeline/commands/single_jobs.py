@@ -25,7 +25,6 @@ from er3a.pipeline.commands.options import (
     print_note,
 )
 from er3a.pipeline.messages import language
-from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 
@@ -57,6 +56,8 @@ def compute(
     results: Results = DEFAULT_RESULTS,
 ):
     """Compute a stage's numbers: tables and summary.json."""
+    from er3a.pipeline.stages import run
+
     loaded, folder = _folder(study, results, robot, stage)
     if parts and not STAGES[stage].sampled:
         raise Er3aError(f"the stage {stage} takes no sampled parts")
@@ -77,6 +78,7 @@ def record(
     The viewer draws it as a picture for the stage's page; of the many variants of a sweep the picture stays empty.
     """
     from er3a.pipeline.results import write_checksum
+    from er3a.pipeline.stages import run
     from er3a.pipeline.viewing.preview import draw_preview, write_empty
 
     loaded, folder = _folder(study, results, robot, stage)
@@ -101,6 +103,7 @@ def report(
 ):
     """Write a stage's page from its results."""
     from er3a.pipeline.results import write_checksum
+    from er3a.pipeline.stages import run
     from er3a.pipeline.viewing.figures import house_style
 
     loaded, folder = _folder(study, results, robot, stage)
@@ -123,7 +126,7 @@ def teach(
 
     A file (.csv with a D-H table, .yaml, .urdf) needs no study: its page is written into this folder.
     """
-    from er3a.files.by_name import READ
+    from er3a.files.arm_file import READ
     from er3a.pipeline.results import write_checksum
     from er3a.pipeline.teach.panel import write_teach_page
 
@@ -139,7 +142,7 @@ def teach(
 
 def _teach_file(source: str, page: Path) -> None:
     """Write the panel of an arm that stands in a file."""
-    from er3a.files.by_name import read_arm
+    from er3a.files.arm_file import read_arm
     from er3a.files.kept_files import sha256
     from er3a.pipeline.code_digest import code_digest
     from er3a.pipeline.results import Input, Provenance

@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict, astuple
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -35,8 +35,10 @@ from er3a.pipeline.commands.options import (
 from er3a.pipeline.messages import language
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.study import load_study
-from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.robots.robot import Convention
+
+if TYPE_CHECKING:
+    from er3a.pipeline.verdicts import StageVerdict
 
 
 @app.command(rich_help_panel=FIRST)
@@ -119,6 +121,7 @@ def run(
 ):
     """Carry out the study of this folder; what is done already is not done again."""
     from er3a.pipeline.run_study import run_study
+    from er3a.pipeline.verdicts import read_verdicts
 
     if not run_study(study, DEFAULT_RESULTS, DEFAULT_REPORTS, words or []):
         raise typer.Exit(2)
@@ -139,6 +142,8 @@ def verdicts(
     from rich.table import Column, Table
     from rich.text import Text
 
+    from er3a.pipeline.verdicts import read_verdicts
+
     found = read_verdicts(load_study(study), results)
     if as_json:
         print_json([asdict(verdict) for verdict in found])
@@ -155,6 +160,8 @@ def verdicts(
 
 def _end_with_findings(found: Sequence[StageVerdict], level: FailOn) -> None:
     """Name the findings at a level, and end with 1 if there are any."""
+    from er3a.pipeline.verdicts import NOT_EXAMINED
+
     counted = [verdict for verdict in found if verdict.counts(level.value)]
     if unknown := sum(verdict.status == NOT_EXAMINED for verdict in found):
         print_note(f"not examined, and neither passed nor failed: {unknown} of {len(found)} stages")

@@ -32,7 +32,9 @@ HEADLINES = {
 }
 CAUSES = {
     "a_and_d_swapped": N_("a and d are swapped"),
-    "other_convention": N_("the table is of the other D-H convention, standard or modified"),
+    "other_convention": N_(
+        "the table is of the other D-H convention, standard or modified: a and alpha stand a row off"
+    ),
     "all_alphas_negated": N_("the sign of every alpha is turned round"),
     "one_alpha_negated": N_("the sign is turned round"),
     "offsets_negated": N_("the sign of every offset is turned round"),

@@ -13,7 +13,6 @@ from er3a.files.robot_library import LoadFields
 from er3a.files.yaml_file import StrictModel
 from er3a.numerics.jit import cache_folder
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.tables import table_types
 from er3a.robots.robot import Robot
 
 
@@ -98,6 +97,8 @@ class Stage:
     @property
     def tables(self) -> list[str]:
         """The names of the stage's tables."""
+        from er3a.pipeline.tables import table_types
+
         return list(table_types(self.module("model").RESULTS))
 
     @property
