@@ -145,10 +145,10 @@ TEXTS = texts(
             "{given_kg_m2:.3g} kg m² given, {about_centre_kg_m2:.3g} if so, {shape_kg_m2:.3g} by the link's shape"
         ),
         "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
-        "payload.bounded": "Payload: at most {kg:.3g} kg on the paths that may be run, by torques on {path}.",
+        "payload.bounded": "At most {kg:.3g} kg on the paths that may be run, by torques on {path}.",
         "payload.partly": "Not counted, because not known: {what}.",
-        "payload.unknown": "Payload: none may be assumed; unknown without {what}.",
-        "payload.not_examined": "Payload: not examined.",
+        "payload.unknown": "None may be assumed: unknown without {what}.",
+        "payload.not_examined": "Not examined.",
         "payload.rated": "Its file gives a rated payload of {kg:.3g} kg.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why})",
     }

@@ -155,18 +155,16 @@ TEXTS = texts(
         ),
         "stand.between": "On a stand of {gap} mm ({least} to {most} mm) on {name}: centre at ({centre}) mm.",
         "void.shoulder": (
-            "Void that the tool point can't reach: {lower:.3g} to {upper:.3g} L around the shoulder, its centre at "
-            "({centre}) mm."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder, centre at ({centre}) mm."
         ),
         "void.away": (
-            "Void that the tool point can't reach: {lower:.3g} to {upper:.3g} L away from the shoulder, its centre at "
-            "({centre}) mm."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder, centre at ({centre}) mm."
         ),
         "void.cause#it": "Its cause: it {cause}.",
         "void.cause#noun": "Its cause: {cause}.",
         "void.more": Plural("count", "{count} smaller one besides.", "{count} smaller ones besides."),
-        "box.size#turned": "{box} mm (tray or pallet), turned by 90 deg so that x, y, z are {xyz} mm",
-        "box.size#as_given": "{box} mm (tray or pallet; x, y, z)",
+        "box.size#turned": "{box} mm, turned by 90 deg so that x, y, z are {xyz} mm",
+        "box.size#as_given": "{box} mm (x, y, z)",
         "box.unknown": "Box of {box} mm: {why}",
         "box.nowhere": "Box of {box} mm: no place was found that the tool serves throughout.",
         "box.put#on": "Box of {box}: put it on {name}, its centre at ({centre}) mm; {reached}. "

@@ -57,7 +57,7 @@ class Fault:
 
 def address_of(page: str, motion: str, t: float, place: str) -> str:
     """The address of a place on a page, whose player then shows time ``t`` (s) of a motion."""
-    return f"{page}.html?{urlencode({'play': motion, 't': round(t, 4)})}#{place}"
+    return f"{page}.html?{urlencode({'play': motion, 't': round(t, 9)})}#{place}"
 
 
 @dataclass(frozen=True, eq=False)

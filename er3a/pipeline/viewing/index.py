@@ -595,15 +595,8 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
         "instead": {instead: f"#{instead}"} if instead else {},
-        "can": [
-            (what_it_can_do(by_status), ""),
-            (
-                payload_text(heads["dynamics"].summary if "dynamics" in heads else None, robot),
-                "dynamics" in heads and "dynamics.html#payload",
-            ),
-            (box_text(heads["workspace"].summary) if "workspace" in heads else "", "workspace.html#placement"),
-            (void_text(heads["workspace"].summary) if "workspace" in heads else "", "workspace.html#table-voids"),
-        ],
+        "can": what_it_can_do(by_status),
+        "answers": [*_answers(heads, robot)],
         "runs": [
             _run(stage, stored[stage].results)
             for stage in RUNS
@@ -636,6 +629,16 @@ def _settled(finding: object) -> tuple[bool, str]:
     part = next((part for part in finding.parts if part.part == "geometry"), None)
     settled = page.whole_sentence(say(part)) if part else ""
     return part is not None and not (part.settled or part.up_to_signs), joined([settled, *how_far_off(finding)], " ")
+
+
+def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str, str]]:
+    """What is asked of an arm first: the question, its answer and where it is shown."""
+    if "workspace" in heads:
+        yield tr("Tray or box"), box_text(heads["workspace"].summary), "workspace.html#placement"
+    summary = heads["dynamics"].summary if "dynamics" in heads else None
+    yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
+    if "workspace" in heads:
+        yield tr("Void"), void_text(heads["workspace"].summary), "workspace.html#table-voids"
 
 
 def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:

@@ -65,15 +65,12 @@ def faults(results: TrajectoryResults) -> list[Fault]:
     """The paths that may not be run as they are, the worst first."""
     found = []
     for path in worst_first(results.summary.paths):
-        first = min(events(path), key=lambda event: (event.status != "fail", event.t), default=None)
         near = near_assumed(path, results.summary)
         if path.verdict == "safe" and not near:
             continue
         where, t = near, path.clearance.t_s if path.clearance else 0.0
-        if path.verdict != "safe" and first:
-            where, t = tr("at t = {time} s: {text}", time=fixed(first.t, 2), text=first.text), first.t
-        elif path.verdict != "safe":
-            where = path_text(path)
+        if path.verdict != "safe":
+            where, t = _first_fault(path)
         todo = path_advice(path, results.checks.take(results.checks.path == path.name))
         found.append(
             Fault(
@@ -88,6 +85,17 @@ def faults(results: TrajectoryResults) -> list[Fault]:
             )
         )
     return found
+
+
+def _first_fault(path: PathSummary) -> tuple[str, float]:
+    """What is wrong first with a path that is not safe, and when (s); how fast it is counts where nothing else is."""
+    found = [(part.t0_s, word, part) for word, parts in kinds(path) for part in parts]
+    at_any_pace = [each for each in found if each[2] not in path.too_fast and each[2] not in path.undecided]
+    if found:
+        t, word, part = min(at_any_pace or found, key=lambda each: each[0])
+        cause = say(part.cause.touches[0]) if isinstance(part.cause, BodiesOverlap) else cause_text(path, part)
+        return tr("at t = {time} s: {text}", time=fixed(t, 2), text=f"{word}: {cause}"), t
+    return path_text(path), min((event.t_s for event in path.singularities), default=0.0)
 
 
 def path_advice(path: PathSummary, rows: PathChecks) -> str | None:
