@@ -565,7 +565,7 @@ function showOneOf(group) {
     const part = aim && parts.find((each) => each.contains(aim));
     if (!part || everything.checked) return;
     choose(part);
-    aim.scrollIntoView(aim.matches("tr") ? { block: "center" } : {});
+    aim.scrollIntoView();
   };
   addEventListener("hashchange", follow);
   choose(parts[0]);
