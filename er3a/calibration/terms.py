@@ -110,7 +110,7 @@ class JointErrors(ByValue):
 
     Attributes
     ----------
-    robot : by whose table (the uncorrected one) heights are computed
+    robot : the uncorrected table, which heights are computed by
     terms : which; coefficients : (c,) of all, in order
     """
 

@@ -79,7 +79,7 @@ def clock(browser) -> str:
 
 
 def told(browser) -> str:
-    return browser.find_element(By.CSS_SELECTOR, ".player .told").text
+    return browser.find_element(By.CSS_SELECTOR, ".player .now-shown").text
 
 
 def until(browser, seen) -> None:

@@ -126,7 +126,7 @@ def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     assert (bare.status, type(verdict)) == ("no_reference", NoLimits)
     assert verdict.missing_links == (6,)
     assert verdict.grade == "export"
-    assert "of grade export, neither measured nor given" in say(verdict)
+    assert "exported from a CAD model, neither measured nor given" in say(verdict)
     assert summary.findings == (MissingLink(6, singular=True),)
     assert {each.what for each in summary.unknown} >= {"masses", "peak", "rated", "friction", "wrist_moment", "load"}
     assert summary.uses == ()

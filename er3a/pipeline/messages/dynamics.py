@@ -11,7 +11,6 @@ from er3a.dynamics.plausibility import (
     ImpossibleInertia,
 )
 from er3a.pipeline.messages.language import N_
-from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics.model import (
@@ -56,6 +55,11 @@ FIGURES = {
     "energy": N_("Greatest energy of a path"),
     "utilisation": N_("Highest utilisation of a limit"),
     "power_balance": N_("Power balance, greatest error"),
+}
+GRADED: dict[Grade, str] = {
+    "cad": N_("taken from a CAD model"),
+    "export": N_("exported from a CAD model"),
+    "claim": N_("claimed by others"),
 }
 BINDING: dict[Binding, str] = {"peak": N_("peak"), "rms": N_("RMS"), "speed": N_("speed")}
 WHY: dict[NoBody, str] = {
@@ -106,8 +110,8 @@ TEXTS = texts(
         ),
         "dynamics.inferred": "Masses are inferred: the results are orders of magnitude only.",
         "dynamics.graded": (
-            "The masses are of grade {grade}, neither measured nor given by the manufacturer: all torques are as "
-            "uncertain as that grade."
+            "The masses are {grade}, neither measured nor given by the manufacturer: all torques are as uncertain as "
+            "that."
         ),
         "dynamics.not_run": Plural(
             "count",
@@ -141,10 +145,10 @@ TEXTS = texts(
             "{given_kg_m2:.3g} kg m² given, {about_centre_kg_m2:.3g} if so, {shape_kg_m2:.3g} by the link's shape"
         ),
         "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
-        "payload.bounded": "Payload: at most {kg:.3g} kg on the paths that may be run, by torques on {path}.",
+        "payload.bounded": "At most {kg:.3g} kg on the paths that may be run, by torques on {path}.",
         "payload.partly": "Not counted, because not known: {what}.",
-        "payload.unknown": "Payload: unknown without {what}.",
-        "payload.not_examined": "Payload: not examined.",
+        "payload.unknown": "None may be assumed: unknown without {what}.",
+        "payload.not_examined": "Not examined.",
         "payload.rated": "Its file gives a rated payload of {kg:.3g} kg.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why})",
     }
@@ -248,7 +252,7 @@ def _graded(grade: Grade | None) -> str:
         return ""
     if grade == "inferred":
         return sentence("dynamics.inferred")
-    return sentence("dynamics.graded", grade=word("grade", GRADE_NAMES, grade))
+    return sentence("dynamics.graded", grade=word("dynamics.graded_as", GRADED, grade))
 
 
 @say.register

@@ -128,7 +128,7 @@ STAYS_MM = 1.0  # that a tool moves when it stays where it is
 PACED = (TooFast, FasterThanAssumed, AcceleratesMoreThanAssumed)
 MOST_PAIRS = 3  # that are named of a collision
 FIGURES = {
-    "programs_passed": N_("Programs that pass"),
+    "programs_passed": N_("Programs that pass, of those meant to"),
     "instructions_passed": N_("Motion instructions that pass"),
     "instructions_caution": N_("Motion instructions with caution"),
     "instructions_failed": N_("Motion instructions that fail"),
@@ -349,7 +349,7 @@ TEXTS = texts(
 
 @say.register
 def _(found: ProgramCounts) -> str:
-    passed = sentence("programs.programs", count=found.programs, passed=found.passed)
+    passed = sentence("programs.programs", count=found.programs + len(found.demonstrations), passed=found.passed)
     unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
     others = []
     for outcome, names in unsound.items():

@@ -27,10 +27,10 @@ from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
 
 FIGURES = {
-    "safe": N_("Safe paths"),
+    "safe": N_("Safe paths, of those meant to be safe"),
     "singular_poses": N_("Singular poses met"),
     "near_passes": N_("Near-singular passes"),
-    "colliding": N_("Paths with a collision"),
+    "colliding": N_("Paths with a collision, of those meant to be safe"),
     "max_joint_speed": N_("Joint speed nearest its limit, on paths meant to be safe"),
     "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
     "speed_ratio": N_("Ratio to that joint's limit"),
@@ -114,6 +114,9 @@ TEXTS = texts(
             "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path): end it before, while joint speeds "
             "still have a bound, or move its end or the workpiece nearer to the arm"
         ),
+        "advice.sound": (
+            "The last point computed before anything is wrong is at t = {t:.4g} s, the tool at x, y, z = {xyz} mm"
+        ),
         "advice.chosen": "{way}: {tool}, and {time}",
         "advice.chosen#clear": "{way}: {tool}, {time}, and the arm keeps {clearance:.1f} mm of clearance",
         "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
@@ -145,7 +148,7 @@ def _(found: PathCounts) -> str:
     for verdict, names in unsafe.items():
         parts = {"count": len(names), "word": outcome_word(verdict), "names": joined(names, ", ")}
         faults.append(sentence("trajectory.fault", **parts) if names else "")
-    safe = sentence("trajectory.paths", count=found.paths, safe=found.safe)
+    safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
     if found.not_followed:
         parts = {"count": len(found.not_followed), "names": joined(found.not_followed, ", ")}
         faults.append(sentence("trajectory.not_followed", **parts))
@@ -207,7 +210,7 @@ def _apart_from_collisions(path: PathSummary) -> str:
         shown = sentence("path.shown")
         return joined([say(path.no_way), shown])
     if path.unreachable:
-        return joined(map(_when, path.unreachable))
+        return joined(map(say, path.unreachable))
     if faults := path.out_of_limits or _first_and_worst(path.too_fast):
         return joined([*map(say, faults), *map(say, path.singularities), _at_another_pace(path)])
     if path.undecided:
@@ -298,8 +301,9 @@ def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-ar
     return cause
 
 
-def advice(path: PathSummary) -> str | None:
-    """What to do about a path; None where nothing is to be done."""
+def advice(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None = None) -> str | None:
+    """What to do about a path; None where nothing is to be done. ``sound``: time (s) and place (mm) of the last point
+    before anything is wrong, of a path that leaves the reach."""
     if not path.avoidance:
         return None
     if path.chosen:
@@ -317,7 +321,8 @@ def advice(path: PathSummary) -> str | None:
             return joined([no_way, _clear(path)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
-    return joined([sentence("advice.none", why=why), _within_reach(path), _clear(path)], ". ")
+    last = sentence("advice.sound", t=sound[0], xyz=_numbers(sound[1], 1)) if sound else ""
+    return joined([sentence("advice.none", why=why), _within_reach(path), last, _clear(path)], ". ")
 
 
 def _slower_throughout(path: PathSummary) -> str:

@@ -154,16 +154,27 @@ TEXTS = texts(
             "itself."
         ),
         "stand.between": "On a stand of {gap} mm ({least} to {most} mm) on {name}: centre at ({centre}) mm.",
+        "void.shoulder": (
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder, centre at ({centre}) mm."
+        ),
+        "void.away": (
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder, centre at ({centre}) mm."
+        ),
+        "void.cause#it": "Its cause: it {cause}.",
+        "void.cause#noun": "Its cause: {cause}.",
+        "void.more": Plural("count", "{count} smaller one besides.", "{count} smaller ones besides."),
+        "box.size#turned": "{box} mm, turned by 90 deg so that x, y, z are {xyz} mm",
+        "box.size#as_given": "{box} mm (x, y, z)",
         "box.unknown": "Box of {box} mm: {why}",
         "box.nowhere": "Box of {box} mm: no place was found that the tool serves throughout.",
-        "box.put#on": "Box of {box} mm (x, y, z): put it on {name}, its centre at ({centre}) mm; {reached}. "
+        "box.put#on": "Box of {box}: put it on {name}, its centre at ({centre}) mm; {reached}. "
         "The box is not checked as an obstacle.",
         "box.put#over": (
-            "Box of {box} mm (x, y, z): put it on a stand of {gap} mm ({least} to {most} mm) on {name}, its centre at "
+            "Box of {box}: put it on a stand of {gap} mm ({least} to {most} mm) on {name}, its centre at "
             "({centre}) mm; {reached}. It can't stand directly on {none}. Box and stand are not checked as obstacles."
         ),
         "box.put#free": (
-            "Box of {box} mm (x, y, z): put its centre at ({centre}) mm; {reached}. No surface is known there. The box "
+            "Box of {box}: put its centre at ({centre}) mm; {reached}. No surface is known there. The box "
             "is not checked as an obstacle."
         ),
         "box.proven#all": "the tool point is proven to reach all of it",
@@ -337,8 +348,9 @@ def box_text(summary: Summary) -> str:
     place = placement.best
     served_from = stand.served_from_m or 0.0 if stand else 0.0
     form = "upper" if served_from > SERVED_ALL_M else "all"
+    edges = ", ".join(as_text(round(1000 * edge), "d") for edge in place.size_m)
     parts = {
-        "box": " × ".join(as_text(round(1000 * edge), "d") for edge in place.size_m),
+        "box": sentence("box.size#turned" if place.turned else "box.size#as_given", box=asked, xyz=edges),
         "centre": millimetres(place.centre_m),
         "reached": sentence(f"box.{place.status}#{form}", served_from=millimetres([served_from])),
     }
@@ -349,6 +361,25 @@ def box_text(summary: Summary) -> str:
         parts |= {"gap": gap, "least": least, "most": most, "none": ", ".join(each.name for each in placement.stands)}
         return sentence("box.put#over", name=over.name, **parts)
     return sentence("box.put#free", **parts)
+
+
+def void_text(summary: Summary) -> str:
+    """The largest void that the arm encloses, with its bounds, place and cause; empty where voids were not judged."""
+    if not isinstance(summary.verdict.finding, NoVoid | VoidAtShoulder | VoidUnexpected):
+        return ""
+    voids = getattr(summary, "enclosed_voids", [])
+    if not voids:
+        return say(summary.verdict.finding)
+    largest = max(voids, key=lambda void: void.volume_m3.upper)
+    parts = {
+        "lower": 1000 * largest.volume_m3.lower,
+        "upper": 1000 * largest.volume_m3.upper,
+        "centre": millimetres(largest.centroid_m),
+    }
+    where = sentence("void.shoulder" if largest.holds_shoulder else "void.away", **parts)
+    cause = sentence("void.cause#it" if is_predicate(largest.cause) else "void.cause#noun", cause=say(largest.cause))
+    more = sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else ""
+    return joined([where, cause, more], " ")
 
 
 def millimetres(values: Sequence[float]) -> str:

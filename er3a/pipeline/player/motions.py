@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
+from urllib.parse import urlencode
 
 from er3a.numerics.arrays import Reals
 
@@ -34,6 +35,29 @@ class Mark:
     start: tuple[float, float, float]
     end: tuple[float, float, float]
     text: str
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why a path or a program may not be run as it is: what fails first and where, and what to do instead.
+
+    ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that; ``address``: of the place on the
+    robot's pages, which the player shows there.
+    """
+
+    name: str
+    title: str
+    status: Weight
+    verdict: str
+    meant: bool
+    where: str
+    to_do: str
+    address: str
+
+
+def address_of(page: str, motion: str, t: float, place: str) -> str:
+    """The address of a place on a page, whose player then shows time ``t`` (s) of a motion."""
+    return f"{page}.html?{urlencode({'play': motion, 't': round(t, 9)})}#{place}"
 
 
 @dataclass(frozen=True, eq=False)

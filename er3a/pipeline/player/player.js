@@ -2,7 +2,7 @@
  * Plays motions of an arm on a page: a time bar, play and step, events, and a cursor in every plot over time.
  *
  * Joint values come with the page; what lies between two of them is on a line. Any element of the page may have `data-play="MOTION"` and `data-t="SECONDS"`: it then leads to that moment, and is marked as `now` from
- * `data-from` to it. A plot is a figure with `data-panels`, a list of `[left, bottom, right, top, t0, t1, MOTION]` in
+ * `data-from` to it; `?play=MOTION&t=SECONDS` in the page's address does the same. A plot is a figure with `data-panels`, a list of `[left, bottom, right, top, t0, t1, MOTION]` in
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
@@ -17,7 +17,7 @@ const place = document.getElementById("player");
 const data = JSON.parse(document.getElementById("player-data").textContent);
 const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
-const [canvas, chooser, bar, clock, told] = ["arm", "motion", "time", "clock", "told"].map(part);
+const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
 const arms = [data, ...data.beside].map((arm, k) => {
   const carried = k === 0 ? sceneSolids(data.carried, table.a.length + 1) : [];
@@ -131,7 +131,7 @@ function tell() {
   clock.textContent = said.replace("{t}", fixed(t, digits)).replace("{end}", fixed(end(), digits));
   bar.setAttribute("aria-valuetext", clock.textContent);
   const text = motion.events.filter(isNow).map((event) => event.text).join(words.between) || motion.text;
-  show(told, text);
+  show(nowShown, text);
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
   for (const { dataset, classList } of stretches) {
@@ -253,6 +253,11 @@ addEventListener("resize", refresh);
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
 choose(decodeURIComponent(location.hash.slice(1)));
+const asked = new URLSearchParams(location.search);
+if (asked.has("play")) {
+  goTo(asked.get("play"), Number(asked.get("t")));
+  dock();
+}
 part("controls").hidden = part("joints").hidden = false;
 refresh();
 performance.mark("player");

@@ -52,13 +52,13 @@ export class Clearance {
   /** What overlaps at frames `T`, in words; empty where nothing does. */
   overlap(T) {
     const found = nearestPair(this.clearance, this.table.base, T);
-    return found && found.distance <= 0 ? this.#told(found) : "";
+    return found && found.distance <= 0 ? this.#described(found) : "";
   }
 
-  #told({ distance, deep, pair }) {
+  #described({ distance, deep, pair }) {
     const { words } = this;
-    const told = distance <= 0 ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
-    return fill(told, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
+    const text = distance <= 0 ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
+    return fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
   }
 
   /** Writes the least distance at frames `T` into the page; returns what is to be drawn of it, null for nothing. */
@@ -74,7 +74,7 @@ export class Clearance {
     const { distance, deep, pair } = found;
     const touching = distance <= 0;
     element.dataset.state = touching ? "at" : distance < this.clearance.near ? "near" : "clear";
-    write(element, this.#told(found));
+    write(element, this.#described(found));
     return { from: found.from, to: found.to, text: deep ? "" : inMillimetres(distance), touching: touching ? pair.names : [] };
   }
 }

@@ -151,11 +151,11 @@ for (const choice of document.querySelectorAll("input[name=orientation]")) {
   choice.addEventListener("change", refresh);
 }
 
-async function copy(text, told) {
+async function copy(text, copied) {
   let message = words.not_copied;
   try {
     await navigator.clipboard.writeText(text);
-    message = told;
+    message = copied;
   } catch {
     // The page says so and shows the text instead.
   }

@@ -12,7 +12,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_shapes
+from er3a.collision.shapes import shapes_assumed
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length
 from er3a.kinematics.solutions import branch_labels
@@ -244,10 +244,6 @@ WORDS: dict[str, Any] = {
         "Clearance: the least distance between the arm's shapes and the scene's, and between links of the arm "
         "that can collide, as checked by the collision stage. A line shows where."
     ),
-    "clearance_estimated": N_(
-        "The robot's file gives no shapes of its links, so they are capsules along the table, as thick as arms of this "
-        "size usually are: an estimate."
-    ),
     "clearance_allowed": N_("Not watched, as the robot's file decides: {pairs}."),
     "clearance_is": N_("Clearance {distance}: {pair}."),
     "overlap": N_("Collision: {pair} overlap by {distance}."),
@@ -355,10 +351,11 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
     """The bodies whose distances the panel watches and their pairs, as ``clearance.js`` takes them; SI units."""
     found = Bodies(robot, scene)
     layout = found.layout
+    shapes = shapes_assumed(robot, 0.0, {})
     return {
         "near": NEAR_TOUCH,
         "unexamined": say(PairsUnexamined(found.unexamined)) if found.unexamined else None,
-        "estimated": not arm_shapes(robot).given,
+        "assumed": say(shapes) if shapes else "",
         "allowed": [
             f"{body_word(row.first)} / {body_word(row.second)}" for row in found.matrix if row.state == "allowed"
         ],

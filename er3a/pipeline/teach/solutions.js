@@ -47,12 +47,12 @@ export class SolutionList {
     this.mark(q);
   }
 
-  /** Lists solutions that iteration found, the arm's own first, and `told` of them. */
-  listFound(found, told) {
+  /** Lists solutions that iteration found, the arm's own first, and `text` about them. */
+  listFound(found, text) {
     this.rows = found.map((q) => ({ slot: null, q, withinLimits: true }));
     this.buttons = [];
     byId("branches").replaceChildren(...this.rows.map((row) => this.#branch([row])));
-    write(byId("count"), told);
+    write(byId("count"), text);
     this.ghost(null);
     this.mark(found[0]);
   }

@@ -29,12 +29,11 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import near_shapes
 from er3a.pipeline.messages.dynamics import payload_text
-from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.pages import caveat, decision, next_step, what_it_can_do
 from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.validation import how_far_off, missed_text
-from er3a.pipeline.messages.workspace import box_text
+from er3a.pipeline.messages.workspace import box_text, void_text
 from er3a.pipeline.results import (
     AbsentResults,
     Input,
@@ -43,9 +42,14 @@ from er3a.pipeline.results import (
     input_records,
     is_computed,
     read_stage,
+    read_status,
     result_records,
 )
+from er3a.pipeline.stages.programs.model import ProgramsResults
+from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
+from er3a.pipeline.stages.trajectory.model import TrajectoryResults
+from er3a.pipeline.stages.trajectory.played import faults as path_faults
 from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
@@ -54,7 +58,7 @@ from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import number
-from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, stage_head, status_word
+from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, stage_head, status_word, stored_head
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -92,7 +96,7 @@ def write_compare(study: Study, results: Path, workspaces: Workspaces, output: P
         rows=rows,
         data=data,
         caveats={
-            name: caveat(stage_head(folder, STAGES["validation"]).status if is_computed(folder) else "not_computed")
+            name: caveat(read_status(folder) if is_computed(folder) else "not_computed")
             for name, folder in validated.items()
         },
         low=corners.min(axis=0).tolist(),
@@ -467,13 +471,8 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 
 SHOWN_FIGURES = 3
-LISTS = {  # where a stage's page lists what it was asked to judge
-    "collision": "table-targets",
-    "inverse": "table-targets",
-    "programs": "table-programs",
-    "trajectory": "table-paths",
-    "vision": "table-objects",
-}
+RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
+MOST_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
 PLACE_LETTERS = 160
 VOID_TAGS = ("br", "img", "input", "wbr", "hr")
 _NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
@@ -499,7 +498,8 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         article=study.article is not None,
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
-        lists=LISTS,
+        run_words=RUNS,
+        most_faults=MOST_FAULTS,
         sweeps=sweep_sections(study, results),
         command=page.run_command(study, "index.html"),
         provenance=Provenance(
@@ -571,7 +571,8 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     """What the index shows of a robot."""
     robot, expected = study.robot(name), study.entry(name).expect
     stages = [stage for stage in study.stages(name) if stage in STAGES]
-    heads = {stage: stage_head(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
+    stored = {stage: read_stage(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
+    heads = {stage: stored_head(each) for stage, each in stored.items()}
     failed = {
         stage: tr(STAGES[stage].title)
         for stage, head in heads.items()
@@ -594,13 +595,12 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
         "instead": {instead: f"#{instead}"} if instead else {},
-        "can": [
-            (what_it_can_do(by_status), ""),
-            (
-                payload_text(heads["dynamics"].summary if "dynamics" in heads else None, robot),
-                "dynamics" in heads and "dynamics.html#payload",
-            ),
-            (box_text(heads["workspace"].summary) if "workspace" in heads else "", "workspace.html#placement"),
+        "can": what_it_can_do(by_status),
+        "answers": [*_answers(heads, robot)],
+        "runs": [
+            _run(stage, stored[stage].results)
+            for stage in RUNS
+            if stage in stored and heads[stage].status != "not_computed"
         ],
         "shapes": next(
             (say(replace(shapes, near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""
@@ -614,7 +614,6 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             measurement=measurement and page.whole_sentence(measurement),
         ),
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
-        "demonstrations": [head for head in heads.values() if head.demonstrations],
         "expected": expected,
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
     }
@@ -632,16 +631,30 @@ def _settled(finding: object) -> tuple[bool, str]:
     return part is not None and not (part.settled or part.up_to_signs), joined([settled, *how_far_off(finding)], " ")
 
 
+def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str, str]]:
+    """What is asked of an arm first: the question, its answer and where it is shown."""
+    if "workspace" in heads:
+        yield tr("Tray or box"), box_text(heads["workspace"].summary), "workspace.html#placement"
+    summary = heads["dynamics"].summary if "dynamics" in heads else None
+    yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
+    if "workspace" in heads:
+        yield tr("Void"), void_text(heads["workspace"].summary), "workspace.html#table-voids"
+
+
+def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
+    """How many paths or programs there are, how many may be run as they are, and why the others may not."""
+    if isinstance(results, ProgramsResults):
+        count, unknown, faults = len(results.summary.programs), 0, program_faults(results)
+    else:
+        count, unknown = len(results.summary.paths), len(results.summary.not_followed)
+        faults = path_faults(results)
+    return {"stage": stage, "count": count + unknown, "sound": count - len(faults), "faults": faults}
+
+
 def _cell(head: Head) -> dict[str, Any]:
-    """What the index says of a stage: its answer and the rest of its text, without what fails as it is meant to and
-    what all stages of a robot share."""
-    finding = head.finding
-    if head.demonstrations:
-        finding = replace(finding, demonstrations=())
+    """What the index says of a stage: its answer and the rest of its text, without what all stages of a robot share."""
     verdict = head.summary.verdict
     unexamined = [say(found) for found in verdict.findings[1:] if found is not verdict.shapes]
     near = near_shapes(verdict.shapes.margin_mm, verdict.shapes.near) if verdict.shapes else ""
-    text = joined([say(finding).removeprefix("."), *unexamined, near], " ")
-    meant = demonstrated(head.finding.demonstrations) if head.demonstrations else ""
-    lead, rest = page.led(text or tr("All of it is meant to be faulty."))
-    return {"head": head, "lead": lead, "rest": joined([rest, page.whole_sentence(meant) if meant else ""], " ")}
+    lead, rest = page.led(joined([say(head.finding), *unexamined, near], " "))
+    return {"head": head, "lead": lead, "rest": rest}

@@ -364,34 +364,32 @@ function addFinder() {
   if (document.body.classList.contains("teach")) return;
   const box = document.createElement("p");
   const field = document.createElement("input");
-  const told = document.createElement("span");
+  const status = document.createElement("span");
   const elsewhere = document.createElement("ul");
   box.className = "find";
   box.role = "search";
   field.type = "search";
   field.placeholder = field.ariaLabel = document.getElementById("places") ? WORDS.findAnywhere : WORDS.find;
   field.value = new URLSearchParams(location.search).get("find") ?? "";
-  told.role = "status";
+  status.role = "status";
   elsewhere.className = "elsewhere";
-  box.append(field, " ", told);
+  box.append(field, " ", status);
   document.querySelector("header").append(box, elsewhere);
   let open = null; // what was unfolded before
   const find = () => {
     const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
     main.classList.toggle("finding", words.length > 0);
     open ??= new Map([...main.querySelectorAll("details")].map((part) => [part, part.open]));
-    if (!words.length) {
-      for (const part of main.querySelectorAll(".unfound")) part.classList.remove("unfound");
-      main.classList.remove("unfound");
-      open.forEach((was, part) => (part.open = was));
-      open = null;
-      told.textContent = "";
-    }
     const others = words.length ? placesElsewhere(words) : [];
     elsewhere.replaceChildren(...others.map((each) => linkTo(each, words)));
     const here = words.length ? keepFound(main, words, "") : 0;
     const count = others.reduce((sum, { texts }) => sum + texts.length, here);
-    if (words.length) told.textContent = WORDS.found.replace("{count}", count);
+    status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : WORDS.none;
+    if (!words.length || !count) { // all of the page
+      for (const part of [main, ...main.querySelectorAll(".unfound")]) part.classList.remove("unfound", "finding");
+      open.forEach((was, part) => (part.open = was));
+    }
+    if (!words.length) open = null;
     dispatchEvent(new Event("resize")); // for what takes its size from what was not there
   };
   field.addEventListener("input", () => {

@@ -64,6 +64,7 @@ SCRIPT_WORDS = {
     "find": N_("Find on this page"),
     "findAnywhere": N_("Find on all pages"),
     "found": N_("{count} places"),
+    "none": N_("Nothing has all these words: try fewer, or others"),
     "link": N_("link to this section"),
     "previous": N_("Previous"),
     "next": N_("Next"),
@@ -288,6 +289,7 @@ def render(
         "sentence": whole_sentence,
         "led": led,
         "linked": linked,
+        "breakable": breakable,
         "grade": partial(word, "grade", GRADE_NAMES),
         "group": partial(word, "group", GROUP_NAMES),
     }
@@ -347,6 +349,11 @@ def linked(text: str, links: Mapping[str, str]) -> Markup:
         return found[0] if address is None else f'<a href="{escape(address)}">{found[0]}</a>'
 
     return Markup(re.sub(rf"(?<![\w-])(?:{names})(?![\w-])", link, html)) if left else html
+
+
+def breakable(name: str) -> Markup:
+    """A name that may go on in the next line behind each of its underscores."""
+    return Markup("_<wbr>").join(name.split("_"))
 
 
 def whole_sentence(finding: str) -> str:
@@ -439,8 +446,13 @@ def panel_link(q_deg: Iterable[float], text: str) -> str:
 
 def stage_head(folder: Path, stage: Stage) -> Head:
     """The verdict and key figures that a folder holds, in the page's language."""
-    words = import_module(stage.messages)
-    return head_of(read_stage(folder, stage), words.FIGURES)
+    return stored_head(read_stage(folder, stage))
+
+
+def stored_head(stored: Stored[Any]) -> Head:
+    """The verdict and key figures of a stage's results, in the page's language."""
+    words = import_module(STAGES[stored.stage].messages)
+    return head_of(stored, words.FIGURES)
 
 
 def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:

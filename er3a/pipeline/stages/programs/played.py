@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import own_title, tr
-from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion, Weight
+from er3a.pipeline.messages.programs import remedies, say
+from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
-from er3a.program_check.program_check_findings import Level, MotionCollides
+from er3a.pipeline.viewing.numbers import fixed
+from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
 from er3a.robots.robot import Robot
 
 WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
@@ -18,17 +22,75 @@ WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "ca
 def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     """The programs as far as they were followed, each line's motion with its text, its verdict and what touches."""
     motions = []
-    for program in results.summary.programs:
+    for program in worst_first(results.summary.programs):
         rows = results.motion.take(results.motion.program == program.name)
         text = results.lines.take(results.lines.program == program.name)
         words = dict(zip(text.line.tolist(), text.text.tolist()))
         events = []
         for line, level, t0, t1 in stretches(rows):
-            told = tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";"))
-            events.append(PlayedEvent(t0, t1, told, WEIGHTS[level], touching(program, line)))
+            shown = tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";"))
+            events.append(PlayedEvent(t0, t1, shown, WEIGHTS[level], touching(program, line)))
+        for each in program.findings:
+            if each.program_s is not None:
+                events.append(PlayedEvent(each.program_s, each.program_s, say(each.finding), WEIGHTS[each.level]))
         q = np.radians(rows.q_deg)
         motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=own_title(program.title)))
     return motions
+
+
+def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
+    """Those that fail first, of them those that were not expected to."""
+    return sorted(programs, key=lambda each: (-RANKS[each.outcome], each.expect == each.outcome))
+
+
+def faults(results: ProgramsResults) -> list[Fault]:
+    """The programs that may not be run as they are, the worst first."""
+    found = []
+    for program in worst_first(results.summary.programs):
+        worst = worst_finding(program)
+        if worst is None or program.outcome == "pass":
+            continue
+        where = say(worst.finding)
+        if worst.line and worst.motion_s is not None:
+            time = fixed(worst.motion_s, 2)
+            where = tr("line {line}, {time} s into it: {text}", line=worst.line, time=time, text=where)
+        elif worst.line:
+            where = tr("line {line}: {text}", line=worst.line, text=where)
+        place = line_id(program.name, worst.line if worst in of_line(program, worst.line) else 0)
+        found.append(
+            Fault(
+                program.name,
+                own_title(program.title),
+                WEIGHTS[worst.level],
+                outcome_word(program.outcome),
+                program.expect == program.outcome,
+                where,
+                " ".join(remedies_of(program, worst)),
+                address_of("programs", program.name, worst.program_s or 0.0, place),
+            )
+        )
+    return found
+
+
+def line_id(program: str, line: int) -> str:
+    """Where a line of a program stands on the page; where the program does for no line."""
+    return f"{program}-{line}" if line else program
+
+
+def when(each: FindingAt) -> float:
+    """When a finding begins, s; behind all others where that is not known."""
+    return next((time for time in (each.program_s, each.motion_s) if time is not None), np.inf)
+
+
+def worst_finding(program: ProgramSummary) -> FindingAt | None:
+    """The first of the findings that weigh most; None where nothing was found."""
+    return min(program.findings, key=lambda each: (-RANKS[each.level], when(each)), default=None)
+
+
+def remedies_of(program: ProgramSummary, found: FindingAt) -> list[str]:
+    """What to do about a finding and others at its line."""
+    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
+    return remedies(here, program.findings)
 
 
 def of_line(program: ProgramSummary, line: int) -> list[FindingAt]:

@@ -23,11 +23,19 @@ from er3a.pipeline.stages.programs.model import (
     ProgramsResults,
     ProgramSummary,
 )
-from er3a.pipeline.stages.programs.played import motions, stretches
+from er3a.pipeline.stages.programs.played import (
+    line_id,
+    motions,
+    remedies_of,
+    stretches,
+    when,
+    worst_finding,
+    worst_first,
+)
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import head_of, render, run_command
-from er3a.program_check.program_check_findings import RANKS, Level, worst_of
+from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
 
 MOST_LINES = 400  # of a listing that the page shows
@@ -43,6 +51,7 @@ class ListingLine:
     """
 
     number: int
+    id: str
     text: str
     level: Level | None
     word: str
@@ -74,7 +83,7 @@ def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
     solids = load_scene(scene) if scene else None
-    sections = [_section(results, program) for program in summary.programs]
+    sections = [_section(results, program) for program in worst_first(summary.programs)]
     render(
         Path(__file__).with_name("report.html.j2"),
         output,
@@ -94,7 +103,7 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     own = Path(program.file).name
     found: dict[int, list[FindingAt]] = defaultdict(list)
     elsewhere = []
-    for each in sorted(program.findings, key=_when):
+    for each in sorted(program.findings, key=when):
         if each.file == own and each.line:
             found[each.line].append(each)
         else:
@@ -110,18 +119,12 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     return ProgramSection(program, status, *texts, lines, elsewhere)
 
 
-def _when(each: FindingAt) -> float:
-    return next((time for time in (each.program_s, each.motion_s) if time is not None), np.inf)
-
-
 def _worst(program: ProgramSummary) -> tuple[Markup, str]:
     """The first of the findings that weigh most, with its line, and what to do there; empty where a program passes."""
-    found = min(program.findings, key=lambda each: (-RANKS[each.level], _when(each)), default=None)
+    found = worst_finding(program)
     if found is None or program.outcome == "pass":
         return Markup(), ""
-    remark = _remark(program.name, found)
-    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
-    to_do = " ".join(remedies(here, program.findings))
+    remark, to_do = _remark(program.name, found), " ".join(remedies_of(program, found))
     return Markup(tr("line {line}: {text}", line=found.line, text=remark)) if found.line else remark, to_do
 
 
@@ -131,7 +134,7 @@ def _remark(name: str, each: FindingAt) -> Markup:
     text = escape(bracketed(say(each.finding), often))
     if each.motion_s is None:
         return text
-    at = tr("{time} s into this line", time=fixed(each.motion_s, 2))
+    at = tr("from {time} s into this line on", time=fixed(each.motion_s, 2))
     if each.program_s is not None:
         at = bracketed(at, tr("player: {time} s", time=fixed(each.program_s, 2)))
     shown = escape(at) if each.program_s is None else moment(name, each.program_s, at)
@@ -146,6 +149,8 @@ def _listing(
     played = {line: (t0, t1) for line, _, t0, t1 in reversed(stretches(motion))}  # the first time counts
     for i, line in enumerate(rows.line.tolist()):
         moves[line].append(i)
+    if len(text) and not text.text[-1]:  # the end of the last line
+        text = text.take(np.arange(len(text) - 1))
     kept = set(range(1, len(text) + 1))
     if len(text) > MOST_LINES:
         marked = sorted({*moves, *found})[: MOST_LINES // (2 * AROUND + 1)]
@@ -166,7 +171,18 @@ def _listing(
             leads = stretch(name, t0, t1), moment(name, t1, str(number))
         word = "" if level is None else level_word(level)
         lines.append(
-            ListingLine(number, words, level, word, remarks, to_do, _facts(rows, moves[number]), *leads, skipped)
+            ListingLine(
+                number,
+                line_id(name, number),
+                words,
+                level,
+                word,
+                remarks,
+                to_do,
+                _facts(rows, moves[number]),
+                *leads,
+                skipped,
+            )
         )
         skipped = False
     return lines

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.expectations import outcome_word
+from er3a.pipeline.messages.language import own_title, tr
+from er3a.pipeline.messages.programs import say
+from er3a.pipeline.messages.say import sentence
 from er3a.pipeline.messages.trajectory import advice, cause_text, event_word, path_text
-from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
-from er3a.pipeline.stages.trajectory.model import BodiesOverlap, PathSummary, Singularity, Stretch, TrajectoryResults
+from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.stages.trajectory.model import (
+    BodiesOverlap,
+    PathChecks,
+    PathSummary,
+    Singularity,
+    Stretch,
+    TrajectoryResults,
+    TrajectorySummary,
+)
+from er3a.pipeline.viewing.numbers import fixed
 from er3a.planning.names import PathVerdict
+from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -29,7 +43,7 @@ WEIGHTS: dict[PathVerdict, Weight] = {
 def motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
     """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it."""
     checks, avoidance, motions = results.checks, results.avoidance, []
-    for path in results.summary.paths:
+    for path in worst_first(results.summary.paths):
         rows = checks.take((checks.path == path.name) & checks.reachable)
         motions.append(
             PlayedMotion(path.name, path_text(path), rows.t_s, meant(robot, rows.q_deg), events(path), contact(path))
@@ -39,6 +53,67 @@ def motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
             name = tr("{path}, repaired", path=path.name)
             motions.append(PlayedMotion(name, advice(path) or "", repair.t_s, meant(robot, repair.q_deg)))
     return motions
+
+
+def worst_first(paths: Sequence[PathSummary]) -> list[PathSummary]:
+    """Those that fail first, of them those that were not expected to."""
+    ranks = ("fail", "caution", "plain")
+    return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), path.expect == path.verdict))
+
+
+def faults(results: TrajectoryResults) -> list[Fault]:
+    """The paths that may not be run as they are, the worst first."""
+    found = []
+    for path in worst_first(results.summary.paths):
+        near = near_assumed(path, results.summary)
+        if path.verdict == "safe" and not near:
+            continue
+        where, t = near, path.clearance.t_s if path.clearance else 0.0
+        if path.verdict != "safe":
+            where, t = _first_fault(path)
+        todo = path_advice(path, results.checks.take(results.checks.path == path.name))
+        found.append(
+            Fault(
+                path.name,
+                own_title(path.title),
+                "caution" if path.verdict == "safe" else WEIGHTS[path.verdict],
+                tr("clear of assumed shapes only") if path.verdict == "safe" else outcome_word(path.verdict),
+                path.expect == path.verdict,
+                where,
+                sentence("finding", finding=todo) if todo else "",
+                address_of("trajectory", path.name, t, path.name),
+            )
+        )
+    return found
+
+
+def _first_fault(path: PathSummary) -> tuple[str, float]:
+    """What is wrong first with a path that is not safe, and when (s); how fast it is counts where nothing else is."""
+    found = [(part.t0_s, word, part) for word, parts in kinds(path) for part in parts]
+    at_any_pace = [each for each in found if each[2] not in path.too_fast and each[2] not in path.undecided]
+    if found:
+        t, word, part = min(at_any_pace or found, key=lambda each: each[0])
+        cause = say(part.cause.touches[0]) if isinstance(part.cause, BodiesOverlap) else cause_text(path, part)
+        return tr("at t = {time} s: {text}", time=fixed(t, 2), text=f"{word}: {cause}"), t
+    return path_text(path), min((event.t_s for event in path.singularities), default=0.0)
+
+
+def path_advice(path: PathSummary, rows: PathChecks) -> str | None:
+    """What to do about a path, with the last of its points (``rows``) before anything is wrong, if it leaves the reach;
+    None where nothing is to be done."""
+    starts = [part.t0_s for _, stretches in kinds(path) for part in stretches]
+    sound = rows.take(rows.reachable & (rows.t_s < min(starts, default=0.0)))
+    if not path.unreachable or not len(sound):
+        return advice(path)
+    return advice(path, (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())))
+
+
+def near_assumed(path: PathSummary, summary: TrajectorySummary) -> str:
+    """That a path is clear of assumed shapes by less than these may be wrong by; else empty."""
+    shapes = summary.verdict.shapes
+    if shapes is None or path.name not in shapes.near or path.clearance is None:
+        return ""
+    return say(ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm))
 
 
 def events(path: PathSummary) -> list[PlayedEvent]:

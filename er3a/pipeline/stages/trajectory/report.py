@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,9 @@ from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.programs import say
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import (
     FIGURES,
-    advice,
     cause_text,
     event_distance,
     event_word,
@@ -43,13 +40,12 @@ from er3a.pipeline.stages.trajectory.model import (
     TriedStrategy,
 )
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
-from er3a.pipeline.stages.trajectory.played import WEIGHTS, kinds, motions
+from er3a.pipeline.stages.trajectory.played import WEIGHTS, kinds, motions, near_assumed, path_advice, worst_first
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import head_of, packed_text, render, run_command
-from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.programs.languages import titles_unwritten
 from er3a.robots.robot import Robot
 
@@ -109,7 +105,7 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     solids = load_scene(scene) if scene else None
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
-    paths = _worst_first(summary.paths) if count < len(summary.paths) else summary.paths
+    paths = worst_first(summary.paths)
     for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
         links = _programs(results.programs.take((results.programs.path == path.name) & (i < count)))
@@ -135,12 +131,6 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     )
 
 
-def _worst_first(paths: Sequence[PathSummary]) -> Sequence[PathSummary]:
-    """Those that fail first, of them those that were not expected to."""
-    ranks = ("fail", "caution", "plain")
-    return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), path.expect == path.verdict))
-
-
 def _programs(rows: ProgramFiles) -> list[ProgramLink]:
     texts = zip(rows.file.tolist(), rows.text.tolist())
     return [ProgramLink(file, packed_text(text), not text) for file, text in texts]
@@ -153,7 +143,7 @@ def _section(
     programs: list[ProgramLink],
     summary: TrajectorySummary,
 ) -> PathSection:
-    near = _near_assumed(path, summary)
+    near = near_assumed(path, summary)
     only_assumed = WEIGHTS[path.verdict] == "plain" and near
     return PathSection(
         path=path,
@@ -161,7 +151,7 @@ def _section(
         verdict=tr("clear of assumed shapes only") if only_assumed else outcome_word(path.verdict),
         kind=kind_word(path.kind),
         text=joined([path_text(path), near]),
-        advice=advice(path),
+        advice=path_advice(path, rows),
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
         events=[_event_row(path.name, event) for event in path.singularities],
@@ -172,14 +162,6 @@ def _section(
         shortest="–" if path.fastest_s is None or path.verdict in AT_ANY_PACE else fixed(path.fastest_s, 2),
         figure=figure,
     )
-
-
-def _near_assumed(path: PathSummary, summary: TrajectorySummary) -> str:
-    """That a path is clear of assumed shapes by less than these may be wrong by; else empty."""
-    shapes = summary.verdict.shapes
-    if shapes is None or path.name not in shapes.near or path.clearance is None:
-        return ""
-    return say(ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm))
 
 
 def _repairs(path: PathSummary, program: ProgramLink) -> bool:
