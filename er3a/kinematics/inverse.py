@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from er3a.errors import PoseError, ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
+from er3a.kinematics import solutions
 from er3a.kinematics.by_class import (
     LazySelfMotions,
     arm_solver,
@@ -28,24 +29,6 @@ from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.solutions import (
-    ByClass,
-    DependentJoints,
-    Iteration,
-    NearestMiss,
-    NoSolutionOfClass,
-    OutOfReach,
-    PoseUnsolved,
-    SideUnsolved,
-    Solutions,
-    Unsolved,
-    WristTiltsTooLittle,
-    WristTooFar,
-    WristTooNear,
-    WristTooNearAxis1,
-    side_of,
-    slot_labels,
-)
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import equivalents_within, within
@@ -66,7 +49,7 @@ def inverse(
     q_ref: Reals | None = None,
     redundancy: Reals | None = None,
     self_motion_rows: bool = False,
-) -> Solutions:
+) -> solutions.Solutions:
     """All joint solutions of one pose of the tool, by the class of the arm's geometry.
 
     Where a joint is free, the member of each family within the limits that is nearest to ``q_ref`` is among the rows,
@@ -113,7 +96,7 @@ def inverse(
     q, branch = _stacked(slots, rows, 6)
     inside = within(robot, q)
     unsolved = _unsolved(robot, fault, gap)
-    return Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
+    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
 
 
 def _with_own(robot: Robot, T: Reals, q_ref: Reals, q: Reals, slots: list[int], rows: list[Reals]) -> None:
@@ -139,7 +122,9 @@ def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals
     return q, np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
 
 
-def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool) -> Solutions:
+def _by_class(
+    robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool
+) -> solutions.Solutions:
     solver = arm_solver(robot).chain
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
@@ -174,7 +159,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
             branches.append(slot_of(robot, T, q_ref))
             rows.append(q_ref[None])
             certain = False
-    unsolved: tuple[Unsolved, ...] = ()
+    unsolved: tuple[solutions.Unsolved, ...] = ()
     if not branches:
         open_pose = bool(solver.parameters)
         near = missed_row(robot, T, q_ref)
@@ -185,12 +170,12 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
             certain = False
         else:
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
-            miss = NearestMiss(position * 1000, float(np.degrees(rotation)))
-            unsolved = (PoseUnsolved(0, NoSolutionOfClass(miss)),)
+            miss = solutions.NearestMiss(position * 1000, float(np.degrees(rotation)))
+            unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(miss)),)
     q, branch = _stacked(branches, rows, robot.joints)
     inside = within(robot, q)
-    method = ByClass(solver.code, bool(certain), bool(slot_labels(robot)))
-    return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, traced)
+    method = solutions.ByClass(solver.code, bool(certain), bool(solutions.slot_labels(robot)))
+    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, traced)
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
@@ -200,7 +185,7 @@ def is_complete(robot: Robot, certainty: Integers) -> Flags:
     return np.asarray((certainty == CERTAIN) | closed)
 
 
-def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
+def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
     """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
     it can."""
     open_pose = bool(parameters_of(robot))
@@ -220,7 +205,7 @@ def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[i
     return [0], [_rows_of_branch(robot, q, q_ref)]
 
 
-def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
+def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
     arms = all_found(robot, T, starts_of(robot))
     solves = np.abs(forward(robot, q_ref) - T).max() <= SOLVES
     if solves and not (len(arms) and max_joint_move(np.asarray(arms), q_ref).min() < SAME_MEMBER):
@@ -228,8 +213,8 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
     q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     inside = within(robot, q)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
-    method = Iteration(starts_of(robot), missing_class(robot))
-    return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
+    method = solutions.Iteration(starts_of(robot), missing_class(robot))
+    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
 
 
 def starts_of(robot: Robot) -> int:
@@ -237,9 +222,9 @@ def starts_of(robot: Robot) -> int:
     return STARTS_OF_DEPENDENT if arm_solver(robot).chain.code == "dependent" else STARTS
 
 
-def missing_class(robot: Robot) -> ClosedFormMissing | DependentJoints | None:
+def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints | None:
     """Why the arm is solved by iteration."""
-    return DependentJoints() if arm_solver(robot).chain.code == "dependent" else closed_form_missing(robot)
+    return solutions.DependentJoints() if arm_solver(robot).chain.code == "dependent" else closed_form_missing(robot)
 
 
 def checked_reference(robot: Robot, q_ref: Reals | None) -> Reals:
@@ -277,23 +262,27 @@ def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     return rows[np.argsort(max_joint_move(rows, q_ref), kind="stable")]
 
 
-def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[SideUnsolved, ...]:
+def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.SideUnsolved, ...]:
     found = []
     for shoulder in (0, 1):
         part = slice(4 * shoulder, 4 * shoulder + 4)
         if (fault[part] == REACHED).any():
             continue
         best = 4 * shoulder + int(np.argmin(gap[part]))
-        found.append(SideUnsolved(side_of(robot, best), _out_of_reach(robot, int(fault[best]), float(gap[best]))))
+        found.append(
+            solutions.SideUnsolved(
+                solutions.side_of(robot, best), _out_of_reach(robot, int(fault[best]), float(gap[best]))
+            )
+        )
     return tuple(found)
 
 
-def _out_of_reach(robot: Robot, fault: int, gap: float) -> OutOfReach:
+def _out_of_reach(robot: Robot, fault: int, gap: float) -> solutions.OutOfReach:
     arm = wrist_partitioned_arm(robot)
     if fault == ORIENTATION:
-        return WristTiltsTooLittle(float(np.degrees(gap)))
+        return solutions.WristTiltsTooLittle(float(np.degrees(gap)))
     if fault == OFF_AXIS:
-        return WristTooNearAxis1(gap * 1000)
+        return solutions.WristTooNearAxis1(gap * 1000)
     if fault == TOO_FAR:
-        return WristTooFar(gap * 1000, arm.wrist_reach * 1000)
-    return WristTooNear(gap * 1000, abs(arm.upper_arm_length - arm.forearm_length) * 1000)
+        return solutions.WristTooFar(gap * 1000, arm.wrist_reach * 1000)
+    return solutions.WristTooNear(gap * 1000, abs(arm.upper_arm_length - arm.forearm_length) * 1000)

@@ -227,67 +227,61 @@ class BelowLimit:
 
 
 @dataclass(frozen=True)
-class TooFast:
+class NeededSpeed:
+    """A speed that a joint (from 1) would need, beyond its limit."""
+
+    joint: int
+    needed_deg_s: float
+    limit_deg_s: float
+    slides: bool = False
+
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s / self.limit_deg_s
+
+
+@dataclass(frozen=True)
+class TooFast(NeededSpeed):
     """A joint (from 1) would have to move faster than it can; values are in mm if it ``slides``."""
 
-    joint: int
-    needed_deg_s: float
-    limit_deg_s: float
-    slides: bool = False
     code: Literal["too_fast"] = "too_fast"
 
-    @property
-    def ratio(self) -> float:
-        """What is needed over what is allowed."""
-        return self.needed_deg_s / self.limit_deg_s
-
 
 @dataclass(frozen=True)
-class TooFastIfAssumed:
+class TooFastIfAssumed(NeededSpeed):
     """A joint (from 1), whose maximum speed is assumed, would have to move faster; in mm if it ``slides``."""
 
-    joint: int
-    needed_deg_s: float
-    limit_deg_s: float
-    slides: bool = False
     code: Literal["too_fast_if_assumed"] = "too_fast_if_assumed"
 
+
+@dataclass(frozen=True)
+class NeededAcceleration:
+    """An acceleration that a joint (from 1) would need, beyond its limit."""
+
+    joint: int
+    needed_deg_s2: float
+    limit_deg_s2: float
+    slides: bool = False
+
     @property
     def ratio(self) -> float:
         """What is needed over what is allowed."""
-        return self.needed_deg_s / self.limit_deg_s
+        return self.needed_deg_s2 / self.limit_deg_s2
 
 
 @dataclass(frozen=True)
-class AccelerationTooGreat:
+class AccelerationTooGreat(NeededAcceleration):
     """A joint (from 1) would have to accelerate more than it can; in mm if it ``slides``."""
 
-    joint: int
-    needed_deg_s2: float
-    limit_deg_s2: float
-    slides: bool = False
     code: Literal["acceleration_too_great"] = "acceleration_too_great"
-
-    @property
-    def ratio(self) -> float:
-        """What is needed over what is allowed."""
-        return self.needed_deg_s2 / self.limit_deg_s2
 
 
 @dataclass(frozen=True)
-class AccelerationTooGreatIfAssumed:
+class AccelerationTooGreatIfAssumed(NeededAcceleration):
     """A joint (from 1), whose maximum acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
 
-    joint: int
-    needed_deg_s2: float
-    limit_deg_s2: float
-    slides: bool = False
     code: Literal["acceleration_too_great_if_assumed"] = "acceleration_too_great_if_assumed"
-
-    @property
-    def ratio(self) -> float:
-        """What is needed over what is allowed."""
-        return self.needed_deg_s2 / self.limit_deg_s2
 
 
 @dataclass(frozen=True)

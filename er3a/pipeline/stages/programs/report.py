@@ -15,14 +15,7 @@ from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, rem
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.programs.model import (
-    FindingAt,
-    Instructions,
-    Lines,
-    ProgramMotion,
-    ProgramsResults,
-    ProgramSummary,
-)
+from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.played import motions, stretches
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
@@ -59,7 +52,7 @@ class ProgramSection:
     """A program on the page, and what it says in the page's language; ``worst``: the finding that weighs most, and
     ``to_do`` about it."""
 
-    program: ProgramSummary
+    program: model.ProgramSummary
     status: str
     language: str
     cycle: str
@@ -69,7 +62,7 @@ class ProgramSection:
     elsewhere: list[list[str]]
 
 
-def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
     """Write the page of a robot's programs."""
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
@@ -90,9 +83,9 @@ def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     )
 
 
-def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSection:
+def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> ProgramSection:
     own = Path(program.file).name
-    found: dict[int, list[FindingAt]] = defaultdict(list)
+    found: dict[int, list[model.FindingAt]] = defaultdict(list)
     elsewhere = []
     for each in sorted(program.findings, key=_when):
         if each.file == own and each.line:
@@ -110,11 +103,11 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     return ProgramSection(program, status, *texts, lines, elsewhere)
 
 
-def _when(each: FindingAt) -> float:
+def _when(each: model.FindingAt) -> float:
     return next((time for time in (each.program_s, each.motion_s) if time is not None), np.inf)
 
 
-def _worst(program: ProgramSummary) -> tuple[Markup, str]:
+def _worst(program: model.ProgramSummary) -> tuple[Markup, str]:
     """The first of the findings that weigh most, with its line, and what to do there; empty where a program passes."""
     found = min(program.findings, key=lambda each: (-RANKS[each.level], _when(each)), default=None)
     if found is None or program.outcome == "pass":
@@ -125,7 +118,7 @@ def _worst(program: ProgramSummary) -> tuple[Markup, str]:
     return Markup(tr("line {line}: {text}", line=found.line, text=remark)) if found.line else remark, to_do
 
 
-def _remark(name: str, each: FindingAt) -> Markup:
+def _remark(name: str, each: model.FindingAt) -> Markup:
     """What was found, after the moment at which it begins: a link to it where the player shows it."""
     often = tr("{times} times that the line is carried out", times=each.times) if each.times > 1 else ""
     text = escape(bracketed(say(each.finding), often))
@@ -139,7 +132,11 @@ def _remark(name: str, each: FindingAt) -> Markup:
 
 
 def _listing(
-    program: ProgramSummary, text: Lines, rows: Instructions, motion: ProgramMotion, found: dict[int, list[FindingAt]]
+    program: model.ProgramSummary,
+    text: model.Lines,
+    rows: model.Instructions,
+    motion: model.ProgramMotion,
+    found: dict[int, list[model.FindingAt]],
 ) -> list[ListingLine]:
     name = program.name
     moves: dict[int, list[int]] = defaultdict(list)
@@ -172,7 +169,7 @@ def _listing(
     return lines
 
 
-def _facts(rows: Instructions, here: list[int]) -> str:
+def _facts(rows: model.Instructions, here: list[int]) -> str:
     """Duration and clearance of the motions of a line."""
     times = rows.duration_s[here] if here else np.empty(0)
     clear = rows.clearance_mm[here] if here else np.empty(0)

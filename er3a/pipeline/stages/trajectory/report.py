@@ -29,19 +29,7 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.trajectory.model import (
-    AvoidanceRows,
-    LimitsUsed,
-    NearThresholds,
-    PathChecks,
-    PathSummary,
-    ProgramFiles,
-    Singularity,
-    StrategyMotion,
-    TrajectoryResults,
-    TrajectorySummary,
-    TriedStrategy,
-)
+from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
 from er3a.pipeline.stages.trajectory.played import WEIGHTS, kinds, motions
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
@@ -84,7 +72,7 @@ class ProgramLink:
 class PathSection:
     """A path on the page: the record, and what it says in the page's language."""
 
-    path: PathSummary
+    path: model.PathSummary
     status: str
     verdict: str
     kind: str
@@ -101,7 +89,7 @@ class PathSection:
     figure: PathDrawing | None
 
 
-def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) -> None:
     """Write the trajectory page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
     summary, checks, avoidance = results.summary, results.checks, results.avoidance
@@ -135,23 +123,23 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
     )
 
 
-def _worst_first(paths: Sequence[PathSummary]) -> Sequence[PathSummary]:
+def _worst_first(paths: Sequence[model.PathSummary]) -> Sequence[model.PathSummary]:
     """Those that fail first, of them those that were not expected to."""
     ranks = ("fail", "caution", "plain")
     return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), path.expect == path.verdict))
 
 
-def _programs(rows: ProgramFiles) -> list[ProgramLink]:
+def _programs(rows: model.ProgramFiles) -> list[ProgramLink]:
     texts = zip(rows.file.tolist(), rows.text.tolist())
     return [ProgramLink(file, packed_text(text), not text) for file, text in texts]
 
 
 def _section(
-    path: PathSummary,
-    rows: PathChecks,
+    path: model.PathSummary,
+    rows: model.PathChecks,
     figure: PathDrawing | None,
     programs: list[ProgramLink],
-    summary: TrajectorySummary,
+    summary: model.TrajectorySummary,
 ) -> PathSection:
     near = _near_assumed(path, summary)
     only_assumed = WEIGHTS[path.verdict] == "plain" and near
@@ -174,7 +162,7 @@ def _section(
     )
 
 
-def _near_assumed(path: PathSummary, summary: TrajectorySummary) -> str:
+def _near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> str:
     """That a path is clear of assumed shapes by less than these may be wrong by; else empty."""
     shapes = summary.verdict.shapes
     if shapes is None or path.name not in shapes.near or path.clearance is None:
@@ -182,12 +170,17 @@ def _near_assumed(path: PathSummary, summary: TrajectorySummary) -> str:
     return say(ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm))
 
 
-def _repairs(path: PathSummary, program: ProgramLink) -> bool:
+def _repairs(path: model.PathSummary, program: ProgramLink) -> bool:
     return program.file.rpartition(".")[0] == repair_name(path.name)
 
 
 def _figure(
-    figure: PathFigure, robot: Robot, path: PathSummary, rows: PathChecks, motions: AvoidanceRows, near: NearThresholds
+    figure: PathFigure,
+    robot: Robot,
+    path: model.PathSummary,
+    rows: model.PathChecks,
+    motions: model.AvoidanceRows,
+    near: model.NearThresholds,
 ) -> PathDrawing:
     alt = tr(
         "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
@@ -200,7 +193,7 @@ def _figure(
     return PathDrawing(uri, alt, _conclusion(path, rows), width, figure.panels(), readings(figure.figure))
 
 
-def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
+def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
     """The rows that a curve needs: evenly spread ones, those at singular poses, and the maximum speeds."""
     even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
     events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
@@ -209,7 +202,7 @@ def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
     return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def _faults(path: PathSummary) -> list[list[str]]:
+def _faults(path: model.PathSummary) -> list[list[str]]:
     return [
         [
             word,
@@ -225,7 +218,7 @@ def _faults(path: PathSummary) -> list[list[str]]:
     ]
 
 
-def _strategies(path: PathSummary) -> list[list[str]]:
+def _strategies(path: model.PathSummary) -> list[list[str]]:
     """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
     if not path.avoidance:
         return []
@@ -245,7 +238,7 @@ def _strategies(path: PathSummary) -> list[list[str]]:
     return rows
 
 
-def _costs(motion: StrategyMotion) -> list[str]:
+def _costs(motion: model.StrategyMotion) -> list[str]:
     return [
         _small(motion.max_deviation_mm),
         _small(motion.max_deviation_deg),
@@ -260,7 +253,7 @@ def _clearance(value: float | None) -> str:
     return "–" if value is None else fixed(value, 0)
 
 
-def _remark(tried: TriedStrategy, motion: StrategyMotion) -> str:
+def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
     if tried.reasons:
         return tr("not usable: {reason}", reason=reasons(tried))
     if tried.name == "detour":
@@ -276,7 +269,7 @@ def _small(value: float) -> str:
     return "0" if value < 5e-4 else number(value, 3)
 
 
-def _conclusion(path: PathSummary, rows: PathChecks) -> str:
+def _conclusion(path: model.PathSummary, rows: model.PathChecks) -> str:
     """What the curves show, in one or two sentences."""
     condition, parts = rows.condition_number, []
     joint = path.fastest_joint
@@ -295,7 +288,7 @@ def _conclusion(path: PathSummary, rows: PathChecks) -> str:
     return " ".join(parts)
 
 
-def _speed(path: PathSummary, limits: LimitsUsed) -> str:
+def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
     """The speed of the joint that comes nearest to its limit."""
     speeds = path.max_joint_speed_deg_s
     if not speeds:
@@ -305,7 +298,7 @@ def _speed(path: PathSummary, limits: LimitsUsed) -> str:
     return f"{number(speeds[joint], 3)}{unit} (J{joint + 1})"
 
 
-def _event_row(path: str, event: Singularity) -> list[str]:
+def _event_row(path: str, event: model.Singularity) -> list[str]:
     until = f" – {fixed(event.until_s, 6)}" if event.until_s > event.t_s else ""
     when = moment(path, event.t_s, fixed(event.t_s, 6) + until)
     if event.crossing:
