@@ -634,21 +634,20 @@ def leading_joint_speed(ready: ReadyMotion, robot: Robot | None) -> float | None
 
 def tool_speed(ready: ReadyMotion) -> float | None:
     """The speed of a line or arc, m/s; None if the program's is not known."""
-    speed = ready.motion.speed
-    if speed is None or speed.unit not in ("m/s", "s"):
-        return None
-    if speed.unit == "m/s":
-        return speed.value
-    length = ready.length
-    return length / speed.value if length and speed.value > 0 else None
+    return _by_length(ready, "m/s")
 
 
 def duration(ready: ReadyMotion) -> float | None:
     """How long a motion takes, s, where the program gives that, or the speed of its tool."""
+    return _by_length(ready, "s")
+
+
+def _by_length(ready: ReadyMotion, unit: str) -> float | None:
+    """A program's speed (m/s) or time (s) in one of both units, the other one by the length of the way."""
     speed = ready.motion.speed
     if speed is None or speed.unit not in ("m/s", "s"):
         return None
-    if speed.unit == "s":
+    if speed.unit == unit:
         return speed.value
     length = ready.length
     return length / speed.value if length and speed.value > 0 else None

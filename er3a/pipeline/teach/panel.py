@@ -13,7 +13,6 @@ from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length, wrist_and_forearm
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing, has_branches
@@ -269,13 +268,12 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     validated = results / name / "validation"
     first_caveat = caveat(read_status(validated) if (validated / SUMMARY).exists() else "not_computed")
     near = near_singular(study.section(TrajectorySettings))
-    scene_file = study.scene(name, "trajectory")
     inputs = input_records(study.inputs(name, "teach"))
     write_panel(
         study.robot(name),
         output,
         near=near,
-        scene=load_scene(scene_file) if scene_file else None,
+        scene=study.scene(name, "trajectory"),
         robot_pages=study.pages(name),
         first_caveat=first_caveat,
         command=run_command(study, f"{name}/teach.html"),

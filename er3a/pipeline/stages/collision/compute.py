@@ -19,7 +19,6 @@ from er3a.collision.free_space import (
 from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import Pair
 from er3a.collision.shapes import shapes_assumed
-from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import MANY_TARGETS
@@ -130,8 +129,7 @@ SAMPLES_STREAM, PLACES_STREAM = 0, 1
 def compute(study: Study, name: str) -> model.CollisionResults:
     """Work out where a robot of the study is free of collisions."""
     robot, settings = study.robot(name), study.section(CollisionSettings)
-    scene_file = study.scene(name, STAGE)
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, STAGE)
     bodies = Bodies(robot, scene)
     space = sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])

@@ -9,10 +9,9 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colors import ListedColormap
 
 from er3a.collision.pairs import TRIED
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
+from er3a.pipeline.messages.collision import body_word, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, say
@@ -23,7 +22,7 @@ from er3a.pipeline.stages.collision.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
+from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -194,14 +193,10 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
     nearest = closest[0] if closest else None
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{name}/collision.html"),
-        robot=robot,
-        robot_pages=study.pages(name),
         matrix=_matrix(robot, results.matrix, results.summary.verdict.shapes is not None),
         tried=TRIED,
         by_pair=by_pair(results.pairs),
@@ -209,7 +204,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         workspace=workspace(results),
         targets=_targets(results.targets),
         clearance=clearance_over_time(results),
-        player=player(robot, motions(robot, results), load_scene(scene) if scene else None),
+        player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MOST_ROWS]],
         rows_left_out=max(len(closest), len(set(results.targets.target))) - MOST_ROWS,

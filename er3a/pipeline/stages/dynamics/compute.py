@@ -15,7 +15,6 @@ from er3a.dynamics.plausibility import MassFinding, MissingLink, mass_findings
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import load_of
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Status, Verdict
@@ -547,8 +546,7 @@ def _paths(
     joints, trajectory = arm.robot.joints, study.section(TrajectorySettings)
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
-    scene = study.scene(name, "trajectory")
-    bodies = Bodies(study.robot(name), load_scene(scene) if scene else None)
+    bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
     surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
     judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
     found, skipped = [], []

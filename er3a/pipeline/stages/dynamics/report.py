@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from er3a.pipeline.messages.dynamics import BINDING, FIGURES, payload_text, quantity_word
+from er3a.pipeline.messages.dynamics import BINDING, payload_text, quantity_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
@@ -18,7 +18,7 @@ from er3a.pipeline.stages.dynamics.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command
+from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
 DRAWN = 161
@@ -148,14 +148,10 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
     ]
     holding = holding_figure(summary) if summary.holding else None
     diagram = diagram_figure(summary, results.diagram) if len(results.diagram) else None
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{stored.robot}/dynamics.html"),
-        robot=robot,
-        robot_pages=study.pages(stored.robot),
         payload=payload_text(summary, robot),
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),

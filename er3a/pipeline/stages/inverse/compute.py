@@ -13,7 +13,6 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
-from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.geometry.transforms import rotation_angle, rpy_of, transform
 from er3a.kinematics.batch import inverse_batch
@@ -380,8 +379,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets, robot)
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
-    scene_file = study.scene(name, STAGE)
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, STAGE)
     assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
     clearance = (motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm) / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()

@@ -22,7 +22,6 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import ClosedForm, Iteration
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
-    FIGURES,
     FREE_AT,
     NEAREST_RULE,
     ORIENTATION_TITLES,
@@ -39,7 +38,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command
+from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, colour_of, shape_of
 from er3a.robots.joint_limits import LimitsExceeded, meant, shown
 from er3a.robots.robot import Robot
@@ -372,14 +371,10 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
     rules = list(dict.fromkeys(results.rankings.rule))
     correction = _correction(robot, stored)
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{name}/inverse.html"),
-        robot=robot,
-        robot_pages=study.pages(name),
         nearest_rule=tr(NEAREST_RULE),
         overview=[_overview_row(target) for target in chosen],
         sections=[_section(robot, target, results, rules, correction) for target in chosen],

@@ -11,7 +11,6 @@ from er3a.collision.along import bodies_of
 from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
@@ -49,8 +48,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     robot = study.robot(name)
     file = study.entry(name).programs
     listed = load_programs(file) if file else ProgramsFile(kind="programs")
-    scene_file = study.scene(name, "trajectory")
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, "trajectory")
     options = replace(_options(study, listed, robot), scene=scene)
     summaries: list[model.ProgramSummary] = []
     lines: list[model.Lines] = []

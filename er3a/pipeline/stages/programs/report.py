@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup, escape
 
-from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, remedies, remedy_at
+from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
@@ -19,7 +18,7 @@ from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.played import motions, stretches
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.pipeline.viewing.page import head_of, render, run_command
+from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import RANKS, Level, worst_of
 from er3a.programs.languages import LANGUAGES
 
@@ -66,19 +65,15 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
     """Write the page of a robot's programs."""
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
-    solids = load_scene(scene) if scene else None
     sections = [_section(results, program) for program in summary.programs]
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES, {each.name: f"#{each.name}" for each in summary.programs}),
-        command=run_command(study, f"{stored.robot}/programs.html"),
-        robot=robot,
-        robot_pages=study.pages(stored.robot),
+        head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
-        player=player(robot, motions(robot, results), solids),
-        bodies=[each.name for each in solids.solids] if solids else [],
+        player=player(robot, motions(robot, results), scene),
+        bodies=[each.name for each in scene.solids] if scene else [],
         drawing_head=drawing_head(),
     )
 

@@ -13,7 +13,6 @@ from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps, PairTooNear
 from er3a.collision.shapes import arm_shapes, shapes_assumed
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, factors_where_defined
@@ -365,8 +364,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     file = Path(study.entry(name).paths)
     thresholds = model.NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
     required, limits = proof_requirements(robot, settings), limits_of(robot, settings)
-    near, scene_file = required.near, study.scene(name, "trajectory")
-    scene = load_scene(scene_file) if scene_file else None
+    near, scene = required.near, study.scene(name, "trajectory")
     surroundings = judgement.Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, surroundings.bodies, study.seed)

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import say
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import (
-    FIGURES,
     advice,
     cause_text,
     event_distance,
@@ -36,7 +34,7 @@ from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import head_of, packed_text, render, run_command
+from er3a.pipeline.viewing.page import packed_text, render_stage
 from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.programs.languages import titles_unwritten
 from er3a.robots.robot import Robot
@@ -94,7 +92,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     robot, results = study.robot(stored.robot), stored.results
     summary, checks, avoidance = results.summary, results.checks, results.avoidance
     scene = study.scene(stored.robot, stored.stage)
-    solids = load_scene(scene) if scene else None
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
     paths = _worst_first(summary.paths) if count < len(summary.paths) else summary.paths
@@ -104,21 +101,18 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
         sections.append(_section(path, rows, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES, {path.name: f"#{path.name}" for path in summary.paths}),
-        command=run_command(study, f"{stored.robot}/trajectory.html"),
-        robot=robot,
-        robot_pages=study.pages(stored.robot),
+        head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results, count),
         assumed=assumed,
         drawn_paths=count,
-        turning=in_space(robot, results, paths[:count], solids),
-        player=player(robot, motions(robot, results), solids),
+        turning=in_space(robot, results, paths[:count], scene),
+        player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
     )
 

@@ -33,8 +33,7 @@ from er3a.pipeline.viewing.page import (
     Picture,
     alternative_table,
     head_of,
-    render,
-    run_command,
+    render_stage,
     text_address,
 )
 from er3a.references.subjects import SegmentInclination
@@ -283,14 +282,12 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     corrected, _ = validation_figures.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
     text = yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True)) if corrected else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
         head=_head(stored, instead),
-        command=run_command(study, f"{name}/validation.html"),
         robot=robot,
-        robot_pages=study.pages(name),
         fold=contradicted,
         to_use=table_to_use(robot, study.robot(instead)) if instead else None,
         table_evidence=evidence_section(summary.evidence),

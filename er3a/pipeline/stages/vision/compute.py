@@ -16,7 +16,6 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
-from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import ObjectEntry, VisionFile, load_vision
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import rpy_of
@@ -331,8 +330,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     task_file = load_vision(file, robot)
     head_path = file.parent / task_file.calibration
     head = load(HandEyeFile, head_path)
-    scene_file = study.scene(name, STAGE)
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, STAGE)
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")

@@ -10,7 +10,6 @@ from markupsafe import Markup
 from matplotlib.ticker import MaxNLocator
 
 from er3a.files.hand_eye_file import HandEyeFile, grey_image
-from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
 from er3a.numerics.arrays import Reals
@@ -18,7 +17,6 @@ from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.messages.vision import (
     DIRECTION_STATUS,
-    FIGURES,
     METHODS,
     correction_verdict,
     direction_word,
@@ -32,7 +30,7 @@ from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command, text_address
+from er3a.pipeline.viewing.page import Picture, panel_link, render_stage, text_address
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 from er3a.programs.languages import titles_unwritten
 from er3a.vision.table_corrections import NoCorrections
@@ -190,14 +188,10 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
     robot = study.robot(name)
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{name}/vision.html"),
-        robot=robot,
-        robot_pages=study.pages(name),
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
@@ -218,7 +212,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
-        player=player(robot, _motions(results), load_scene(scene) if scene else None),
+        player=player(robot, _motions(results), scene),
         drawing_head=drawing_head(),
         next_pose=panel_link(found.next_view.q_deg, _listed(found.next_view.q_deg))
         if found and found.next_view

@@ -12,7 +12,6 @@ from er3a.collision.along import bodies_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.reference_sets import check_reference_file, reference_folder
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.si_units import stated
@@ -168,8 +167,7 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> mod
     voids = proven_voids(robot, proven, hull, shoulder)
     if not proven.settles:
         voids += sampled_only(in_cloud, grid, shoulder, voids)
-    scene_file = study.scene(name, "capability")
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, "capability")
     assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
     margin = motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm
     asked = study.section(CapabilitySettings)

@@ -20,7 +20,6 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Logged, Recorded, escaped, write_recording
 from er3a.robots.robot import Robot
 
-STAGE = "workspace"
 POINT_SHARE = 0.16  # radius of a point of the cloud, of the mean distance between points
 DIMMEST = 0.4  # of the colour scale: darker points can't be seen on the viewer's ground
 _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
@@ -34,7 +33,7 @@ def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     shown = Recorded(
         robot=robot,
         name=stored.robot,
-        stage=STAGE,
+        stage=stored.stage,
         note=_note(robot, results.summary),
         views={
             "Cloud, near half cut away": ["cloud/far/**"],

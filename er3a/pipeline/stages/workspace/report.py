@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from er3a.collision.scene import Scene
-from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS, entry_word
+from er3a.pipeline.messages.workspace import VOID_KINDS, VOID_STATUS, entry_word
 from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
@@ -27,7 +26,7 @@ from er3a.pipeline.stages.workspace.workspace_figures import (
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
+from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
 from er3a.workspace.causes import joints_after
 
@@ -37,16 +36,11 @@ LISTED = 12
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
     """Render the workspace page of a robot from its results."""
     robot, results = study.robot(stored.robot), stored.results
-    summary, file = results.summary, study.scene(stored.robot, "capability")
-    scene = load_scene(file) if file else None
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    summary, scene = results.summary, study.scene(stored.robot, "capability")
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{stored.robot}/workspace.html"),
-        robot=robot,
-        robot_pages=study.pages(stored.robot),
         side=_side(robot, results),
         arc_rows=arc_rows(results.border),
         method=say(summary.proof.method),
