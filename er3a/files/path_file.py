@@ -443,28 +443,26 @@ class ArcTo(LineTo):
         return replace(super().segment(), via=np.array(self.via_mm) / 1000)
 
 
-class LinePath(ToolStart, LineTo):
+class ToolMovePath(ToolStart, LineTo):
+    """One line or arc of the tool."""
+
+    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
+        """The path in SI units."""
+        return commands.ToolMoveCommand(
+            self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source
+        )
+
+
+class LinePath(ToolMovePath):
     """A straight line of the tool."""
 
     kind: Literal["line"]
 
-    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
-        """The path in SI units."""
-        return commands.ToolMoveCommand(
-            self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source
-        )
 
-
-class ArcPath(ToolStart, ArcTo):
+class ArcPath(ToolMovePath, ArcTo):
     """A circular arc of the tool."""
 
     kind: Literal["arc"]
-
-    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
-        """The path in SI units."""
-        return commands.ToolMoveCommand(
-            self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source
-        )
 
 
 class LineSegment(LineTo):

@@ -10,16 +10,7 @@ from numpy.typing import NDArray
 from er3a.errors import PoseError, ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
-from er3a.kinematics import solutions
-from er3a.kinematics.by_class import (
-    LazySelfMotions,
-    arm_solver,
-    checked_parameters,
-    parameters_of,
-    slot_of,
-    slots_of_class,
-    task_mask,
-)
+from er3a.kinematics import by_class, solutions
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, LinkedRows
 from er3a.kinematics.classes.six_revolute import CERTAIN
@@ -125,16 +116,16 @@ def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals
 def _by_class(
     robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool
 ) -> solutions.Solutions:
-    solver = arm_solver(robot).chain
+    solver = by_class.arm_solver(robot).chain
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
-    values = checked_parameters(robot, redundancy, q_ref[None], 1)
-    found = slots_of_class(robot, T[None], q_ref[None], values)
+    values = by_class.checked_parameters(robot, redundancy, q_ref[None], 1)
+    found = by_class.slots_of_class(robot, T[None], q_ref[None], values)
     slots, motions = found.q, found.settled[0].motions if found.settled else ()
     filled = np.flatnonzero(np.isfinite(slots[0, :, 0]))
     traced: Sequence[SelfMotionCurve] = motions
     if len(solver.parameters) == 1:
-        traced = LazySelfMotions(robot, T, q_ref, values)
+        traced = by_class.LazySelfMotions(robot, T, q_ref, values)
         motions = tuple(traced) if self_motion_rows or not filled.size else ()
     if solver.parameters:  # where two branches meet one stands; other arms' poses of that kind are settled
         apart = np.abs(shortest_move(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
@@ -145,18 +136,18 @@ def _by_class(
         for member in (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,):
             listed = np.concatenate([np.empty((0, robot.joints)), *rows])
             if motion.within_limits and max_joint_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
-                branches.append(slot_of(robot, T, member))
+                branches.append(by_class.slot_of(robot, T, member))
                 rows.append(member[None])
     certain = bool(is_complete(robot, found.certainty)[0])
     if not certain and isinstance(solver, LinkedRows):  # the rows found may be members that the linkage can't make
         for row in all_found(robot, T, STARTS):
             if max_joint_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
-                branches.append(slot_of(robot, T, row))
+                branches.append(by_class.slot_of(robot, T, row))
                 rows.append(_rows_of_branch(robot, row, q_ref))
     if redundancy is None and within(robot, q_ref) and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
         listed = np.concatenate([np.empty((0, robot.joints)), *rows])
         if max_joint_move(listed, q_ref).min(initial=np.inf) > MISSED:  # a double root that rounding takes off the axis
-            branches.append(slot_of(robot, T, q_ref))
+            branches.append(by_class.slot_of(robot, T, q_ref))
             rows.append(q_ref[None])
             certain = False
     unsolved: tuple[solutions.Unsolved, ...] = ()
@@ -180,7 +171,7 @@ def _by_class(
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
     """Whether the class found all solutions of poses (N,), of which it is so certain (N,)."""
-    solver = arm_solver(robot).chain
+    solver = by_class.arm_solver(robot).chain
     closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
     return np.asarray((certainty == CERTAIN) | closed)
 
@@ -188,18 +179,20 @@ def is_complete(robot: Robot, certainty: Integers) -> Flags:
 def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
     """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
     it can."""
-    open_pose = bool(parameters_of(robot))
-    near = nearest_arm(robot, T, q_ref, task_mask(robot), open_pose, MISS_RESTARTS)
+    open_pose = bool(by_class.parameters_of(robot))
+    near = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), open_pose, MISS_RESTARTS)
     if open_pose or not near.solved or within(robot, near.q):
         return near
-    inside = nearest_arm(robot, T, q_ref, task_mask(robot), True, MISS_RESTARTS)
+    inside = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), True, MISS_RESTARTS)
     return inside if inside.solved else near
 
 
 def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[int], list[Reals]]:
     """Branches and rows of a pose that joint values (n,) solve: all at their redundancy parameters, else they."""
-    if parameters_of(robot):
-        slots = slots_of_class(robot, T[None], q_ref[None], checked_parameters(robot, None, q[None], 1)).q[0]
+    if by_class.parameters_of(robot):
+        slots = by_class.slots_of_class(
+            robot, T[None], q_ref[None], by_class.checked_parameters(robot, None, q[None], 1)
+        ).q[0]
         if branches := np.flatnonzero(np.isfinite(slots[:, 0])).tolist():
             return branches, [_rows_of_branch(robot, slots[slot], q_ref) for slot in branches]
     return [0], [_rows_of_branch(robot, q, q_ref)]
@@ -219,12 +212,16 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
 
 def starts_of(robot: Robot) -> int:
     """How many random starts look for the solutions of an arm that no class solves."""
-    return STARTS_OF_DEPENDENT if arm_solver(robot).chain.code == "dependent" else STARTS
+    return STARTS_OF_DEPENDENT if by_class.arm_solver(robot).chain.code == "dependent" else STARTS
 
 
 def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints | None:
     """Why the arm is solved by iteration."""
-    return solutions.DependentJoints() if arm_solver(robot).chain.code == "dependent" else closed_form_missing(robot)
+    return (
+        solutions.DependentJoints()
+        if by_class.arm_solver(robot).chain.code == "dependent"
+        else closed_form_missing(robot)
+    )
 
 
 def checked_reference(robot: Robot, q_ref: Reals | None) -> Reals:

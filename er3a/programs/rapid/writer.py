@@ -15,15 +15,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, writing
-from er3a.programs.rapid.data_types import (
-    AXIS_SPEED,
-    LEAST_LOAD,
-    SLIDE_SPEED,
-    TOOL_SPEEDS,
-    TURN_SPEED,
-    ZONES,
-    quarters_of,
-)
+from er3a.programs.rapid import data_types
 from er3a.robots.masses import MassBody
 
 NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -113,7 +105,7 @@ class RapidWriter(writing.Writer):
         joints = ready.joints if not self.own and ready.motion.kind != "joint" else None
         if joints is None or len(joints) != 6 or np.isnan(joints).any():
             return "[0,0,0,0]"
-        return "[" + ",".join(map(str, quarters_of(joints))) + ",0]"
+        return "[" + ",".join(map(str, data_types.quarters_of(joints))) + ",0]"
 
     def _frame(self, frame: instructions.NamedFrame, kind: str) -> str:
         """The name of a tool or work object, which is declared once."""
@@ -152,10 +144,12 @@ class RapidWriter(writing.Writer):
         if speed.unit == "m/s":
             self.set_once("vel", "VelSet 100,5000;")
             along = speed.value * 1000
-            turn = TURN_SPEED if motion.turn_speed is None else math.degrees(motion.turn_speed)
-            if along in TOOL_SPEEDS and abs(turn - TURN_SPEED) < 1e-9:
+            turn = data_types.TURN_SPEED if motion.turn_speed is None else math.degrees(motion.turn_speed)
+            if along in data_types.TOOL_SPEEDS and abs(turn - data_types.TURN_SPEED) < 1e-9:
                 return f"v{along:g}"
-            return f"[{writing.short(along)},{writing.short(turn)},{SLIDE_SPEED:g},{AXIS_SPEED:g}]"
+            return (
+                f"[{writing.short(along)},{writing.short(turn)},{data_types.SLIDE_SPEED:g},{data_types.AXIS_SPEED:g}]"
+            )
         share = writing.share_of_max(ready, self.robot)
         if speed.unit != "share":
             self.count["estimated"] += 1
@@ -173,7 +167,7 @@ class RapidWriter(writing.Writer):
             self.count["zones"] += zone.kind != "fine"
             return "fine"
         size = zone.value * 1000
-        name = next((name.lower() for name, sizes in ZONES.items() if abs(sizes[0] - size) < 1e-9), "")
+        name = next((name.lower() for name, sizes in data_types.ZONES.items() if abs(sizes[0] - size) < 1e-9), "")
         own, wide, turn = (writing.short(share * size) for share in (1.0, 1.5, 0.15))
         return name or f"[FALSE,{own},{wide},{wide},{turn},{wide},{turn}]"
 
@@ -196,7 +190,7 @@ def _joints_text(joints: Reals) -> str:
 def _load_text(load: MassBody | None) -> str:
     """loaddata, with the principal axes of the inertia; the least that a controller takes if it is not known."""
     if load is None:
-        return f"[{LEAST_LOAD},[0,0,{LEAST_LOAD}],[1,0,0,0],0,0,0]"
+        return f"[{data_types.LEAST_LOAD},[0,0,{data_types.LEAST_LOAD}],[1,0,0,0],0,0,0]"
     pose, moments = writing.principal_axes(load)
     quaternion = ",".join(writing.fixed(each, QUATERNION_DIGITS) for each in instructions.numbers_of(pose, "abb")[3:])
     centre = ",".join(writing.short(each * 1000) for each in load.centre)

@@ -6,16 +6,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from er3a.collision import free_space
 from er3a.collision.bodies import Bodies
-from er3a.collision.free_space import (
-    DEPTH,
-    ClearPlaces,
-    JointSpace,
-    Share,
-    find_places,
-    joined_to_home,
-    sample_joint_space,
-)
 from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import Pair
 from er3a.collision.shapes import shapes_assumed
@@ -131,14 +123,14 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     robot, settings = study.robot(name), study.section(CollisionSettings)
     scene = study.scene(name, STAGE)
     bodies = Bodies(robot, scene)
-    space = sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
+    space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
-    places = find_places(bodies, space, settings.cells_across, settings.rounds, random)
+    places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
     home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
     least, nearest = bodies.min_distance(home[None])
     at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and least[0] < 0 else None
     if at_home is None:
-        places.joined[:] = joined_to_home(bodies, places, home, settings.neighbours)
+        places.joined[:] = free_space.joined_to_home(bodies, places, home, settings.neighbours)
     targets, at_targets = target_clearances(robot, bodies, study.entry(name).targets)
     tolerance = settings.penetration_tolerance_mm / 1000
     motions = list(study_motions(study, name, CHECKS))
@@ -167,7 +159,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             of_scene=_share(space.of_scene),
             whole=_share(space.whole),
             home_deg=None if at_home else tuple(shown(robot, home).tolist()),
-            proven_m=DEPTH,
+            proven_m=free_space.DEPTH,
             penetration_tolerance_mm=settings.penetration_tolerance_mm,
             places=places_found,
             mounting=mounting,
@@ -223,24 +215,24 @@ def _matrix(bodies: Bodies) -> model.MatrixRows:
     ).of_joints(robot.slides)
 
 
-def _pair_shares(bodies: Bodies, space: JointSpace) -> model.PairShares:
+def _pair_shares(bodies: Bodies, space: free_space.JointSpace) -> model.PairShares:
     """One row for what the results call a pair; it overlaps where any of its bodies do."""
     numbers: dict[Pair, list[int]] = {}
     for number, pair in enumerate(bodies.pairs):
         numbers.setdefault(pair, []).append(number)
     rows = []
     for pair, own in numbers.items():
-        share = Share(space.count(own), len(space.q))
+        share = free_space.Share(space.count(own), len(space.q))
         always = share.count == share.of and any(bodies.always_overlaps(number) for number in own)
         rows.append((pair, bool(bodies.second[own[0]] >= 0), share.value, *share.interval, always))
     return model.PairShares.of_rows(sorted(rows, key=lambda row: (-row[2], row[0].label)))
 
 
-def _share(share: Share) -> model.FreeShare:
+def _share(share: free_space.Share) -> model.FreeShare:
     return model.FreeShare(share.value, share.interval)
 
 
-def _places_summary(places: ClearPlaces) -> model.PlacesSummary:
+def _places_summary(places: free_space.ClearPlaces) -> model.PlacesSummary:
     cell, clear = places.cell**3, int(places.clear.sum())
     return model.PlacesSummary(
         cell_m=places.cell,
@@ -254,7 +246,9 @@ def _places_summary(places: ClearPlaces) -> model.PlacesSummary:
     )
 
 
-def _free_space(space: JointSpace, places: model.PlacesSummary, undecided: int, assumed: bool) -> model.FreeSpace:
+def _free_space(
+    space: free_space.JointSpace, places: model.PlacesSummary, undecided: int, assumed: bool
+) -> model.FreeSpace:
     return model.FreeSpace(space.whole.value, places.reached, places.clear, places.joined, undecided, assumed)
 
 
@@ -273,8 +267,8 @@ def _verdict(
     return Verdict("caution" if found.undecided or not found.clear else "pass", found)
 
 
-def _figures(space: JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:
-    def percent(name: str, share: Share) -> Figure:
+def _figures(space: free_space.JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:
+    def percent(name: str, share: free_space.Share) -> Figure:
         low, high = share.interval
         return Figure(name, 100 * share.value, "%", 50 * (high - low))
 

@@ -23,9 +23,10 @@ from er3a.collision.scene import Scene
 from er3a.kinematics.forward import skeleton
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, say
-from er3a.pipeline.messages.trajectory import event_word, type_word
+from er3a.pipeline.messages.trajectory import event_word
 from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
@@ -215,7 +216,7 @@ def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> 
     )
     for kind, distance, threshold in curves:
         ratio = np.maximum(np.abs(distance) / threshold, 1e-4)
-        ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=type_word(kind))
+        ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=singularity_word(kind))
     ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
     _logarithmic(ax, 0.01, 100.0)
     ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)

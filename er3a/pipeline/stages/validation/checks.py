@@ -25,15 +25,7 @@ from er3a.identifiability.statements import (
     is_unexplained,
     not_the_robot_described,
 )
-from er3a.kinematics.round_trips import (
-    MOST_BY_CLASS,
-    NEAR_ELBOW_DEG,
-    NEAR_SHOULDER_MM,
-    NEAR_WRIST_DEG,
-    batch_round_trips,
-    has_class,
-    slot_round_trips,
-)
+from er3a.kinematics import round_trips
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
@@ -224,9 +216,9 @@ def table_checks(robot: Robot) -> list[model.Check]:
 def _class_checks(robot: Robot, poses: int, seed: int) -> list[model.Check]:
     """Round trips of an arm without the closed form of spherical wrists, by its class."""
     missing = closed_form_missing(robot)
-    if missing and not has_class(robot):
+    if missing and not round_trips.has_class(robot):
         return [model.Unjudged(model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", model.NoClosedForm(missing))]
-    found = batch_round_trips(robot, np.random.default_rng(seed), poses)
+    found = round_trips.batch_round_trips(robot, np.random.default_rng(seed), poses)
     return [
         against_itself("unsolved_poses", GROUP, float(found.poses - found.own_found), 0.5),
         against_itself("position_error", GROUP, found.worst_position * 1000, POSITION_TOLERANCE_MM, "mm"),
@@ -240,16 +232,18 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
     """Round trips as checks, and their errors; None if the arm has no closed form."""
     missing = closed_form_missing(robot)
     if missing or robot.coupling is not None:
-        return _class_checks(robot, min(poses, MOST_BY_CLASS), seed), None
-    found = slot_round_trips(robot, poses, seed)
-    note = model.NearSingularLeftOut(poses - found.near_singular, poses, NEAR_WRIST_DEG, NEAR_SHOULDER_MM)
+        return _class_checks(robot, min(poses, round_trips.MOST_BY_CLASS), seed), None
+    found = round_trips.slot_round_trips(robot, poses, seed)
+    note = model.NearSingularLeftOut(
+        poses - found.near_singular, poses, round_trips.NEAR_WRIST_DEG, round_trips.NEAR_SHOULDER_MM
+    )
     checks: list[model.Check] = [
         against_itself("unsolved_poses", GROUP, float(found.unsolved), 0.5),
         against_itself("joint_error", GROUP, found.joint_error_deg, JOINT_TOLERANCE_DEG, "deg", note),
         against_itself("position_error", GROUP, found.position_error_mm, POSITION_TOLERANCE_MM, "mm"),
         against_itself("orientation_error", GROUP, found.orientation_error_deg, ORIENTATION_TOLERANCE_DEG, "deg"),
     ]
-    margins = model.Margins(NEAR_WRIST_DEG, NEAR_ELBOW_DEG, NEAR_SHOULDER_MM)
+    margins = model.Margins(round_trips.NEAR_WRIST_DEG, round_trips.NEAR_ELBOW_DEG, round_trips.NEAR_SHOULDER_MM)
     return checks, model.RoundTripErrors(**asdict(found), margins=margins)
 
 
