@@ -17,7 +17,7 @@ Promise.all([import("er3a/kinematics"), import("er3a/inverse")]).then(([kinemati
     return {
       T: T[6],
       measures: kinematics.conditioning(table, T, length),
-      factors: arm && kinematics.determinantFactors(T, arm.wristInTool),
+      factors: panel.singular_sets && kinematics.determinantFactors(T, panel.singular_sets),
       solved: arm && inverse.inverse(table, arm, T[6], q),
     };
   }));

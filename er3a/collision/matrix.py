@@ -328,18 +328,18 @@ def _overlapping(robot: Robot, pair: tuple[Body, Body], q: Reals, distance: Real
 
 
 def _beside(
-    robot: Robot, pairs: Sequence[tuple[Body, Body]], found: list[JudgedPair], farthest: Reals, boxes: int
+    robot: Robot, pairs: Sequence[tuple[Body, Body]], found: list[JudgedPair], apart: Reals, boxes: int
 ) -> list[JudgedPair]:
     """Judgements of all bodies of two links; of those that no joint explains, the ones beside bodies that one holds.
 
     Housings are often drawn as several bodies, which overlap in the joint's region too. Nothing beyond the region of
-    those that are held is left out for them. ``farthest``: (K, n), joint vectors that hold each pair farthest apart.
+    those that are held is left out for them. ``apart``: (K, n), joint vectors that hold each pair farthest apart.
     """
     held = [each for each in found if each.state == "joined" and each.hub is not None]
     for k, pair in enumerate(pairs):
         for other in held:
             if found[k].state == "overlaps":
-                joined = _joined(robot, pair, farthest[k], Held(other.hub, found[k].boxes), boxes, other.left_out)
+                joined = _joined(robot, pair, apart[k], Held(other.hub, found[k].boxes), boxes, other.left_out)
                 found[k] = joined if joined.state == "joined" else found[k]
     return found
 
@@ -453,19 +453,19 @@ def _in_frame(T: Reals, point: Reals, axis: Reals) -> tuple[Reals, Reals]:
 
 
 def _joined(
-    robot: Robot, pair: tuple[Body, Body], farthest: Reals, held: Held, boxes: int, most: float = np.inf
+    robot: Robot, pair: tuple[Body, Body], apart: Reals, held: Held, boxes: int, most: float = np.inf
 ) -> JudgedPair:
     """A pair that overlaps in every pose: without the region around the joint, judged again.
 
     It just overlaps if that region would have to be larger than ``most`` (m) by more than one step of its growth.
     """
-    centres = _centres(robot, pair, farthest, held.hub)
+    centres = _centres(robot, pair, apart, held.hub)
     last, radius = np.inf, sum(girth(body, centre) for body, centre in zip(pair, centres))
     while radius < SETTLED * last:  # girths of less and less of the bodies, until they hold for what is cut off
         radius, last = sum(girth(body, centre, radius) for body, centre in zip(pair, centres)), radius
     for _ in range(GROWTHS):
         if radius > most * GROWTH:
-            return JudgedPair("overlaps", witness=farthest, boxes=held.boxes)
+            return JudgedPair("overlaps", witness=apart, boxes=held.boxes)
         parts = [trimmed(body, centre, radius) for body, centre in zip(pair, centres)]
         rest = [(first, second) for first in parts[0] for second in parts[1]]
         found = _without_joining(robot, rest, boxes)

@@ -7,6 +7,8 @@ from typing import Literal
 
 BASE = 0  # number of the link that stands still
 TRIED = 1024  # joint vectors, spread over the limits, in which each pair is tried
+PENETRATION_TOLERANCE = 0.001  # m; no overlap deeper than this goes unnoticed, where nothing else is asked
+ASSUMED_MARGIN = 0.02  # m, within which of assumed shapes nothing is settled, where nothing else is asked
 
 
 @dataclass(frozen=True)

@@ -29,19 +29,8 @@ import scipy
 from er3a.dynamics.arm_model import ArmModel, drives_of
 from er3a.dynamics.torques import AT_REST, direction_of, holding_torques, known, torque_parts
 from er3a.numerics.arrays import Reals
+from er3a.planning import timing
 from er3a.planning.piecewise import polynomial_motion
-from er3a.planning.timing import (
-    SAME_NODE,
-    SPLINE_DEGREE,
-    STRAIGHT_NODES,
-    MustStandStill,
-    NoTimeLawFound,
-    Timed,
-    TimingError,
-    ToppraMissing,
-    run_along,
-    standing,
-)
 
 MOST_ROUNDS = 30
 GAIN = 1e-4
@@ -58,7 +47,7 @@ class TimedTorques:
     least : s, that no motion under the same limits at the same nodes takes less than
     """
 
-    timed: Timed
+    timed: timing.Timed
     torques: Reals
     least: float
 
@@ -77,19 +66,19 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
         if there is no such time law
     """
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0) / speed, axis=1))])
-    kept = np.flatnonzero(np.concatenate([[True], np.diff(way) > SAME_NODE]))
+    kept = np.flatnonzero(np.concatenate([[True], np.diff(way) > timing.SAME_NODE]))
     if len(kept) < 2:
-        timed = standing(q[-1], 0.0)
+        timed = timing.standing(q[-1], 0.0)
         return TimedTorques(timed, holding_torques(model, timed.q), 0.0)
     kept[-1] = len(way) - 1
     q, way = q[kept], way[kept]
     if len(way) == 2:
-        q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
+        q, way = np.linspace(q[0], q[1], timing.STRAIGHT_NODES), np.linspace(0.0, way[1], timing.STRAIGHT_NODES)
     spline = scipy.interpolate.CubicSpline(way, q)
     along = TorquesAlong.along(model, way, spline, speed, peak)
     least, ceiling = along.least_time()
     pace, t = along.fastest(ceiling)
-    timed = Timed(polynomial_motion(run_along(way, spline, pace, t), t, SPLINE_DEGREE))
+    timed = timing.Timed(polynomial_motion(timing.run_along(way, spline, pace, t), t, timing.SPLINE_DEGREE))
     dry = known(drives_of(model.robot).coulomb) * (direction_of(spline(way, 1)) - direction_of(timed.velocity))
     torques = torque_parts(model, timed.q, timed.velocity, timed.acceleration).total + dry
     return TimedTorques(timed, torques, min(least, timed.duration))
@@ -198,10 +187,10 @@ class TorquesAlong:
         solver = toppra.algorithm.TOPPRA([speeds, Torques()], path, gridpoints=way, solver_wrapper="seidel")
         _, pace, _ = solver.compute_parameterization(0, 0)
         if pace is None or not np.isfinite(pace).all():
-            raise TimingError(NoTimeLawFound())
+            raise timing.TimingError(timing.NoTimeLawFound())
         between = (pace[:-1] + pace[1:]) / 2
         if (between <= 0).any():
-            raise TimingError(MustStandStill())
+            raise timing.TimingError(timing.MustStandStill())
         return np.asarray(pace, float), np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
 
 
@@ -255,5 +244,5 @@ def _library() -> Any:
             import toppra.constraint.linear_constraint
             import toppra.interpolator
     except ModuleNotFoundError:
-        raise TimingError(ToppraMissing()) from None
+        raise timing.TimingError(timing.ToppraMissing()) from None
     return toppra

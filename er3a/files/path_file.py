@@ -35,19 +35,7 @@ from er3a.files.yaml_file import StrictModel, load, read_yaml
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.planning.commands import (
-    Command,
-    CommandSource,
-    JointMoveCommand,
-    JointSequenceCommand,
-    JointTableCommand,
-    PlanCommand,
-    SegmentCommand,
-    Start,
-    ToolMoveCommand,
-    ToolSequenceCommand,
-    ToolTableCommand,
-)
+from er3a.planning import commands
 from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.robots.joint_limits import joint_columns
@@ -372,10 +360,10 @@ class JointPath(NamedPath):
             raise ValueError("give either start_deg (joint values) or after (an earlier path) | Keep one of the two")
         return self
 
-    def command(self, source: CommandSource, robot: Robot) -> Command:
+    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
         """The path in SI units."""
-        return JointMoveCommand(
-            Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after),
+        return commands.JointMoveCommand(
+            commands.Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after),
             joint_values(robot, self.end_deg, "end_deg"),
             self.duration_s,
             (
@@ -400,11 +388,11 @@ class JointSequencePath(Profiled):
     points_deg: Annotated[list[JointsDeg], Field(min_length=2)]
     blend_deg: Blend = 0.0
 
-    def command(self, source: CommandSource, robot: Robot) -> Command:
+    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
         """The path in SI units."""
         points = [joint_values(robot, row, f"points_deg[{i}]") for i, row in enumerate(self.points_deg)]
         blend = float(np.radians(self.blend_deg))
-        return JointSequenceCommand(np.array(points), blend, self.duration_s, self.ramp, source=source)
+        return commands.JointSequenceCommand(np.array(points), blend, self.duration_s, self.ramp, source=source)
 
 
 class ToolStart(Profiled):
@@ -428,10 +416,10 @@ class ToolStart(Profiled):
             raise ValueError(f"start_branch: {what} already fixes the branch | Remove start_branch")
         return self
 
-    def start_command(self, robot: Robot) -> Start:
+    def start_command(self, robot: Robot) -> commands.Start:
         """The start in SI units."""
         pose = self.start.pose() if self.start else None
-        return Start(_joints(robot, self.start_deg, "start_deg"), pose, self.after, _branch(self.start_branch))
+        return commands.Start(_joints(robot, self.start_deg, "start_deg"), pose, self.after, _branch(self.start_branch))
 
 
 class LineTo(StrictModel):
@@ -440,9 +428,9 @@ class LineTo(StrictModel):
     end: PoseEntry
     half_turn_axis: Triple | None = None
 
-    def segment(self) -> SegmentCommand:
+    def segment(self) -> commands.SegmentCommand:
         """The segment in SI units."""
-        return SegmentCommand(self.end.pose(), half_turn_axis=_axis(self.half_turn_axis))
+        return commands.SegmentCommand(self.end.pose(), half_turn_axis=_axis(self.half_turn_axis))
 
 
 class ArcTo(LineTo):
@@ -450,29 +438,31 @@ class ArcTo(LineTo):
 
     via_mm: PositionMm
 
-    def segment(self) -> SegmentCommand:
+    def segment(self) -> commands.SegmentCommand:
         """The segment in SI units."""
         return replace(super().segment(), via=np.array(self.via_mm) / 1000)
 
 
-class LinePath(ToolStart, LineTo):
+class ToolMovePath(ToolStart, LineTo):
+    """One line or arc of the tool."""
+
+    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
+        """The path in SI units."""
+        return commands.ToolMoveCommand(
+            self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source
+        )
+
+
+class LinePath(ToolMovePath):
     """A straight line of the tool."""
 
     kind: Literal["line"]
 
-    def command(self, source: CommandSource, robot: Robot) -> Command:
-        """The path in SI units."""
-        return ToolMoveCommand(self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source)
 
-
-class ArcPath(ToolStart, ArcTo):
+class ArcPath(ToolMovePath, ArcTo):
     """A circular arc of the tool."""
 
     kind: Literal["arc"]
-
-    def command(self, source: CommandSource, robot: Robot) -> Command:
-        """The path in SI units."""
-        return ToolMoveCommand(self.start_command(robot), self.segment(), self.duration_s, self.ramp, source=source)
 
 
 class LineSegment(LineTo):
@@ -504,10 +494,12 @@ class SequencePath(ToolStart):
             raise ValueError(f"segments[{last}].blend_mm: the last segment has no corner at its end | Remove it")
         return self
 
-    def command(self, source: CommandSource, robot: Robot) -> Command:
+    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
         """The path in SI units."""
         segments = tuple(replace(part.segment(), blend=part.blend_mm / 1000) for part in self.segments)
-        return ToolSequenceCommand(self.start_command(robot), segments, self.duration_s, self.ramp, source=source)
+        return commands.ToolSequenceCommand(
+            self.start_command(robot), segments, self.duration_s, self.ramp, source=source
+        )
 
 
 class TablePath(NamedPath):
@@ -525,7 +517,7 @@ class TablePath(NamedPath):
     start_branch: Text | None = None
     half_turn_axis: Triple | None = None
 
-    def command(self, source: CommandSource, robot: Robot) -> Command:
+    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
         """The table's points in SI units, without those that repeat the point before.
 
         Raises
@@ -554,11 +546,11 @@ class TablePath(NamedPath):
             if self.blend_mm is not None:
                 raise source.error("blend_mm", "the table holds joint angles", "Write blend_deg")
             blend = None if self.blend_deg is None else float(self.blend_deg * np.radians(1.0))
-            return JointTableCommand(table.joints[kept], timing, blend, repeated, source=source)
+            return commands.JointTableCommand(table.joints[kept], timing, blend, repeated, source=source)
         assert table.poses is not None
         if self.blend_deg is not None:
             raise source.error("blend_deg", "the table holds poses", "Write blend_mm")
-        return ToolTableCommand(
+        return commands.ToolTableCommand(
             table.poses[kept],
             tuple(f"row {row} of {table.file}" for row in table.rows[kept]),
             timing,
@@ -583,13 +575,13 @@ class PlanPath(NamedPath):
     kind: Literal["plan"]
     plan: PlanEnds
 
-    def command(self, source: CommandSource, robot: Robot) -> Command:
+    def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
         """What is to be planned."""
         start, end = (
             part.pose() if isinstance(part, PoseEntry) else joint_values(robot, part, f"plan.{key}")
             for key, part in (("from", self.plan.from_), ("to", self.plan.to))
         )
-        return PlanCommand(start, end, source=source)
+        return commands.PlanCommand(start, end, source=source)
 
 
 class ProgramPath(NamedPath):

@@ -11,23 +11,10 @@ from pydantic import Field, model_validator
 
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals, wrapped
 from er3a.errors import InputError, InputWarning
+from er3a.files import robot_file
 from er3a.files.dh_table import read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.pieces_file import load_pieces
-from er3a.files.robot_file import (
-    HEAVIEST_PAYLOAD_KG,
-    IMPOSSIBLE,
-    BodyFields,
-    CombinedLimitRow,
-    Envelopes,
-    JointLimitRow,
-    JointSpeedRow,
-    LinkPieces,
-    Placement,
-    RobotFile,
-    coupling_matrix,
-    masses_of,
-)
 from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import rot_x, rot_y, transform, translation
@@ -67,7 +54,7 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
     return robot_of(read_robot(robot_path(name_or_path)))
 
 
-def read_table(path: Path, convention: Convention = "standard") -> RobotFile:
+def read_table(path: Path, convention: Convention = "standard") -> robot_file.RobotFile:
     """What a D-H table says, as a robot's file; warns of what had to be assumed."""
     content, notes = read_dh_table(path, robot_name(path), convention)
     if notes:
@@ -75,9 +62,9 @@ def read_table(path: Path, convention: Convention = "standard") -> RobotFile:
     return content
 
 
-def read_robot(path: Path) -> RobotFile:
+def read_robot(path: Path) -> robot_file.RobotFile:
     """What a robot file holds, checked; :class:`InputError` as :func:`load_robot`."""
-    content = load(RobotFile, path)
+    content = load(robot_file.RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
     return content
@@ -96,7 +83,7 @@ def robot_path(name_or_path: str | Path) -> Path:
     return path
 
 
-def robot_of(content: RobotFile) -> Robot:
+def robot_of(content: robot_file.RobotFile) -> Robot:
     """The model behind a checked file: metres and radians."""
     groups = ("dh", "zero", "limits", "speeds", "coupling", "base", "flange", "tool", "envelopes", *MASS_GROUPS)
     present = {group: getattr(content, group) for group in groups if getattr(content, group) is not None}
@@ -120,7 +107,7 @@ def robot_of(content: RobotFile) -> Robot:
         upper=limits[:, 1],
         speed=np.array([_speed(row) for row in content.speeds.rows] if content.speeds else []),
         sliding=np.array(sliding),
-        coupling=coupling_matrix(content.coupling, len(rows), joints) if content.coupling else None,
+        coupling=robot_file.coupling_matrix(content.coupling, len(rows), joints) if content.coupling else None,
         continuous=np.array([row.continuous for row in content.limits.rows]),
         combined=tuple(_combined(row, joints) for row in content.limits.combined),
         base=placement_transform(content.base),
@@ -138,7 +125,7 @@ def robot_of(content: RobotFile) -> Robot:
     if content.dh.has_far_normals:
         robot = with_near_rows(robot)
     groups_of_masses = [getattr(content, group) for group in MASS_GROUPS]
-    return robot.replace(masses=masses_of(robot, *groups_of_masses)) if any(groups_of_masses) else robot
+    return robot.replace(masses=robot_file.masses_of(robot, *groups_of_masses)) if any(groups_of_masses) else robot
 
 
 def with_near_rows(robot: Robot) -> Robot:
@@ -160,20 +147,20 @@ def _si(degrees: float | None, millimetres: float | None) -> float:
     return float(np.radians(degrees)) if degrees is not None else (millimetres or 0.0) / 1000
 
 
-def _speed(row: JointSpeedRow) -> float:
+def _speed(row: robot_file.JointSpeedRow) -> float:
     """rad/s or m/s; NaN where it is unknown."""
     unknown = row.speed_deg_s is None and row.speed_mm_s is None
     return np.nan if unknown else _si(row.speed_deg_s, row.speed_mm_s)
 
 
-def _limits(row: JointLimitRow | CombinedLimitRow) -> tuple[float, float]:
+def _limits(row: robot_file.JointLimitRow | robot_file.CombinedLimitRow) -> tuple[float, float]:
     """Lower and upper limit, rad or m; a turn around zero of a continuous joint."""
-    if isinstance(row, JointLimitRow) and row.continuous:
+    if isinstance(row, robot_file.JointLimitRow) and row.continuous:
         return -np.pi, np.pi
     return _si(row.lower_deg, row.lower_mm), _si(row.upper_deg, row.upper_mm)
 
 
-def _combined(row: CombinedLimitRow, joints: int) -> CombinedLimit:
+def _combined(row: robot_file.CombinedLimitRow, joints: int) -> CombinedLimit:
     factors = np.zeros(joints)
     factors[np.array(row.joints) - 1] = row.factors
     return CombinedLimit(tuple(factors.tolist()), *_limits(row))
@@ -188,7 +175,7 @@ VALUES_OF_ROW = {
 """The entries that a row of each group holds."""
 
 
-def _origins(content: RobotFile) -> dict[str, str]:
+def _origins(content: robot_file.RobotFile) -> dict[str, str]:
     """Documents of single entries that have another one than their group."""
     found: dict[str, str] = {}
     for group, columns in VALUES_OF_ROW.items():
@@ -201,7 +188,7 @@ def _origins(content: RobotFile) -> dict[str, str]:
     return found
 
 
-def _envelopes(group: Envelopes | None) -> tuple[Envelope, ...]:
+def _envelopes(group: robot_file.Envelopes | None) -> tuple[Envelope, ...]:
     def metres(values: list[float]) -> tuple[float, float, float]:
         x, y, z = values
         return x / 1000, y / 1000, z / 1000
@@ -210,11 +197,11 @@ def _envelopes(group: Envelopes | None) -> tuple[Envelope, ...]:
     return tuple(Envelope(c.link, metres(c.from_mm), metres(c.to_mm), c.radius_mm / 1000) for c in capsules)
 
 
-def _hulls(group: Envelopes | None) -> tuple[ConvexPiece, ...]:
+def _hulls(group: robot_file.Envelopes | None) -> tuple[ConvexPiece, ...]:
     """Hulls that are written in the file, and those of files of convex pieces."""
     found: list[ConvexPiece] = []
     for mesh in group.meshes if group else ():
-        content, T = load_pieces(own_or_shipped(mesh.pieces)), placement_transform(Placement(**_place(mesh)))
+        content, T = load_pieces(own_or_shipped(mesh.pieces)), placement_transform(robot_file.Placement(**_place(mesh)))
         found += [_hull(mesh.link, p @ T[:3, :3].T + T[:3, 3], content.uncovered_mm / 1000) for p in content.pieces()]
     for hull in group.hulls if group else ():
         found.append(_hull(hull.link, np.array(hull.points_mm) / 1000, hull.margin_mm / 1000))
@@ -225,11 +212,11 @@ def _hull(link: int, points: Reals, margin: float) -> ConvexPiece:
     return ConvexPiece(link, tuple((float(x), float(y), float(z)) for x, y, z in points), margin)
 
 
-def _place(mesh: LinkPieces) -> dict[str, list[float]]:
+def _place(mesh: robot_file.LinkPieces) -> dict[str, list[float]]:
     return {"xyz_mm": mesh.xyz_mm, "rpy_deg": mesh.rpy_deg}
 
 
-def placement_transform(placement: Placement | None) -> np.ndarray:
+def placement_transform(placement: robot_file.Placement | None) -> np.ndarray:
     """The (4, 4) transform of a placement in mm and degrees; the identity for None."""
     if placement is None:
         return np.eye(4)
@@ -258,7 +245,7 @@ class LoadFields(StrictModel):
 
     source: Annotated[str, Field(min_length=1, max_length=2000)]
     grade: Grade
-    body: BodyFields | None = None
+    body: robot_file.BodyFields | None = None
     mesh: MeshMass | None = None
     force_n: Newton = THREE_ZEROS
     moment_n_m: Newton = THREE_ZEROS
@@ -267,7 +254,7 @@ class LoadFields(StrictModel):
     def _one_of_both(self):
         if (self.body is None) == (self.mesh is None):
             raise ValueError("body: a load needs a body or a mesh, and not both | Give one of the two")
-        if self.body and self.body.mass_kg > HEAVIEST_PAYLOAD_KG:
+        if self.body and self.body.mass_kg > robot_file.HEAVIEST_PAYLOAD_KG:
             kg = self.body.mass_kg
             raise ValueError(f"body.mass_kg: {kg:g} kg is more than any robot carries | Write {kg / 1000:g} if it is g")
         return self
@@ -325,7 +312,7 @@ def mesh_body(given: MeshMass) -> MassBody:
     x, y, z = mesh.center_mass.tolist()
     body = MassBody(float(mesh.mass), (x, y, z), six_moments(mesh.moment_inertia))
     if problem := no_body(body):
-        raise InputError(given.file, None, IMPOSSIBLE[problem], "Check the mesh")
-    if body.mass > HEAVIEST_PAYLOAD_KG:
+        raise InputError(given.file, None, robot_file.IMPOSSIBLE[problem], "Check the mesh")
+    if body.mass > robot_file.HEAVIEST_PAYLOAD_KG:
         raise InputError(given.file, None, f"makes {body.mass:g} kg", "Check unit_mm: 1 for mm, 1000 for m")
     return moved(body, transform(np.array(given.xyz_mm) / 1000, np.radians(given.rpy_deg)))

@@ -35,23 +35,7 @@ from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.meshes import simplified
 from er3a.errors import Er3aError, InputError
-from er3a.formats.urdf_tree import (
-    CylinderOfLink,
-    LinkPlaces,
-    Split,
-    UrdfChain,
-    UrdfJoint,
-    collision_shapes,
-    masses_from_urdf,
-    peak_torque,
-    read_chain,
-    urdf_root,
-    visual_surface,
-    with_capsules,
-    write_friction,
-    write_masses,
-    write_shapes,
-)
+from er3a.formats import urdf_tree
 from er3a.geometry.transforms import rot_y, rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
@@ -250,7 +234,7 @@ def import_urdf(
     base: str | None = None,
     tip: str | None = None,
     snap: bool = False,
-    split: bool | Split = False,
+    split: bool | urdf_tree.Split = False,
 ) -> UrdfImport:
     """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over shapes, looks and masses.
 
@@ -275,18 +259,18 @@ def import_urdf(
         if the file is no URDF, has several arms (candidates are named), or none of 1 to 10 joints
     """
     path = Path(path)
-    found = read_chain(path, base, tip, snap)
+    found = urdf_tree.read_chain(path, base, tip, snap)
     robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
     moving = [joint for joint in found.joints if joint.moves]
     limits = np.stack([robot.lower, robot.upper], axis=1)
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
     given = _chain_forward(found.joints, q @ coupling.T + shift)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
-    root, placed = urdf_root(path), link_places(found, shift)
+    root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     envelopes, hulls, shaped = link_shapes(path, root, robot, placed, _asked(split))
     visuals, unseen = link_visuals(path, root, robot, placed)
     names = tuple(joint.name for joint in sources)
-    masses, weighed, changed = masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
+    masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
     stated = {
         "envelopes": bool(envelopes or hulls),
         "inertia": bool(masses.links),
@@ -313,7 +297,7 @@ def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = N
     Parameters and errors are those of :func:`import_urdf`.
     """
     path = Path(path)
-    chain = read_chain(path, base, tip, False)
+    chain = urdf_tree.read_chain(path, base, tip, False)
     robot, *_, notes = _robot_of_chain(path, chain)
     return robot, (*chain.notes, *notes)
 
@@ -350,7 +334,7 @@ def urdf_statements(path: str | Path, *, base: str | None = None, tip: str | Non
     Parameters and errors are those of :func:`import_urdf`.
     """
     path = Path(path)
-    chain = read_chain(path, base, tip, False)
+    chain = urdf_tree.read_chain(path, base, tip, False)
     robot, sources, coupling, shift, _ = _robot_of_chain(path, chain)
     moving = [joint for joint in chain.joints if joint.moves]
     plain = robot.coupling is None
@@ -361,7 +345,7 @@ def urdf_statements(path: str | Path, *, base: str | None = None, tip: str | Non
         for joint, row in zip(sources, np.stack([robot.lower, robot.upper], axis=1).tolist())
     ]
     q = _looked_at(robot)
-    length, angle = _rounding(urdf_root(path), chain)
+    length, angle = _rounding(urdf_tree.urdf_root(path), chain)
     reach = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) if len(points) > 1 else 0.0
     return UrdfStatements(
         directions[order],
@@ -393,7 +377,7 @@ def _looked_at(robot: Robot) -> Reals:
     return np.concatenate([np.zeros((1, robot.joints)), alone, spread]) * unit
 
 
-def _rounding(root: ElementTree.Element, chain: UrdfChain) -> tuple[float, float]:
+def _rounding(root: ElementTree.Element, chain: urdf_tree.UrdfChain) -> tuple[float, float]:
     """How far the digits that a URDF prints leave the ends of a chain apart, m and rad: half the last digit of lengths,
     and of angles what they lack of a fraction of a turn that is cut off, else half the last digit; added up."""
     names = {joint.name for joint in chain.joints}
@@ -417,7 +401,9 @@ def _decimals(word: str) -> int:
     return len(mantissa.partition(".")[2]) - int(exponent or 0)
 
 
-def _robot_of_chain(path: Path, found: UrdfChain) -> tuple[Robot, list[UrdfJoint], Reals, Reals, list[str]]:
+def _robot_of_chain(
+    path: Path, found: urdf_tree.UrdfChain
+) -> tuple[Robot, list[urdf_tree.UrdfJoint], Reals, Reals, list[str]]:
     """The robot without shapes and masses, its joints, what they move (m, n) and its constant (m,), notes on limits."""
     moving = [joint for joint in found.joints if joint.moves]
     if not 1 <= len(moving) <= MOST_JOINTS:
@@ -448,13 +434,13 @@ def _robot_of_chain(path: Path, found: UrdfChain) -> tuple[Robot, list[UrdfJoint
     return robot, sources, coupling, shift, notes
 
 
-def _asked(split: bool | Split) -> Split | None:
+def _asked(split: bool | urdf_tree.Split) -> urdf_tree.Split | None:
     if callable(split):
         return split
     return (lambda _: None) if split else None
 
 
-def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
+def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlaces:
     """Where links stand that move with the chain, all joints of the robot at 0.
 
     Parameters
@@ -489,7 +475,7 @@ def link_places(found: UrdfChain, shift: Reals) -> LinkPlaces:
 
 
 def link_shapes(
-    path: Path, root: ElementTree.Element, robot: Robot, placed: LinkPlaces, split: Split | None
+    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces, split: urdf_tree.Split | None
 ) -> tuple[tuple[Envelope, ...], tuple[ConvexPiece, ...], tuple[str, ...]]:
     """The collision geometry of a URDF, in the frames of the links of the robot made from it, and notes in words."""
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
@@ -501,14 +487,16 @@ def link_shapes(
                 notes.append(f"link {link.get('name')} does not move with the arm's chain; its shape is left out")
             continue
         T, number = place
-        made = list[Envelope | ConvexPiece | CylinderOfLink]()
+        made = list[Envelope | ConvexPiece | urdf_tree.CylinderOfLink]()
         for collision in shapes:
             frame = np.linalg.inv(zero[number]) @ T
             try:
-                made += collision_shapes(path, link.get("name", "?"), collision, (frame, number), notes, split)
+                made += urdf_tree.collision_shapes(
+                    path, link.get("name", "?"), collision, (frame, number), notes, split
+                )
             except InputError as error:
                 notes.append(f"link {link.get('name')} has a shape that is left out ({error})")
-        for shape in with_capsules(made):
+        for shape in urdf_tree.with_capsules(made):
             if isinstance(shape, Envelope):
                 envelopes.append(shape)
             else:
@@ -518,7 +506,7 @@ def link_shapes(
 
 
 def link_visuals(
-    path: Path, root: ElementTree.Element, robot: Robot, placed: LinkPlaces
+    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces
 ) -> tuple[tuple[Visual, ...], tuple[str, ...]]:
     """The visual geometry of a URDF, one surface for each link, simplified to ``DRAWN_TRIANGLES`` in all, and notes."""
     zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
@@ -532,7 +520,7 @@ def link_visuals(
         T = np.linalg.inv(zero[number]) @ T
         for visual in visuals:
             try:
-                points, faces = visual_surface(path, link.get("name", "?"), visual)
+                points, faces = urdf_tree.visual_surface(path, link.get("name", "?"), visual)
             except Er3aError:
                 missing.append(link.get("name", "?"))
                 continue
@@ -550,9 +538,11 @@ def link_visuals(
     return tuple(found), (note,) if missing else ()
 
 
-def _coupling(path: Path, found: UrdfChain, moving: list[UrdfJoint]) -> tuple[list[UrdfJoint], Reals, Reals]:
+def _coupling(
+    path: Path, found: urdf_tree.UrdfChain, moving: list[urdf_tree.UrdfJoint]
+) -> tuple[list[urdf_tree.UrdfJoint], Reals, Reals]:
     """The independent joints behind the chain's, what each of the chain's is made of (m, n), and its constant (m,)."""
-    sources: list[UrdfJoint] = []
+    sources: list[urdf_tree.UrdfJoint] = []
     rows = []
     for joint in moving:
         factor, offset, seen = 1.0, 0.0, {joint.name}
@@ -573,7 +563,7 @@ def _coupling(path: Path, found: UrdfChain, moving: list[UrdfJoint]) -> tuple[li
     return sources, coupling, np.array([offset for _, _, offset in rows])
 
 
-def _axes_at_zero(joints: Sequence[UrdfJoint], shift: Reals) -> tuple[Reals, Reals, Reals]:
+def _axes_at_zero(joints: Sequence[urdf_tree.UrdfJoint], shift: Reals) -> tuple[Reals, Reals, Reals]:
     """Directions and points (m, 3) of the moving axes and the flange (4, 4) with all independent joints at 0."""
     directions, points, T = [], [], np.eye(4)
     for joint in joints:
@@ -585,7 +575,7 @@ def _axes_at_zero(joints: Sequence[UrdfJoint], shift: Reals) -> tuple[Reals, Rea
     return np.array(directions), np.array(points), T
 
 
-def _motion(joint: UrdfJoint, values: Reals) -> Reals:
+def _motion(joint: urdf_tree.UrdfJoint, values: Reals) -> Reals:
     """A joint's motions (N, 4, 4) by values (N,), rad or m."""
     T = np.tile(np.eye(4), (len(values), 1, 1))
     if joint.type == "prismatic":
@@ -595,7 +585,7 @@ def _motion(joint: UrdfJoint, values: Reals) -> Reals:
     return T
 
 
-def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
+def _limits(path: Path, sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str]]:
     """Limits (n, 2), rad or m, and what was assumed of them."""
     rows, notes = [], []
     for joint in sources:
@@ -622,7 +612,7 @@ def _limits(path: Path, sources: list[UrdfJoint]) -> tuple[Reals, list[str]]:
     return np.array(rows), notes
 
 
-def _followers_beyond(moving: Sequence[UrdfJoint], coupling: Reals, shift: Reals, limits: Reals) -> list[str]:
+def _followers_beyond(moving: Sequence[urdf_tree.UrdfJoint], coupling: Reals, shift: Reals, limits: Reals) -> list[str]:
     """Which joints of the chain follow others out of limits of their own, which the robot's limits don't keep."""
     ends = np.sort(coupling @ limits + shift[:, None], axis=1)
     notes = []
@@ -666,8 +656,8 @@ def export_urdf(robot: Robot, meshes: str | Path | None = None) -> str:
         joint.set("type", "fixed")
         if k < rows:
             _describe(robot, k, moved_by, joint)
-    write_masses(robot, names, root)
-    write_shapes(robot, names, root, None if meshes is None else Path(meshes))
+    urdf_tree.write_masses(robot, names, root)
+    urdf_tree.write_shapes(robot, names, root, None if meshes is None else Path(meshes))
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -697,15 +687,15 @@ def _describe(robot: Robot, k: int, moved_by: list[tuple[int, float]], joint: El
     speed = 0.0 if math.isnan(robot.speed[j]) else robot.speed[j]
     limits = {} if endless else {"lower": robot.lower[j], "upper": robot.upper[j]}
     driver = moved_by.index((j, 1.0))
-    limits |= {"velocity": speed, "effort": peak_torque(robot, j) if driver == k else 0.0}
+    limits |= {"velocity": speed, "effort": urdf_tree.peak_torque(robot, j) if driver == k else 0.0}
     ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in limits.items()})
     if driver == k:
-        write_friction(robot, j, joint)
+        urdf_tree.write_friction(robot, j, joint)
     else:
         ElementTree.SubElement(joint, "mimic", joint=f"joint_{driver + 1}", multiplier=repr(factor), offset="0.0")
 
 
-def _chain_forward(joints: Sequence[UrdfJoint], values: Reals) -> Reals:
+def _chain_forward(joints: Sequence[urdf_tree.UrdfJoint], values: Reals) -> Reals:
     """The flange (N, 4, 4) by the URDF's own transforms, for values (N, m) of the moving joints in rad or m."""
     T, moved = np.eye(4), 0
     for joint in joints:

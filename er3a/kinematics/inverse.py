@@ -10,15 +10,7 @@ from numpy.typing import NDArray
 from er3a.errors import PoseError, ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
-from er3a.kinematics.by_class import (
-    LazySelfMotions,
-    arm_solver,
-    checked_parameters,
-    parameters_of,
-    slot_of,
-    slots_of_class,
-    task_mask,
-)
+from er3a.kinematics import by_class, solutions
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, LinkedRows
 from er3a.kinematics.classes.six_revolute import CERTAIN
@@ -28,24 +20,6 @@ from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.solutions import (
-    ByClass,
-    DependentJoints,
-    Iteration,
-    NearestMiss,
-    NoSolutionOfClass,
-    OutOfReach,
-    PoseUnsolved,
-    SideUnsolved,
-    Solutions,
-    Unsolved,
-    WristTiltsTooLittle,
-    WristTooFar,
-    WristTooNear,
-    WristTooNearAxis1,
-    side_of,
-    slot_labels,
-)
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import equivalents_within, within
@@ -66,7 +40,7 @@ def inverse(
     q_ref: Reals | None = None,
     redundancy: Reals | None = None,
     self_motion_rows: bool = False,
-) -> Solutions:
+) -> solutions.Solutions:
     """All joint solutions of one pose of the tool, by the class of the arm's geometry.
 
     Where a joint is free, the member of each family within the limits that is nearest to ``q_ref`` is among the rows,
@@ -113,7 +87,7 @@ def inverse(
     q, branch = _stacked(slots, rows, 6)
     inside = within(robot, q)
     unsolved = _unsolved(robot, fault, gap)
-    return Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
+    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, unsolved=unsolved, families=continua)
 
 
 def _with_own(robot: Robot, T: Reals, q_ref: Reals, q: Reals, slots: list[int], rows: list[Reals]) -> None:
@@ -139,17 +113,19 @@ def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals
     return q, np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
 
 
-def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool) -> Solutions:
-    solver = arm_solver(robot).chain
+def _by_class(
+    robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool
+) -> solutions.Solutions:
+    solver = by_class.arm_solver(robot).chain
     if isinstance(solver, UnsolvedChain):
         return _by_iteration(robot, T, q_ref)
-    values = checked_parameters(robot, redundancy, q_ref[None], 1)
-    found = slots_of_class(robot, T[None], q_ref[None], values)
+    values = by_class.checked_parameters(robot, redundancy, q_ref[None], 1)
+    found = by_class.slots_of_class(robot, T[None], q_ref[None], values)
     slots, motions = found.q, found.settled[0].motions if found.settled else ()
     filled = np.flatnonzero(np.isfinite(slots[0, :, 0]))
     traced: Sequence[SelfMotionCurve] = motions
     if len(solver.parameters) == 1:
-        traced = LazySelfMotions(robot, T, q_ref, values)
+        traced = by_class.LazySelfMotions(robot, T, q_ref, values)
         motions = tuple(traced) if self_motion_rows or not filled.size else ()
     if solver.parameters:  # where two branches meet one stands; other arms' poses of that kind are settled
         apart = np.abs(shortest_move(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
@@ -160,21 +136,21 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         for member in (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,):
             listed = np.concatenate([np.empty((0, robot.joints)), *rows])
             if motion.within_limits and max_joint_move(listed, member).min(initial=np.inf) > SAME_MEMBER:
-                branches.append(slot_of(robot, T, member))
+                branches.append(by_class.slot_of(robot, T, member))
                 rows.append(member[None])
     certain = bool(is_complete(robot, found.certainty)[0])
     if not certain and isinstance(solver, LinkedRows):  # the rows found may be members that the linkage can't make
         for row in all_found(robot, T, STARTS):
             if max_joint_move(np.concatenate([np.empty((0, robot.joints)), *rows]), row).min(initial=np.inf) > MISSED:
-                branches.append(slot_of(robot, T, row))
+                branches.append(by_class.slot_of(robot, T, row))
                 rows.append(_rows_of_branch(robot, row, q_ref))
     if redundancy is None and within(robot, q_ref) and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
         listed = np.concatenate([np.empty((0, robot.joints)), *rows])
         if max_joint_move(listed, q_ref).min(initial=np.inf) > MISSED:  # a double root that rounding takes off the axis
-            branches.append(slot_of(robot, T, q_ref))
+            branches.append(by_class.slot_of(robot, T, q_ref))
             rows.append(q_ref[None])
             certain = False
-    unsolved: tuple[Unsolved, ...] = ()
+    unsolved: tuple[solutions.Unsolved, ...] = ()
     if not branches:
         open_pose = bool(solver.parameters)
         near = missed_row(robot, T, q_ref)
@@ -185,42 +161,44 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
             certain = False
         else:
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
-            miss = NearestMiss(position * 1000, float(np.degrees(rotation)))
-            unsolved = (PoseUnsolved(0, NoSolutionOfClass(miss)),)
+            miss = solutions.NearestMiss(position * 1000, float(np.degrees(rotation)))
+            unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(miss)),)
     q, branch = _stacked(branches, rows, robot.joints)
     inside = within(robot, q)
-    method = ByClass(solver.code, bool(certain), bool(slot_labels(robot)))
-    return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, traced)
+    method = solutions.ByClass(solver.code, bool(certain), bool(solutions.slot_labels(robot)))
+    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved, traced)
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
     """Whether the class found all solutions of poses (N,), of which it is so certain (N,)."""
-    solver = arm_solver(robot).chain
+    solver = by_class.arm_solver(robot).chain
     closed = not ARM_CLASSES[solver.code].eliminates and not isinstance(solver, LinkedRows)
     return np.asarray((certainty == CERTAIN) | closed)
 
 
-def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
+def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
     """What a search from the reference (n,) finds at a pose that the arm's class has no row for, within the limits if
     it can."""
-    open_pose = bool(parameters_of(robot))
-    near = nearest_arm(robot, T, q_ref, task_mask(robot), open_pose, MISS_RESTARTS)
+    open_pose = bool(by_class.parameters_of(robot))
+    near = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), open_pose, MISS_RESTARTS)
     if open_pose or not near.solved or within(robot, near.q):
         return near
-    inside = nearest_arm(robot, T, q_ref, task_mask(robot), True, MISS_RESTARTS)
+    inside = nearest_arm(robot, T, q_ref, by_class.task_mask(robot), True, MISS_RESTARTS)
     return inside if inside.solved else near
 
 
 def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[int], list[Reals]]:
     """Branches and rows of a pose that joint values (n,) solve: all at their redundancy parameters, else they."""
-    if parameters_of(robot):
-        slots = slots_of_class(robot, T[None], q_ref[None], checked_parameters(robot, None, q[None], 1)).q[0]
+    if by_class.parameters_of(robot):
+        slots = by_class.slots_of_class(
+            robot, T[None], q_ref[None], by_class.checked_parameters(robot, None, q[None], 1)
+        ).q[0]
         if branches := np.flatnonzero(np.isfinite(slots[:, 0])).tolist():
             return branches, [_rows_of_branch(robot, slots[slot], q_ref) for slot in branches]
     return [0], [_rows_of_branch(robot, q, q_ref)]
 
 
-def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
+def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
     arms = all_found(robot, T, starts_of(robot))
     solves = np.abs(forward(robot, q_ref) - T).max() <= SOLVES
     if solves and not (len(arms) and max_joint_move(np.asarray(arms), q_ref).min() < SAME_MEMBER):
@@ -228,18 +206,22 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> Solutions:
     q, branch = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     inside = within(robot, q)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
-    method = Iteration(starts_of(robot), missing_class(robot))
-    return Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
+    method = solutions.Iteration(starts_of(robot), missing_class(robot))
+    return solutions.Solutions(robot, q, np.ones_like(inside), inside, branch, method, unsolved)
 
 
 def starts_of(robot: Robot) -> int:
     """How many random starts look for the solutions of an arm that no class solves."""
-    return STARTS_OF_DEPENDENT if arm_solver(robot).chain.code == "dependent" else STARTS
+    return STARTS_OF_DEPENDENT if by_class.arm_solver(robot).chain.code == "dependent" else STARTS
 
 
-def missing_class(robot: Robot) -> ClosedFormMissing | DependentJoints | None:
+def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints | None:
     """Why the arm is solved by iteration."""
-    return DependentJoints() if arm_solver(robot).chain.code == "dependent" else closed_form_missing(robot)
+    return (
+        solutions.DependentJoints()
+        if by_class.arm_solver(robot).chain.code == "dependent"
+        else closed_form_missing(robot)
+    )
 
 
 def checked_reference(robot: Robot, q_ref: Reals | None) -> Reals:
@@ -277,23 +259,27 @@ def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     return rows[np.argsort(max_joint_move(rows, q_ref), kind="stable")]
 
 
-def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[SideUnsolved, ...]:
+def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.SideUnsolved, ...]:
     found = []
     for shoulder in (0, 1):
         part = slice(4 * shoulder, 4 * shoulder + 4)
         if (fault[part] == REACHED).any():
             continue
         best = 4 * shoulder + int(np.argmin(gap[part]))
-        found.append(SideUnsolved(side_of(robot, best), _out_of_reach(robot, int(fault[best]), float(gap[best]))))
+        found.append(
+            solutions.SideUnsolved(
+                solutions.side_of(robot, best), _out_of_reach(robot, int(fault[best]), float(gap[best]))
+            )
+        )
     return tuple(found)
 
 
-def _out_of_reach(robot: Robot, fault: int, gap: float) -> OutOfReach:
+def _out_of_reach(robot: Robot, fault: int, gap: float) -> solutions.OutOfReach:
     arm = wrist_partitioned_arm(robot)
     if fault == ORIENTATION:
-        return WristTiltsTooLittle(float(np.degrees(gap)))
+        return solutions.WristTiltsTooLittle(float(np.degrees(gap)))
     if fault == OFF_AXIS:
-        return WristTooNearAxis1(gap * 1000)
+        return solutions.WristTooNearAxis1(gap * 1000)
     if fault == TOO_FAR:
-        return WristTooFar(gap * 1000, arm.wrist_reach * 1000)
-    return WristTooNear(gap * 1000, abs(arm.upper_arm_length - arm.forearm_length) * 1000)
+        return solutions.WristTooFar(gap * 1000, arm.wrist_reach * 1000)
+    return solutions.WristTooNear(gap * 1000, abs(arm.upper_arm_length - arm.forearm_length) * 1000)

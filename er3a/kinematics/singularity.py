@@ -120,6 +120,19 @@ def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditi
     return Conditioning(values.prod(axis=-1), condition, smallest)
 
 
+def wrist_and_forearm(robot: Robot) -> tuple[Reals, bool]:
+    """The wrist centre (3,) in the tool frame, m, and whether the forearm ends on axis 4 instead of there.
+
+    Raises
+    ------
+    NotWristPartitionedError
+        if the arm's determinant does not factor
+    """
+    if (parallel := parallel_axes_arm(robot)) is not None:
+        return np.array(parallel.constants.wrist_in_tool), True
+    return wrist_partitioned_arm(robot).wrist_in_tool, False
+
+
 def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
     """Signed distances from the wrist, elbow and shoulder singularities at joint angles (..., 6) in rad.
 
@@ -128,10 +141,7 @@ def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
     NotWristPartitionedError
         if the arm's determinant does not factor this way
     """
-    if (parallel := parallel_axes_arm(robot)) is not None:
-        wrist_in_tool, to_axis_4 = np.array(parallel.constants.wrist_in_tool), True
-    else:
-        wrist_in_tool, to_axis_4 = wrist_partitioned_arm(robot).wrist_in_tool, False
+    wrist_in_tool, to_axis_4 = wrist_and_forearm(robot)
     q = checked_joints(robot, q)
     out = np.empty((q.size // 6, 3))
     links = constant_links(robot)

@@ -14,20 +14,11 @@ from numpy.typing import NDArray
 
 from er3a.errors import NotWristPartitionedError
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle, wrap_to_pi
+from er3a.kinematics import closed_form
 from er3a.kinematics.block_inverse import BlockConstants, block_constants
 from er3a.kinematics.chain import axes_at_zero_theta, constant_links, row_values
 from er3a.kinematics.classes.four_bar import solve_near_reference
 from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
-from er3a.kinematics.closed_form import (
-    BOUNDARY_M,
-    BOUNDARY_RAD,
-    FOLD_OFFSET,
-    REACHED,
-    SLOTS,
-    TOO_FAR,
-    ArmConstants,
-    solve,
-)
 from er3a.numerics.arrays import Reals, for_kernel
 from er3a.robots.robot import Robot, derived
 
@@ -175,11 +166,11 @@ def recognised(axes: Reals, points: Reals, T_base_tool: Reals) -> WristPartition
         if np.linalg.norm(np.cross(axes[i], axes[j])) < PARALLEL:
             return NeighboursParallel(i + 1, j + 1)
     wrist, miss = _meeting_point(axes[3:], points[3:])
-    if miss > BOUNDARY_M:
+    if miss > closed_form.BOUNDARY_M:
         return NoWristCentre(miss * 1000)
     across = np.eye(3) - np.outer(axes[1], axes[1])
     upper_arm, forearm = across @ (points[2] - points[1]), across @ (wrist - points[2])
-    if min(np.linalg.norm(upper_arm), np.linalg.norm(forearm)) < BOUNDARY_M:
+    if min(np.linalg.norm(upper_arm), np.linalg.norm(forearm)) < closed_form.BOUNDARY_M:
         return NoArmLength()
     return WristPartitionedArm(
         axes=axes,
@@ -212,11 +203,11 @@ def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
 
 
 @derived
-def _constants(robot: Robot) -> ArmConstants:
+def _constants(robot: Robot) -> closed_form.ArmConstants:
     return constants_of(wrist_partitioned_arm(robot))
 
 
-def constants_of(arm: WristPartitionedArm) -> ArmConstants:
+def constants_of(arm: WristPartitionedArm) -> closed_form.ArmConstants:
     """The arm as the kernel takes it."""
     w = [_vector(axis) for axis in arm.axes]
     beside_6 = np.cross(arm.axes[5], np.eye(3)[np.argmin(np.abs(arm.axes[5]))])
@@ -224,8 +215,11 @@ def constants_of(arm: WristPartitionedArm) -> ArmConstants:
     upper_arm, forearm = _vector(arm.upper_arm), _vector(arm.forearm)
     least = abs(arm.upper_arm_length - arm.forearm_length)
     angle_45, angle_56 = float(unsigned_angle(w[3], w[4])), float(unsigned_angle(w[4], w[5]))
-    oblique = abs(angle_45 - angle_56) > BOUNDARY_RAD, abs(angle_45 + angle_56 - np.pi) > BOUNDARY_RAD
-    return ArmConstants(
+    oblique = (
+        abs(angle_45 - angle_56) > closed_form.BOUNDARY_RAD,
+        abs(angle_45 + angle_56 - np.pi) > closed_form.BOUNDARY_RAD,
+    )
+    return closed_form.ArmConstants(
         axis_1=w[0],
         axis_2=w[1],
         axis_4=w[3],
@@ -249,9 +243,11 @@ def constants_of(arm: WristPartitionedArm) -> ArmConstants:
         wrist_angle=float(signed_angle(w[3], w[5], w[4])),
         angle_45=angle_45,
         angle_56=angle_56,
-        folded_offset=FOLD_OFFSET * min(1.0, least / arm.forearm_length) if least > BOUNDARY_M else 0.0,
-        least_tilt_offset=FOLD_OFFSET if oblique[0] else 0.0,
-        most_tilt_offset=FOLD_OFFSET if oblique[1] else 0.0,
+        folded_offset=closed_form.FOLD_OFFSET * min(1.0, least / arm.forearm_length)
+        if least > closed_form.BOUNDARY_M
+        else 0.0,
+        least_tilt_offset=closed_form.FOLD_OFFSET if oblique[0] else 0.0,
+        most_tilt_offset=closed_form.FOLD_OFFSET if oblique[1] else 0.0,
     )
 
 
@@ -291,7 +287,7 @@ def _slots_of_parallel_axes(
 ) -> tuple[Reals, NDArray[np.int8], Reals]:
     x, gap = solve_near_reference(arm, T, robot.direction * q_ref + robot.offset)
     q = wrap_to_pi(robot.direction * (x - robot.offset))
-    fault = np.where(np.isnan(q[..., 0]), TOO_FAR, REACHED).astype(np.int8)
+    fault = np.where(np.isnan(q[..., 0]), closed_form.TOO_FAR, closed_form.REACHED).astype(np.int8)
     return q, fault, gap
 
 
@@ -315,10 +311,12 @@ def solve_slots(
     """
     if (parallel := parallel_axes_arm(robot)) is not None:
         return _slots_of_parallel_axes(robot, parallel, T, q_ref)
-    shape = T.shape[0], SLOTS
+    shape = T.shape[0], closed_form.SLOTS
     q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
     T, q_ref = for_kernel(T), for_kernel(row_values(robot, q_ref))
-    solve(_constants(robot), (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap))
+    closed_form.solve(
+        _constants(robot), (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap)
+    )
     if robot.coupling is not None:
         q = wrap_to_pi(q @ np.round(np.linalg.inv(robot.coupling)).T)
     return q, fault, gap

@@ -172,6 +172,5 @@ def check_study(path: Path) -> Study:
         for key in (
             key for stage in STAGES.values() for key in stage.settings if hasattr(getattr(study, key), "scene")
         ):
-            if scene := study.scene(name, key):
-                load_scene(scene)
+            study.scene(name, key)
     return study

@@ -20,6 +20,7 @@ import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
@@ -381,7 +382,6 @@ def _uri_from_here(file: Path | None) -> str:
 
 
 CHECKS_PER_SAMPLE = 5
-TOLERANCE = 0.001  # m
 SEED = 0  # of the planner
 
 
@@ -412,8 +412,8 @@ def programs_of(
     """
     if reason := not_written(language, robot):
         raise InputError(None, None, reason, WITHOUT_JOINTS)
-    surroundings = Surroundings(Bodies(robot, scene), TOLERANCE)
-    task = PlanningTask(robot, surroundings.bodies, TOLERANCE, assumed_limits(robot, CheckOptions()), SEED)
+    surroundings = Surroundings(Bodies(robot, scene), PENETRATION_TOLERANCE)
+    task = PlanningTask(robot, surroundings.bodies, PENETRATION_TOLERANCE, assumed_limits(robot, CheckOptions()), SEED)
     listed = load_paths(file).paths
     missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)
     if missing is not None:

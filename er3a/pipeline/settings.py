@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.planning.names import StrategyName
@@ -39,7 +40,7 @@ class TrajectorySettings(StrictModel):
     acceleration_deg_s2: Annotated[list[Annotated[float, Field(gt=0, le=1e6)]], Field(min_length=1)] | None = None
     jerk_deg_s3: Annotated[list[Annotated[float, Field(gt=0, le=1e9)]], Field(min_length=1)] | None = None
     scene: Text | None = None
-    penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1.0
-    assumed_margin_mm: Annotated[float, Field(ge=0, le=1000)] = 20.0
+    penetration_tolerance_mm: Annotated[float, Field(ge=0.05, le=100)] = 1000 * PENETRATION_TOLERANCE
+    assumed_margin_mm: Annotated[float, Field(ge=0, le=1000)] = 1000 * ASSUMED_MARGIN
     programs: list[LanguageName] = ["krl", "urscript", "rpl", "xpl", "csv"]
     write_unsafe: bool = False

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, PrivateAttr, create_model, model_validator
 
+from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.annotations import catalogues_beside, translations_in
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
+from er3a.files.scene_file import load_scene
 from er3a.files.yaml_file import StrictModel, load, read_yaml
 from er3a.pipeline.messages.language import LANGUAGES, LanguageCode
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
@@ -247,7 +249,7 @@ class StudyBase(StrictModel):
         own = getattr(self, key, None)
         settings = own.model_dump() if own else {}
         if "scene" in settings:
-            scene = self.scene(name, key)
+            scene = self.scene_file(name, key)
             settings["scene"] = str(scene) if scene else None
         if key == "dynamics":
             settings["loads"] = [load.model_dump() for load in self.loads(name)]
@@ -275,11 +277,16 @@ class StudyBase(StrictModel):
 
     def scenes(self, name: str, stage: str) -> list[Path]:
         """The file of :meth:`scene`, and those of convex pieces that it names; empty in open space."""
-        scene = self.scene(name, stage)
+        scene = self.scene_file(name, stage)
         return [scene, *pieces_named_in(scene)] if scene else []
 
-    def scene(self, name: str, stage: str) -> Path | None:
-        """The file of the solids that a robot may not touch in a stage; None for open space."""
+    def scene(self, name: str, stage: str) -> Scene | None:
+        """The solids that a robot may not touch in a stage; None in open space."""
+        file = self.scene_file(name, stage)
+        return load_scene(file) if file else None
+
+    def scene_file(self, name: str, stage: str) -> Path | None:
+        """The file of :meth:`scene`."""
         scene = self.entry(name).scene or getattr(self, stage).scene
         return Path(scene) if scene else None
 

@@ -457,21 +457,21 @@ def _tracked(rows: Reals, turns: tuple[Reals, Reals], start: Reals, q: Reals) ->
     n = rows.shape[2]
     last, step = start.copy(), np.empty(n)
     for i in range(rows.shape[0]):
-        least, reached = np.inf, False
+        nearest, reached = np.inf, False
         for slot in range(rows.shape[1]):
             if np.isnan(rows[i, slot, 0]):
                 continue
-            reached, farthest = True, 0.0
+            reached, max_step = True, 0.0
             for j in range(n):
                 step[j] = rows[i, slot, j] - last[j]
             take_turns_off(step, turns)
             for j in range(n):
-                farthest = max(farthest, abs(step[j]))
-            if farthest < least:
-                least = farthest
+                max_step = max(max_step, abs(step[j]))
+            if max_step < nearest:
+                nearest = max_step
                 for j in range(n):
                     q[i, j] = last[j] + step[j]
-        if least > WIDE:
+        if nearest > WIDE:
             return i, reached
         last[:] = q[i]
     return rows.shape[0], True

@@ -574,14 +574,14 @@ def _costs_to_go(q: Reals, price: Reals, meeting: Integers) -> tuple[Integers, F
             for b in range(SLOTS):
                 if not np.isfinite(behind[b]):
                     continue
-                travel, farthest = 0.0, 0.0
+                travel, max_step = 0.0, 0.0
                 for j in range(6):
                     step = q[i + 1, b, j] - q[i, a, j]
                     step -= 2 * np.pi * np.round(step / (2 * np.pi))
                     travel += step * step
-                    farthest = max(farthest, abs(step))
+                    max_step = max(max_step, abs(step))
                 together = (a ^ b) & ~(meeting[i, a] | meeting[i + 1, b]) == 0
-                jump = farthest > (WIDE_STEP if together else SWITCH_STEP)
+                jump = max_step > (WIDE_STEP if together else SWITCH_STEP)
                 total = price[i, a] + np.sqrt(travel) + behind[b] + (JUMP_COST if jump else 0.0)
                 if total < cost[a]:
                     cost[a] = total

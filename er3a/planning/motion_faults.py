@@ -27,16 +27,8 @@ import scipy
 from numpy.polynomial import chebyshev
 
 from er3a.by_value import Finding
+from er3a.kinematics import singularity
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.singularity import (
-    TYPES,
-    EventType,
-    NearSingular,
-    SingularityType,
-    determinant_factors,
-    factor_of,
-    rank_losses,
-)
 from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Reals, runs
@@ -71,13 +63,15 @@ class SingularEvent:
 
     t: float
     until: float
-    type: EventType
+    type: singularity.EventType
     crossing: bool
     distance: float
     axes: tuple[int, ...] = ()
 
 
-def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: NearSingular) -> list[SingularEvent]:
+def singular_events(
+    robot: Robot, t: Reals, q: Reals, joints: Joints, near: singularity.NearSingular
+) -> list[SingularEvent]:
     """All crossings, and the nearest pass of each stretch below its type's threshold, in order of time.
 
     Parameters
@@ -89,22 +83,27 @@ def singular_events(robot: Robot, t: Reals, q: Reals, joints: Joints, near: Near
     if not has_branches(robot):
         return [
             SingularEvent(loss.t, loss.until, "dependent_axes", loss.crossing, loss.smallest, loss.axes)
-            for loss in rank_losses(robot, t, q, joints, near.smallest)
+            for loss in singularity.rank_losses(robot, t, q, joints, near.smallest)
         ]
     events: list[SingularEvent] = []
-    for kind in TYPES:
+    for kind in singularity.TYPES:
 
-        def factor(at: Any, kind: SingularityType = kind) -> Any:
-            return factor_of(determinant_factors(robot, joints(at)), kind)
+        def factor(at: Any, kind: singularity.SingularityType = kind) -> Any:
+            return singularity.factor_of(singularity.determinant_factors(robot, joints(at)), kind)
 
-        values = factor_of(determinant_factors(robot, q), kind)
+        values = singularity.factor_of(singularity.determinant_factors(robot, q), kind)
         for stretch in runs(np.isfinite(values)):
             events += _in_stretch(kind, t, values, stretch, factor, near)
-    return sorted(events, key=lambda event: (event.t, [*TYPES, "dependent_axes"].index(event.type)))
+    return sorted(events, key=lambda event: (event.t, [*singularity.TYPES, "dependent_axes"].index(event.type)))
 
 
 def _in_stretch(
-    kind: SingularityType, t: Reals, values: Reals, stretch: tuple[int, int], factor: Factor, near: NearSingular
+    kind: singularity.SingularityType,
+    t: Reals,
+    values: Reals,
+    stretch: tuple[int, int],
+    factor: Factor,
+    near: singularity.NearSingular,
 ) -> list[SingularEvent]:
     """Events between two unreachable stretches (or the ends of the motion)."""
     first, last = stretch
@@ -227,67 +226,61 @@ class BelowLimit:
 
 
 @dataclass(frozen=True)
-class TooFast:
+class NeededSpeed:
+    """A speed that a joint (from 1) would need, beyond its limit."""
+
+    joint: int
+    needed_deg_s: float
+    limit_deg_s: float
+    slides: bool = False
+
+    @property
+    def ratio(self) -> float:
+        """What is needed over what is allowed."""
+        return self.needed_deg_s / self.limit_deg_s
+
+
+@dataclass(frozen=True)
+class TooFast(NeededSpeed):
     """A joint (from 1) would have to move faster than it can; values are in mm if it ``slides``."""
 
-    joint: int
-    needed_deg_s: float
-    limit_deg_s: float
-    slides: bool = False
     code: Literal["too_fast"] = "too_fast"
 
-    @property
-    def ratio(self) -> float:
-        """What is needed over what is allowed."""
-        return self.needed_deg_s / self.limit_deg_s
-
 
 @dataclass(frozen=True)
-class TooFastIfAssumed:
+class TooFastIfAssumed(NeededSpeed):
     """A joint (from 1), whose maximum speed is assumed, would have to move faster; in mm if it ``slides``."""
 
-    joint: int
-    needed_deg_s: float
-    limit_deg_s: float
-    slides: bool = False
     code: Literal["too_fast_if_assumed"] = "too_fast_if_assumed"
 
+
+@dataclass(frozen=True)
+class NeededAcceleration:
+    """An acceleration that a joint (from 1) would need, beyond its limit."""
+
+    joint: int
+    needed_deg_s2: float
+    limit_deg_s2: float
+    slides: bool = False
+
     @property
     def ratio(self) -> float:
         """What is needed over what is allowed."""
-        return self.needed_deg_s / self.limit_deg_s
+        return self.needed_deg_s2 / self.limit_deg_s2
 
 
 @dataclass(frozen=True)
-class AccelerationTooGreat:
+class AccelerationTooGreat(NeededAcceleration):
     """A joint (from 1) would have to accelerate more than it can; in mm if it ``slides``."""
 
-    joint: int
-    needed_deg_s2: float
-    limit_deg_s2: float
-    slides: bool = False
     code: Literal["acceleration_too_great"] = "acceleration_too_great"
-
-    @property
-    def ratio(self) -> float:
-        """What is needed over what is allowed."""
-        return self.needed_deg_s2 / self.limit_deg_s2
 
 
 @dataclass(frozen=True)
-class AccelerationTooGreatIfAssumed:
+class AccelerationTooGreatIfAssumed(NeededAcceleration):
     """A joint (from 1), whose maximum acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
 
-    joint: int
-    needed_deg_s2: float
-    limit_deg_s2: float
-    slides: bool = False
     code: Literal["acceleration_too_great_if_assumed"] = "acceleration_too_great_if_assumed"
-
-    @property
-    def ratio(self) -> float:
-        """What is needed over what is allowed."""
-        return self.needed_deg_s2 / self.limit_deg_s2
 
 
 @dataclass(frozen=True)
@@ -585,14 +578,14 @@ def factor_forms(robot: Robot) -> FactorForms:
     for joint, kind in ((WRIST_JOINT, "wrist"), (ELBOW_JOINT, "elbow")):
         q = np.zeros((2, 6))
         q[1, joint] = np.pi / 2
-        at_0, at_90 = np.sin(getattr(determinant_factors(robot, q @ back.T), kind))
+        at_0, at_90 = np.sin(getattr(singularity.determinant_factors(robot, q @ back.T), kind))
         phases.append(float(np.arctan2(at_0, at_90)))
     sense = float(robot.direction[1] * robot.direction[2] * arm.elbow_sign)
     q = np.zeros((25, 6))
     q[:, 1:3] = np.stack(np.meshgrid(*[np.linspace(0, 5, 5)] * 2), axis=-1).reshape(-1, 2)
     both = q[:, 1] + sense * q[:, 2]
     columns = np.stack([np.ones(25), np.cos(q[:, 1]), np.sin(q[:, 1]), np.cos(both), np.sin(both)], axis=1)
-    shoulder = np.linalg.lstsq(columns, determinant_factors(robot, q @ back.T).shoulder, rcond=None)[0]
+    shoulder = np.linalg.lstsq(columns, singularity.determinant_factors(robot, q @ back.T).shoulder, rcond=None)[0]
     return FactorForms(phases[0], phases[1], sense, shoulder)
 
 
@@ -687,7 +680,7 @@ class SingularCheck:
         if the sets of this arm are no functions of single joints
     """
 
-    def __init__(self, robot: Robot, near: NearSingular):
+    def __init__(self, robot: Robot, near: singularity.NearSingular):
         self._robot, self._near = robot, near
         self._stretches: dict[tuple[int, int], list[_Stretch]] = {}  # by the number of the type, and half turns
         self._parts, self._end = 0, 0.0
@@ -698,7 +691,7 @@ class SingularCheck:
             moved = (series @ self._robot.coupling.T for series in (part.angle, part.velocity, part.acceleration))
             part = PiecewiseMotion(part.times, *moved)
         self._parts, self._end = self._parts + 1, part.duration
-        for order, kind in enumerate(TYPES):
+        for order, kind in enumerate(singularity.TYPES):
             near = self._near.of(kind)
             for turn, distance in _distances(self._robot, part, kind, near):
                 _near_stretches(distance, near, self._parts, self._stretches.setdefault((order, turn), []))
@@ -708,8 +701,8 @@ class SingularCheck:
         found: list[SingularEvent] = []
         for (order, _), stretches in sorted(self._stretches.items(), key=lambda each: each[0]):
             for stretch in stretches:
-                found += stretch.events(TYPES[order], self._near.of(TYPES[order]), self._end)
-        return sorted(found, key=lambda event: (event.t, TYPES.index(event.type)))
+                found += stretch.events(singularity.TYPES[order], self._near.of(singularity.TYPES[order]), self._end)
+        return sorted(found, key=lambda event: (event.t, singularity.TYPES.index(event.type)))
 
 
 def limit_intervals(robot: Robot, motion: Polynomials) -> list[Interval[LimitCause]]:
@@ -736,7 +729,7 @@ class _Stretch:
     roots: list[Reals]
     part: int = 0
 
-    def events(self, kind: SingularityType, near: float, duration: float) -> list[SingularEvent]:
+    def events(self, kind: singularity.SingularityType, near: float, duration: float) -> list[SingularEvent]:
         """Crossings, and the nearest passes."""
         t, f, roots = (np.concatenate(each) for each in (self.t, self.f, self.roots))
         met = [_stay(t, f, a, b, duration) for a, b in runs(np.abs(f) <= ON_SET)]
@@ -773,7 +766,7 @@ def _near_stretches(distance: Pieces, near: float, part: int, found: list[_Stret
 
 
 def _distances(
-    robot: Robot, motion: PiecewiseMotion, kind: SingularityType, near: float
+    robot: Robot, motion: PiecewiseMotion, kind: singularity.SingularityType, near: float
 ) -> Iterator[tuple[int, Pieces]]:
     """Signed distances from the sets of a type, with the half turns to each that the motion may come near."""
     forms = factor_forms(robot)

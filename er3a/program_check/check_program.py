@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.collision.pairs import PairsUnexamined, ShapesAssumed
+from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE, PairsUnexamined, ShapesAssumed
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
@@ -27,24 +27,8 @@ from er3a.planning.commands import (
     ToolSequenceCommand,
 )
 from er3a.planning.timing import JointLimits, joint_limits
+from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionPath
-from er3a.program_check.program_check_findings import (
-    RANKS,
-    BothSidesChecked,
-    CheckFinding,
-    Level,
-    LoadAbovePayload,
-    LoadNotExamined,
-    MayMove,
-    MotionNotReached,
-    MovesBesideProgram,
-    NeverReached,
-    NotFollowedToEnd,
-    PathNotKnown,
-    RestNotChecked,
-    level_of,
-    worst_of,
-)
 from er3a.program_check.step_checks import CheckedMotion, StepChecker, obstacles_of
 from er3a.programs.execution import Ending, Execution, KeepOn, RunLimits
 from er3a.programs.instructions import ArmMotion, Decision, MovesBeside, Pause, Place, PoseTarget, Unknown
@@ -85,8 +69,8 @@ class CheckOptions(ByValue):
     near: NearSingular = USUAL_NEAR
     assumed_speed: Reals | None = None
     acceleration_time: float = 0.25
-    penetration_tolerance: float = 0.001
-    assumed_margin: float = 0.02
+    penetration_tolerance: float = PENETRATION_TOLERANCE
+    assumed_margin: float = ASSUMED_MARGIN
     measures: bool = True
     most_motions: int = MOST_MOTIONS
     assumed: AssumedRates = field(default_factory=AssumedRates)
@@ -116,8 +100,8 @@ class LocatedFinding:
     joint_moves : (n,) each, deg: joint moves, one or two, that take the tool where that motion does, and pass
     """
 
-    level: Level
-    finding: CheckFinding
+    level: found_in.Level
+    finding: found_in.CheckFinding
     place: Place
     calls: tuple[Place, ...] = ()
     times: int = 1
@@ -143,7 +127,7 @@ class MotionVerdict:
     line: int
     text: str
     kind: str
-    level: Level
+    level: found_in.Level
     times: int
     duration_s: float | None
     least_clearance_mm: float | None
@@ -185,7 +169,7 @@ class ProgramCheck(ByValue):
     """
 
     execution: Execution
-    level: Level
+    level: found_in.Level
     findings: tuple[LocatedFinding, ...]
     verdicts: tuple[MotionVerdict, ...]
     motions: Mapping[int, CheckedMotion]
@@ -225,7 +209,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     located = _with_joint_moves(located, checker, options.keep_on)
     missed = _not_examined(execution, located, end)
     verdicts = _verdicts(program, execution, checker.motions, located, missed)
-    level: Level = worst_of(each.level for each in located)
+    level: found_in.Level = found_in.worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
     cycle = _cycle(execution, checker.motions, main, way)
@@ -249,10 +233,12 @@ def _not_examined(execution: Execution, located: tuple[LocatedFinding, ...], end
     """``end``: number of the first step that was not checked."""
     moves = (step.place for step in execution.steps[end:] if isinstance(step.instruction, ArmMotion))
     found = [NotExamined(place, "motion") for place in moves]
-    missed = (MotionNotReached, NeverReached)
+    missed = (found_in.MotionNotReached, found_in.NeverReached)
     found += [NotExamined(each.place, "motion") for each in located if isinstance(each.finding, missed)]
-    found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, PathNotKnown)]
-    found += [NotExamined(each.place, "course") for each in located if isinstance(each.finding, NotFollowedToEnd)]
+    found += [NotExamined(each.place, "way") for each in located if isinstance(each.finding, found_in.PathNotKnown)]
+    found += [
+        NotExamined(each.place, "course") for each in located if isinstance(each.finding, found_in.NotFollowedToEnd)
+    ]
     files = {each.place.file: i for i, each in enumerate(located)}
     order = dict.fromkeys(found)
     return tuple(sorted(order, key=lambda each: (files.get(each.place.file, len(files)), each.place.line)))
@@ -264,21 +250,21 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
     top = Place(program.file)
     moving = {step.place for step in execution.steps if isinstance(step.instruction, Unknown)}
     found = [
-        LocatedFinding(level_of(each), each, _place_of(each, top))
+        LocatedFinding(found_in.level_of(each), each, _place_of(each, top))
         for each in program.findings
         if not (isinstance(each, NotUnderstood) and each.place in moving)
     ]
     if end < len(execution.steps):
         targets, wrong = checker.rest(end)
-        rest = RestNotChecked(len(checker.motions), targets)
+        rest = found_in.RestNotChecked(len(checker.motions), targets)
         found.append(LocatedFinding("caution", rest, execution.steps[end].place))
         for number, each_wrong in wrong.items():
             step = execution.steps[number]
-            found += [LocatedFinding(level_of(each), each, step.place, step.calls) for each in each_wrong]
+            found += [LocatedFinding(found_in.level_of(each), each, step.place, step.calls) for each in each_wrong]
     for number, motion in checker.motions.items():
         step = execution.steps[number]
         found += [
-            LocatedFinding(level_of(each), each, step.place, step.calls, 1, number, motion.moments.get(each))
+            LocatedFinding(found_in.level_of(each), each, step.place, step.calls, 1, number, motion.moments.get(each))
             for each in motion.findings
         ]
     arms = checker.obstacles.bodies.values() if checker.obstacles else ()
@@ -287,30 +273,34 @@ def _located(execution: Execution, robot: Robot, checker: StepChecker, end: int)
     for step in execution.steps:
         what = step.instruction
         if isinstance(what, Unknown):
-            unknown = MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
+            unknown = found_in.MayMove(what.text) if what.may_move else NotUnderstood(what.text, step.place)
             found.append(LocatedFinding("caution", unknown, step.place, step.calls))
         elif isinstance(what, MovesBeside) and what.kind != "entered":
-            beside = MovesBesideProgram(what.routine, what.kind)
+            beside = found_in.MovesBesideProgram(what.routine, what.kind)
             found.append(LocatedFinding("caution", beside, step.place, step.calls))
         elif isinstance(what, Decision) and what.taken:
-            found.append(LocatedFinding("note", BothSidesChecked(what.condition), step.place, step.calls))
+            found.append(LocatedFinding("note", found_in.BothSidesChecked(what.condition), step.place, step.calls))
     found += _loads(execution, robot)
     found += [LocatedFinding("caution", other, ending.place) for ending, other in checker.returns]
     for ending in execution.endings:
         if ending.kind not in ("end", "repeats", "joins"):
-            stopped = NotFollowedToEnd(ending.kind, ending.limit)
-            found.append(LocatedFinding(level_of(stopped), stopped, ending.place))
+            stopped = found_in.NotFollowedToEnd(ending.kind, ending.limit)
+            found.append(LocatedFinding(found_in.level_of(stopped), stopped, ending.place))
     unmet = dict.fromkeys(place for place in execution.unmet if place.file == program.file)
     unreached = dict.fromkeys(_unreached(execution))
     for place in dict.fromkeys([*unreached, *unmet]):
-        missed: CheckFinding = NeverReached(place in unreached) if execution.complete else MotionNotReached()
-        found.append(LocatedFinding(level_of(missed), missed, place))
+        missed: found_in.CheckFinding = (
+            found_in.NeverReached(place in unreached) if execution.complete else found_in.MotionNotReached()
+        )
+        found.append(LocatedFinding(found_in.level_of(missed), missed, place))
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
         groups[each.place, each.finding.code, _which(each.finding)].append(each)
     grouped = [replace(same[0], times=len(same)) for same in groups.values()]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
-    return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
+    return tuple(
+        sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -found_in.RANKS[each.level]))
+    )
 
 
 def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
@@ -321,14 +311,14 @@ def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
         if load is None or load in seen:
             continue
         seen.add(load)
-        found: CheckFinding
+        found: found_in.CheckFinding
         if isinstance(load, str):
-            found = LoadNotExamined(None, load)
+            found = found_in.LoadNotExamined(None, load)
         elif wrist is not None and load.mass > wrist.payload:
-            found = LoadAbovePayload(load.mass, wrist.payload)
+            found = found_in.LoadAbovePayload(load.mass, wrist.payload)
         else:
-            found = LoadNotExamined(load.mass)
-        yield LocatedFinding(level_of(found), found, step.place, step.calls)
+            found = found_in.LoadNotExamined(load.mass)
+        yield LocatedFinding(found_in.level_of(found), found, step.place, step.calls)
 
 
 BY_JOINT_MOVES = frozenset(
@@ -362,13 +352,13 @@ def _with_joint_moves(
     )
 
 
-def _which(finding: CheckFinding) -> str:
+def _which(finding: found_in.CheckFinding) -> str:
     """What distinguishes findings of one code at one instruction."""
     names = ("joint", "type", "name", "text", "condition", "kind", "mass_kg")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
 
-def _place_of(finding: CheckFinding, top: Place) -> Place:
+def _place_of(finding: found_in.CheckFinding, top: Place) -> Place:
     """Where a finding about the text stands."""
     place = getattr(finding, "place", None)
     return place if isinstance(place, Place) else top
@@ -404,11 +394,11 @@ def _verdicts(
         step = execution.steps[number]
         done[step.place].append(motion)
         lines.setdefault(step.place, execution.own_line(step))
-    worst: dict[Place, Level] = {}
+    worst: dict[Place, found_in.Level] = {}
     for each in located:
-        worst[each.place] = worst_of((worst.get(each.place, "pass"), each.level))
+        worst[each.place] = found_in.worst_of((worst.get(each.place, "pass"), each.level))
     for missing in (each for each in missed if each.what != "way"):
-        worst[missing.place] = worst_of((worst.get(missing.place, "pass"), "caution"))
+        worst[missing.place] = found_in.worst_of((worst.get(missing.place, "pass"), "caution"))
     met = {step.place for step in execution.steps}
     found = []
     for place, text in _motion_texts(program):
@@ -416,7 +406,7 @@ def _verdicts(
         if not here and place not in met and place.file != program.file:
             continue
         if not here and place in met:
-            worst[place] = worst_of((worst.get(place, "pass"), "caution"))
+            worst[place] = found_in.worst_of((worst.get(place, "pass"), "caution"))
         durations = [each.way.law.duration for each in here if each.way is not None]
         clear = [each.clearance for each in here if each.clearance is not None]
         found.append(

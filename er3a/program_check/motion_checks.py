@@ -22,45 +22,15 @@ from er3a.kinematics.singularity import NearSingular, determinant_factors
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
+from er3a.planning import motion_faults
 from er3a.planning.follow import Followed
-from er3a.planning.motion_faults import (
-    AccelerationTooGreat,
-    AccelerationTooGreatIfAssumed,
-    Interval,
-    LimitCause,
-    LimitSide,
-    RateCause,
-    TooFast,
-    TooFastIfAssumed,
-    joints_of,
-    limit_sides,
-    out_of_limits,
-    rates_exceeded,
-    singular_events,
-    unreachable,
-)
 from er3a.planning.moves import Segment, line
 from er3a.planning.piecewise import polynomial_motion
 from er3a.planning.profiles import trapezoid
 from er3a.planning.sequences import TURN_LENGTH, Arc, arc
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_proof import ProofRequirements, ToolProof, follow_and_prove
-from er3a.program_check.program_check_findings import (
-    AcceleratesMoreThanAssumed,
-    ArcHasNoCircle,
-    ArrivesOtherwise,
-    CheckFinding,
-    ConfigurationChanges,
-    ConfigurationEnds,
-    FasterThanAssumed,
-    JointJumps,
-    LineNotChecked,
-    MeetsSingularity,
-    PassesSingularity,
-    StretchOutOfReach,
-    TurnsAtStart,
-    WholeTurn,
-)
+from er3a.program_check import program_check_findings as found_in
 from er3a.programs.instructions import ArmMotion, Rate
 from er3a.robots.joint_limits import joint_shown
 from er3a.robots.robot import Robot
@@ -183,7 +153,7 @@ def time_of_share(law: MotionLaw, share: float) -> float:
     return high
 
 
-def limit_moment(law: MotionLaw, side: LimitSide, start: Reals, end: Reals) -> float:
+def limit_moment(law: MotionLaw, side: motion_faults.LimitSide, start: Reals, end: Reals) -> float:
     """When (s) a joint move between joints (n,) goes beyond a side of a limit that its end is beyond; 0 if it begins
     there."""
     before, behind, bound = float(side.of(start)), float(side.of(end)), side.sign * side.limit
@@ -257,9 +227,9 @@ class MotionPath(ByValue):
     length: float
     turned: float
     end: Reals | None
-    findings: tuple[CheckFinding, ...]
+    findings: tuple[found_in.CheckFinding, ...]
     tool_path: Segment | None = None
-    moments: Mapping[CheckFinding, float] = field(default_factory=dict)
+    moments: Mapping[found_in.CheckFinding, float] = field(default_factory=dict)
 
     def sagitta(self, share: float) -> float:
         """By how much (m) a share of the tool's way bulges over the straight line between its ends."""
@@ -323,23 +293,25 @@ def joint_motion_path(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, r
     )
 
 
-def limit_findings(arm: Robot, q: Reals) -> tuple[LimitCause, ...]:
+def limit_findings(arm: Robot, q: Reals) -> tuple[motion_faults.LimitCause, ...]:
     """Joints (n,) in rad or m, and sums of them, that are beyond a limit."""
     return tuple(side.cause(float(side.of(q))) for side in _sides_left(arm, q))
 
 
-def _sides_left(arm: Robot, q: Reals) -> list[LimitSide]:
-    return [side for side in limit_sides(arm) if float(side.of(q)) > side.sign * side.limit + LIMIT_TOLERANCE]
+def _sides_left(arm: Robot, q: Reals) -> list[motion_faults.LimitSide]:
+    return [
+        side for side in motion_faults.limit_sides(arm) if float(side.of(q)) > side.sign * side.limit + LIMIT_TOLERANCE
+    ]
 
 
-def _limit_moments(arm: Robot, law: MotionLaw, start: Reals, end: Reals) -> dict[CheckFinding, float]:
+def _limit_moments(arm: Robot, law: MotionLaw, start: Reals, end: Reals) -> dict[found_in.CheckFinding, float]:
     """Limits that the end (n,) of a joint move is beyond, and when (s) the move passes them."""
     return {side.cause(float(side.of(end))): limit_moment(law, side, start, end) for side in _sides_left(arm, end)}
 
 
 def tool_motion_path(
     arm: Robot, motion: ArmMotion, start: Reals, goal: tuple[Reals, Reals | None, Reals | None], rules: CheckRules
-) -> MotionPath | CheckFinding | None:
+) -> MotionPath | found_in.CheckFinding | None:
     """A line or arc from joints (n,) in rad; None if the tool does not move, a finding if it can't be followed.
 
     Parameters
@@ -351,7 +323,7 @@ def tool_motion_path(
     try:
         shape = line(T_start, end, 1.0) if via is None else _arc(T_start, via, end, (1.0, None), motion.angle)
     except PoseError:
-        return ArcHasNoCircle()
+        return found_in.ArcHasNoCircle()
     turn_length = TURN_LENGTH
     if motion.turn_speed is not None and motion.speed is not None and motion.speed.unit == "m/s":
         turn_length = motion.speed.value / motion.turn_speed
@@ -367,7 +339,7 @@ def tool_motion_path(
     try:
         followed, proof = follow_and_prove(arm, path, times, ProofRequirements(rules.limits.rates, rules.near), start)
     except NotWristPartitionedError:
-        return LineNotChecked()
+        return found_in.LineNotChecked()
     last = followed.q[-1]
     end_joints = last if np.isfinite(last).all() else None
     way = MotionPath(
@@ -388,24 +360,24 @@ def _arc(T_start: Reals, via: Reals, end: Reals, time: tuple[float, float | None
 
 def _followed_moments(
     followed: Followed, proof: ToolProof, way: MotionPath, rules: CheckRules
-) -> dict[CheckFinding, float]:
+) -> dict[found_in.CheckFinding, float]:
     """Reach, configuration, limits, singular poses and speeds, each with the time (s) from which on it is wrong."""
     arm = way.arm
-    found: dict[CheckFinding, float] = {
-        StretchOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
-        for stretch in unreachable(arm, followed)
+    found: dict[found_in.CheckFinding, float] = {
+        found_in.StretchOutOfReach(way.along_mm(stretch.start), stretch.cause.reasons): stretch.start
+        for stretch in motion_faults.unreachable(arm, followed)
     }
     for jump in followed.jumps:
         amount, slides = joint_shown(arm, jump.joint - 1, jump.angle)
-        found[ConfigurationEnds(way.along_mm(jump.t), jump.joint, amount, slides)] = jump.t
+        found[found_in.ConfigurationEnds(way.along_mm(jump.t), jump.joint, amount, slides)] = jump.t
     ends = bool(found)
     t, kept = np.unique(np.concatenate([way.t, proof.t]), return_index=True)
     solved = np.concatenate([way.q, proof.q])[kept]
-    outside = out_of_limits(arm, t, solved, way.joints)
-    limits = {(type(each.cause), joints_of(each.cause)): each.cause for each in outside}
-    begun = {(type(each.cause), joints_of(each.cause)): each.start for each in reversed(outside)}
+    outside = motion_faults.out_of_limits(arm, t, solved, way.joints)
+    limits = {(type(each.cause), motion_faults.joints_of(each.cause)): each.cause for each in outside}
+    begun = {(type(each.cause), motion_faults.joints_of(each.cause)): each.start for each in reversed(outside)}
     found |= {cause: begun[key] for key, cause in limits.items()}
-    events = singular_events(arm, t, solved, way.joints, rules.near)
+    events = motion_faults.singular_events(arm, t, solved, way.joints, rules.near)
     at = np.unique(np.concatenate([t, [event.t for event in events]]))
     q, velocity, acceleration = followed.rates(at)
     bounded = not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
@@ -413,46 +385,51 @@ def _followed_moments(
         where = way.along_mm(event.t)
         if not event.crossing:
             scale = 1000.0 if event.type == "shoulder" else float(np.degrees(1.0))
-            found[PassesSingularity(event.type, where, event.distance * scale)] = event.t
+            found[found_in.PassesSingularity(event.type, where, event.distance * scale)] = event.t
         elif not ends:
-            found[MeetsSingularity(event.type, where, bounded)] = event.t
+            found[found_in.MeetsSingularity(event.type, where, bounded)] = event.t
     if ends:  # towards the end of reach joint speeds grow without bound
         return found
-    stretches: list[Interval[RateCause]] = []
+    stretches: list[motion_faults.Interval[motion_faults.RateCause]] = []
     for limit in rules.limits.rates[:2]:
         values = velocity if limit.order == 1 else acceleration
-        stretches += rates_exceeded(at, values, limit, lambda t, order=limit.order: followed.rates(t)[order])  # type: ignore[misc]
+        stretches += motion_faults.rates_exceeded(
+            at,
+            values,
+            limit,
+            lambda t, order=limit.order: followed.rates(t)[order],  # type: ignore[misc]
+        )
     worst = {_of(each): each.cause for each in sorted(stretches, key=lambda stretch: stretch.cause.ratio)}
     first = {_of(each): each.start for each in sorted(stretches, key=lambda stretch: stretch.start, reverse=True)}
     found |= {_as_checked(worst[key]): first[key] for key in sorted(worst, key=lambda key: key[1])}
     return found | {part.cause: part.start for part in reversed(proof.undecided)}
 
 
-def _of(stretch: Interval[RateCause]) -> tuple[type, int]:
+def _of(stretch: motion_faults.Interval[motion_faults.RateCause]) -> tuple[type, int]:
     """What limit of which joint is exceeded."""
     return type(stretch.cause), stretch.cause.joint
 
 
-def _as_checked(cause: RateCause) -> CheckFinding:
-    if isinstance(cause, TooFastIfAssumed):
-        return FasterThanAssumed(cause.joint, cause.needed_deg_s, cause.limit_deg_s, cause.slides)
-    if isinstance(cause, TooFast):
+def _as_checked(cause: motion_faults.RateCause) -> found_in.CheckFinding:
+    if isinstance(cause, motion_faults.TooFastIfAssumed):
+        return found_in.FasterThanAssumed(cause.joint, cause.needed_deg_s, cause.limit_deg_s, cause.slides)
+    if isinstance(cause, motion_faults.TooFast):
         return cause
-    assert isinstance(cause, AccelerationTooGreatIfAssumed | AccelerationTooGreat)
-    return AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2, cause.slides)
+    assert isinstance(cause, motion_faults.AccelerationTooGreatIfAssumed | motion_faults.AccelerationTooGreat)
+    return found_in.AcceleratesMoreThanAssumed(cause.joint, cause.needed_deg_s2, cause.limit_deg_s2, cause.slides)
 
 
-def _arrival_moments(followed: Followed, given: Reals | None, way: MotionPath) -> dict[CheckFinding, float]:
+def _arrival_moments(followed: Followed, given: Reals | None, way: MotionPath) -> dict[found_in.CheckFinding, float]:
     """Turns at rest at the start, and whether the end has the joints that the program gives; with their times, s."""
-    found: dict[CheckFinding, float] = {}
+    found: dict[found_in.CheckFinding, float] = {}
     turn, last = followed.start_turn, followed.q[-1]
     joint = int(np.argmax(np.abs(turn)))
     if abs(turn[joint]) > SAME_ARRIVAL:
-        found[TurnsAtStart(joint + 1, float(np.degrees(turn[joint])))] = 0.0
+        found[found_in.TurnsAtStart(joint + 1, float(np.degrees(turn[joint])))] = 0.0
     if given is not None and np.isfinite(last).all() and np.abs(last - given).max() > SAME_ARRIVAL:
         joint = int(np.argmax(np.abs(last - given)))
         other = joint_shown(way.arm, joint, float(last[joint] - given[joint]))
-        found[ArrivesOtherwise(joint + 1, *other)] = way.law.duration
+        found[found_in.ArrivesOtherwise(joint + 1, *other)] = way.law.duration
     return found
 
 
@@ -463,18 +440,18 @@ def _points(length: float, turned: float) -> int:
 
 def _rate_moments(
     arm: Robot, law: MotionLaw, greatest: tuple[Reals, Reals], limits: JointLimits
-) -> dict[CheckFinding, float]:
+) -> dict[found_in.CheckFinding, float]:
     """Of a joint move with maximum speeds and accelerations (n,), each with when (s) it gets too great."""
-    found: dict[CheckFinding, float] = {}
+    found: dict[found_in.CheckFinding, float] = {}
     speed = greatest[0]
     for j in np.flatnonzero(speed > limits.speed * (1 + SPEED_TOLERANCE)).tolist():
         (needed, slides), (able, _) = (joint_shown(arm, j, float(rates[j])) for rates in (speed, limits.speed))
-        made = TooFast if np.isfinite(arm.speed[j]) else FasterThanAssumed
+        made = motion_faults.TooFast if np.isfinite(arm.speed[j]) else found_in.FasterThanAssumed
         found[made(j + 1, needed, able, slides)] = speed_moment(law, float(limits.speed[j] / speed[j]))
     return found | dict.fromkeys(_acceleration_findings(arm, greatest[1], limits), 0.0)
 
 
-def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits) -> list[CheckFinding]:
+def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits) -> list[found_in.CheckFinding]:
     """The joint that asks most of its acceleration, if that is too much."""
     ratio = acceleration / limits.acceleration
     worst = int(np.argmax(ratio))
@@ -483,10 +460,12 @@ def _acceleration_findings(arm: Robot, acceleration: Reals, limits: JointLimits)
     (needed, slides), (able, _) = (
         joint_shown(arm, worst, float(rates[worst])) for rates in (acceleration, limits.acceleration)
     )
-    return [AcceleratesMoreThanAssumed(worst + 1, needed, able, slides)]
+    return [found_in.AcceleratesMoreThanAssumed(worst + 1, needed, able, slides)]
 
 
-def _configuration_moment(arm: Robot, law: MotionLaw, joints_at: Callable[[Reals], Reals]) -> dict[CheckFinding, float]:
+def _configuration_moment(
+    arm: Robot, law: MotionLaw, joints_at: Callable[[Reals], Reals]
+) -> dict[found_in.CheckFinding, float]:
     """Whether a joint move ends in another configuration, and when (s) it leaves that of its start."""
     if closed_form_missing(arm) is not None:
         return {}
@@ -497,20 +476,20 @@ def _configuration_moment(arm: Robot, law: MotionLaw, joints_at: Callable[[Reals
     labels, first, last = branch_labels(arm), slot(0.0), slot(1.0)
     if first is None or last is None or first == last:
         return {}
-    return {ConfigurationChanges(labels[first], labels[last]): change_moment(law, slot)}
+    return {found_in.ConfigurationChanges(labels[first], labels[last]): change_moment(law, slot)}
 
 
-def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: float) -> list[CheckFinding]:
-    found: list[CheckFinding] = []
+def _joint_jumps(arm: Robot, start: Reals, end: Reals, moved: float, turned: float) -> list[found_in.CheckFinding]:
+    found: list[found_in.CheckFinding] = []
     step = end - start
     turned_by = np.where(arm.slides, 0.0, np.abs(step))
     lead = int(np.argmax(turned_by))
     if turned_by[lead] > FAR_TURN and moved < NEAR_MOVE and turned < turned_by[lead] / 2:
-        found.append(JointJumps(lead + 1, float(np.degrees(step[lead])), moved * 1000))
+        found.append(found_in.JointJumps(lead + 1, float(np.degrees(step[lead])), moved * 1000))
     for j in np.flatnonzero(turned_by > np.pi + NO_WAY).tolist():
         nearer = float(wrap_to_pi(step[j]))
         if arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
-            found.append(WholeTurn(j + 1, *np.degrees([step[j], nearer]).tolist()))
+            found.append(found_in.WholeTurn(j + 1, *np.degrees([step[j], nearer]).tolist()))
     return found
 
 

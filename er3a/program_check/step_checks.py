@@ -54,6 +54,7 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import turned_difference
 from er3a.planning.tool_proof import inverse_and_reach
+from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import (
     CheckRules,
     MotionPath,
@@ -62,47 +63,8 @@ from er3a.program_check.motion_checks import (
     limit_findings,
     tool_motion_path,
 )
-from er3a.program_check.program_check_findings import (
-    ArcGoesOn,
-    ArcHasNoCircle,
-    BodiesTouch,
-    CheckFinding,
-    ClearOfAssumed,
-    ConfigurationGuessed,
-    ConfigurationNotMet,
-    ConfigurationNotRead,
-    ExternalAxesLeftOut,
-    FrameNotGiven,
-    FrameTakenAsFlange,
-    LoopComesBackOtherwise,
-    MoreThanFullSpeed,
-    MotionCollides,
-    PathNotKnown,
-    SpeedNotGiven,
-    SplineAsLine,
-    StretchOutOfReach,
-    TargetNotGiven,
-    TargetOutOfReach,
-    TurnNotMet,
-    ZoneCollides,
-    ZoneNotSettled,
-    ZoneTooLarge,
-    ZoneWithoutSize,
-    level_of,
-    worst_of,
-)
+from er3a.programs import instructions
 from er3a.programs.execution import Ending, Execution
-from er3a.programs.instructions import (
-    ArmMotion,
-    JointTarget,
-    MovesBeside,
-    Pause,
-    PoseTarget,
-    Rate,
-    Target,
-    Unknown,
-    UnresolvedTarget,
-)
 from er3a.programs.writing import solutions_meant
 from er3a.robots.joint_limits import joint_shown, within
 from er3a.robots.robot import Robot
@@ -122,14 +84,14 @@ class PlacedMotion(ByValue):
     missing, taken : frames that are not given
     """
 
-    motion: ArmMotion
+    motion: instructions.ArmMotion
     arm: Robot
     base: Reals | None
-    missing: tuple[FrameNotGiven, ...]
-    taken: tuple[FrameTakenAsFlange, ...]
+    missing: tuple[found_in.FrameNotGiven, ...]
+    taken: tuple[found_in.FrameTakenAsFlange, ...]
 
     @property
-    def needed(self) -> tuple[FrameNotGiven, ...]:
+    def needed(self) -> tuple[found_in.FrameNotGiven, ...]:
         """The frames that are not given, for a motion that needs them."""
         return tuple(replace(each, needed=True) for each in self.missing)
 
@@ -141,19 +103,19 @@ class Arms:
         self.robot = robot
         self._by_tool: dict[bytes, Robot] = {robot.tool.tobytes(): robot}
 
-    def placed(self, motion: ArmMotion) -> PlacedMotion:
+    def placed(self, motion: instructions.ArmMotion) -> PlacedMotion:
         """A motion with its arm; frames that are not given are named."""
-        missing: list[FrameNotGiven] = []
-        taken: tuple[FrameTakenAsFlange, ...] = ()
+        missing: list[found_in.FrameNotGiven] = []
+        taken: tuple[found_in.FrameTakenAsFlange, ...] = ()
         arm, base = self.robot, motion.base.pose
         if motion.tool.pose is not None:
             arm = self._with(motion.tool.pose)
         elif motion.tool.name == FLANGE:
-            arm, taken = self._with(np.eye(4)), (FrameTakenAsFlange(FLANGE),)
+            arm, taken = self._with(np.eye(4)), (found_in.FrameTakenAsFlange(FLANGE),)
         elif motion.tool.name:
-            missing.append(FrameNotGiven(motion.tool.name, "tool", needed=False))
+            missing.append(found_in.FrameNotGiven(motion.tool.name, "tool", needed=False))
         if base is None and motion.base.name:
-            missing.append(FrameNotGiven(motion.base.name, "base", needed=motion.kind != "joint"))
+            missing.append(found_in.FrameNotGiven(motion.base.name, "base", needed=motion.kind != "joint"))
         known = None if base is None and motion.base.name else self.robot.base @ (np.eye(4) if base is None else base)
         return PlacedMotion(motion, arm, known, tuple(missing), taken)
 
@@ -178,23 +140,27 @@ class Goal:
     joints: Reals | None
     pose: Reals | None
     known: bool
-    findings: tuple[CheckFinding, ...] = ()
+    findings: tuple[found_in.CheckFinding, ...] = ()
 
 
-def goal_of(placed: PlacedMotion, target: Target | None, before: Reals | None) -> Goal:
+def goal_of(placed: PlacedMotion, target: instructions.Target | None, before: Reals | None) -> Goal:
     """What a target means, from joints (n,) in rad; of several solutions the nearest within the limits."""
-    if isinstance(target, UnresolvedTarget) and target.reason == "position_unknown" and placed.missing:
+    if isinstance(target, instructions.UnresolvedTarget) and target.reason == "position_unknown" and placed.missing:
         return Goal(None, None, False, placed.needed)
-    if target is None or isinstance(target, UnresolvedTarget):
-        unknown = TargetNotGiven("", "undefined") if target is None else TargetNotGiven(target.text, target.reason)
+    if target is None or isinstance(target, instructions.UnresolvedTarget):
+        unknown = (
+            found_in.TargetNotGiven("", "undefined")
+            if target is None
+            else found_in.TargetNotGiven(target.text, target.reason)
+        )
         return Goal(None, None, False, (unknown,))
-    if isinstance(target, JointTarget):
+    if isinstance(target, instructions.JointTarget):
         open_ = np.isnan(target.joints)
         if not open_.any():
             return Goal(target.joints, None, True)
         if before is None:
             stays = bool(open_.all())
-            return Goal(None, None, stays, () if stays else (TargetNotGiven("", "position_unknown"),))
+            return Goal(None, None, stays, () if stays else (found_in.TargetNotGiven("", "position_unknown"),))
         return Goal(np.where(open_, before, target.joints), None, True)
     if placed.missing or placed.base is None:
         return Goal(None, None, False, placed.needed)
@@ -202,16 +168,16 @@ def goal_of(placed: PlacedMotion, target: Target | None, before: Reals | None) -
     return _solved(placed, target, pose, before)
 
 
-def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals | None) -> Goal:
+def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, before: Reals | None) -> Goal:
     reference = target.near if target.near is not None else before
     try:
         found = inverse(placed.arm, pose, reference, self_motion_rows=True)
     except PoseError:
-        return Goal(None, None, False, (TargetNotGiven("", "not_finite"),))
+        return Goal(None, None, False, (found_in.TargetNotGiven("", "not_finite"),))
     if not len(found.q):
-        return Goal(None, pose, True, (*placed.taken, TargetOutOfReach(found.unsolved)))
+        return Goal(None, pose, True, (*placed.taken, found_in.TargetOutOfReach(found.unsolved)))
     rows = found.q[found.within_limits] if found.within_limits.any() else found.q
-    findings: list[CheckFinding] = list(placed.taken)
+    findings: list[found_in.CheckFinding] = list(placed.taken)
     joint = placed.motion.kind == "joint"
     if target.branch is not None and joint:
         met = solutions_meant(target.branch, placed.arm, rows)
@@ -219,9 +185,9 @@ def _solved(placed: PlacedMotion, target: PoseTarget, pose: Reals, before: Reals
         findings += () if met.any() else (_branch_not_met(target, joint),)
     elif target.configuration and target.branch is None and joint and _different(rows) > 1:
         words = (f"S {value:g}" if key == "S" else f"{value}" for key, value in target.configuration)
-        findings.append(ConfigurationNotRead(", ".join(words)))
+        findings.append(found_in.ConfigurationNotRead(", ".join(words)))
     if reference is None and not findings and (different := _different(rows)) > 1:
-        findings.append(ConfigurationGuessed(different))
+        findings.append(found_in.ConfigurationGuessed(different))
     start = np.zeros(rows.shape[1]) if reference is None else reference
     away = np.abs(rows - start).max(axis=1)
     return Goal(rows[int(away.argmin())], pose, True, tuple(findings))
@@ -232,21 +198,21 @@ def _different(rows: Reals) -> int:
     return len(np.unique(np.round(rows, SAME_DIGITS), axis=0))
 
 
-def _branch_not_met(target: PoseTarget, joint: bool) -> CheckFinding:
+def _branch_not_met(target: instructions.PoseTarget, joint: bool) -> found_in.CheckFinding:
     """That no solution has the configuration of a target, or that a line does not arrive in it."""
     given = dict(target.configuration)
     if isinstance(turn := given.get("T"), (int, float)):
-        return TurnNotMet(int(turn))
+        return found_in.TurnNotMet(int(turn))
     shown = ", ".join(f"{key} {value:g}" if isinstance(value, float) else f"{value}" for key, value in given.items())
-    return ConfigurationNotMet(shown, "target" if joint else "line")
+    return found_in.ConfigurationNotMet(shown, "target" if joint else "line")
 
 
 MOST_REASONS = 1000  # targets out of reach whose reasons are looked for
 
 
 def target_findings(
-    arms: Arms, motions: Mapping[int, ArmMotion], keys: Mapping[int, Hashable]
-) -> tuple[int, dict[int, tuple[CheckFinding, ...]]]:
+    arms: Arms, motions: Mapping[int, instructions.ArmMotion], keys: Mapping[int, Hashable]
+) -> tuple[int, dict[int, tuple[found_in.CheckFinding, ...]]]:
     """How many targets were looked at, and what is wrong with them, by the number of the step.
 
     Parameters
@@ -256,15 +222,15 @@ def target_findings(
     first: dict[Hashable, int] = {}
     for number in motions:
         first.setdefault(keys[number], number)
-    findings: dict[int, tuple[CheckFinding, ...]] = {}
+    findings: dict[int, tuple[found_in.CheckFinding, ...]] = {}
     poses: dict[int, list[tuple[int, PlacedMotion]]] = defaultdict(list)
     for number in first.values():
         placed = arms.placed(motions[number])
         target = placed.motion.target
-        if isinstance(target, JointTarget):
+        if isinstance(target, instructions.JointTarget):
             known = np.where(np.isnan(target.joints), placed.arm.lower, target.joints)
             findings[number] = limit_findings(placed.arm, known)
-        elif not isinstance(target, PoseTarget) or placed.base is None or placed.missing:
+        elif not isinstance(target, instructions.PoseTarget) or placed.base is None or placed.missing:
             findings[number] = goal_of(placed, target, None).findings
         elif closed_form_missing(placed.arm) is None and placed.arm.coupling is None:  # others take too long
             poses[id(placed.arm)].append((number, placed))
@@ -274,10 +240,10 @@ def target_findings(
     return len(looked), {number: found for number in looked if (found := findings[first[keys[number]]])}
 
 
-def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[CheckFinding, ...]]:
+def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[found_in.CheckFinding, ...]]:
     """Findings of targets that are poses, of one arm."""
     arm = group[0][1].arm
-    findings: dict[int, tuple[CheckFinding, ...]] = {number: () for number, _ in group}
+    findings: dict[int, tuple[found_in.CheckFinding, ...]] = {number: () for number, _ in group}
     try:
         found = inverse_batch(arm, np.stack([_pose(placed) for _, placed in group]))
     except PoseError:  # one of them is no pose
@@ -292,13 +258,13 @@ def _of_poses(group: list[tuple[int, PlacedMotion]]) -> dict[int, tuple[CheckFin
         elif (reasons := reasons + 1) <= MOST_REASONS:
             findings[number] = goal_of(placed, placed.motion.target, None).findings
         else:
-            findings[number] = (TargetOutOfReach(()),)
+            findings[number] = (found_in.TargetOutOfReach(()),)
     return findings
 
 
 def _pose(placed: PlacedMotion) -> Reals:
     assert placed.base is not None
-    assert isinstance(placed.motion.target, PoseTarget)
+    assert isinstance(placed.motion.target, instructions.PoseTarget)
     found: Reals = placed.base @ placed.motion.target.pose
     return found
 
@@ -484,7 +450,7 @@ PARTS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of corners and
 
 def zone_clearance(
     bodies: Bodies, corners: Reals, tolerance: float, bend: Reals | None = None, patch: ZonePatch | None = None
-) -> ZoneCollides | ZoneNotSettled | None:
+) -> found_in.ZoneCollides | found_in.ZoneNotSettled | None:
     """Look for a way round a corner that collides; None if all are free.
 
     Parameters
@@ -518,7 +484,7 @@ def zone_clearance(
         worst = int(np.argmin(distances))
         least = min(least, float(distances[worst]))
         if distances[worst] < -tolerance - (0.0 if patch is None else off[worst]):
-            return ZoneCollides(bodies.pairs[worst], -1000 * float(distances[worst]))
+            return found_in.ZoneCollides(bodies.pairs[worst], -1000 * float(distances[worst]))
         nearer = (levers @ np.abs(row_values(bodies.robot, triangle - middle)).T).max(axis=1)
         open_ = distances <= nearer + off - tolerance
         if not open_.any():
@@ -534,7 +500,7 @@ def zone_clearance(
         places, joints = np.concatenate([at, between]), np.concatenate([triangle, solved])
         for i, part in enumerate(PARTS):
             heapq.heappush(waiting, (float(distances[worst]), 4 * measured + i, places[part], joints[part]))
-    return None if settled else ZoneNotSettled(1000 * least)
+    return None if settled else found_in.ZoneNotSettled(1000 * least)
 
 
 def pair_levers(bodies: Bodies, corners: Reals) -> Reals:
@@ -611,11 +577,11 @@ class CheckedMotion(ByValue):
     start: Reals | None
     way: MotionPath | None
     end: Reals | None
-    findings: tuple[CheckFinding, ...]
+    findings: tuple[found_in.CheckFinding, ...]
     clearance: float | None = None
     stays: bool = False
     blended_ends: int = 0
-    moments: Mapping[CheckFinding, float] = field(default_factory=dict)
+    moments: Mapping[found_in.CheckFinding, float] = field(default_factory=dict)
 
 
 MOST_SOLUTIONS = 8  # of a target, to which joint moves are tried
@@ -629,11 +595,11 @@ class StepChecker:
         self.arms, self.rules, self.obstacles, self.execution = Arms(robot), rules, obstacles, execution
         self.start: Reals | None = None
         self.motions: dict[int, CheckedMotion] = {}
-        self.returns: list[tuple[Ending, LoopComesBackOtherwise]] = []
+        self.returns: list[tuple[Ending, found_in.LoopComesBackOtherwise]] = []
         self._joints: list[Reals | None] = []
         self._before: list[int] = []  # the motion that an arm blends from into the next; -1 for none
         self._known: dict[Hashable, CheckedMotion] = {}
-        self._corners: dict[Hashable, tuple[CheckFinding, ...]] = {}
+        self._corners: dict[Hashable, tuple[found_in.CheckFinding, ...]] = {}
 
     def check(self, number: int) -> None:
         """Check a step; those before it have been checked."""
@@ -641,15 +607,15 @@ class StepChecker:
         joints = self._joints[step.before] if step.before >= 0 else self.start
         before = self._before[step.before] if step.before >= 0 else -1
         what = step.instruction
-        if isinstance(what, ArmMotion):
+        if isinstance(what, instructions.ArmMotion):
             self.motions[number] = motion = self._motion(what, joints)
             joints = motion.end
             self._corner(before, number)
             before = number
-        elif isinstance(what, Pause):
+        elif isinstance(what, instructions.Pause):
             before = -1
-        elif (isinstance(what, Unknown) and what.may_move) or (
-            isinstance(what, MovesBeside) and what.kind != "interrupt"
+        elif (isinstance(what, instructions.Unknown) and what.may_move) or (
+            isinstance(what, instructions.MovesBeside) and what.kind != "interrupt"
         ):
             joints, before = None, -1
         self._joints.append(joints)
@@ -660,10 +626,14 @@ class StepChecker:
         """How many motions that differ were checked."""
         return len(self._known)
 
-    def rest(self, first: int) -> tuple[int, dict[int, tuple[CheckFinding, ...]]]:
+    def rest(self, first: int) -> tuple[int, dict[int, tuple[found_in.CheckFinding, ...]]]:
         """As :func:`target_findings`, of the steps from one on."""
         steps = self.execution.steps
-        motions = {i: what for i in range(first, len(steps)) if isinstance(what := steps[i].instruction, ArmMotion)}
+        motions = {
+            i: what
+            for i in range(first, len(steps))
+            if isinstance(what := steps[i].instruction, instructions.ArmMotion)
+        }
         return target_findings(self.arms, motions, {i: _key(motion) for i, motion in motions.items()})
 
     def close_loop(self, ending: Ending) -> None:
@@ -676,8 +646,8 @@ class StepChecker:
         if then is not None and now is not None and np.abs(now - then).max() > SAME_JOINTS:
             joint = int(np.argmax(np.abs(now - then)))
             other = joint_shown(self.arms.robot, joint, float(now[joint] - then[joint]))
-            self.returns.append((ending, LoopComesBackOtherwise(joint + 1, *other)))
-        if isinstance(first.instruction, ArmMotion):
+            self.returns.append((ending, found_in.LoopComesBackOtherwise(joint + 1, *other)))
+        if isinstance(first.instruction, instructions.ArmMotion):
             self._corner(self._before[ending.step], ending.repeats_from)
 
     def joint_moves_instead(self, number: int) -> tuple[Reals, ...]:
@@ -713,9 +683,9 @@ class StepChecker:
         placed, target = checked.placed, checked.placed.motion.target
         if placed.missing or placed.motion.angle is not None:
             return None
-        if isinstance(target, PoseTarget):
+        if isinstance(target, instructions.PoseTarget):
             return None if placed.base is None else _pose(placed)
-        if isinstance(target, JointTarget) and checked.start is not None:
+        if isinstance(target, instructions.JointTarget) and checked.start is not None:
             return forward(placed.arm, np.where(np.isnan(target.joints), checked.start, target.joints))
         return None
 
@@ -728,31 +698,40 @@ class StepChecker:
 
     def _passes(self, placed: PlacedMotion, start: Reals, end: Reals) -> bool:
         """Whether a joint move with a motion's tool has no finding of more than a note."""
-        speed = Rate(self.rules.assumed.joint_share, "share")
-        move = ArmMotion("joint", JointTarget(end), speed=speed, tool=placed.motion.tool, base=placed.motion.base)
+        speed = instructions.Rate(self.rules.assumed.joint_share, "share")
+        move = instructions.ArmMotion(
+            "joint", instructions.JointTarget(end), speed=speed, tool=placed.motion.tool, base=placed.motion.base
+        )
         found = self._checked(move, start)
-        return found.way is not None and worst_of(level_of(each) for each in found.findings) in ("pass", "note")
+        return found.way is not None and found_in.worst_of(found_in.level_of(each) for each in found.findings) in (
+            "pass",
+            "note",
+        )
 
-    def _motion(self, motion: ArmMotion, before: Reals | None) -> CheckedMotion:
+    def _motion(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
         key = (_key(motion), None if before is None else before.tobytes())
         if key not in self._known:
             self._known[key] = self._checked(motion, before)
         return self._known[key]
 
-    def _checked(self, motion: ArmMotion, before: Reals | None) -> CheckedMotion:
+    def _checked(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
         placed = self.arms.placed(motion)
         goal = goal_of(placed, motion.target, before)
-        findings: list[CheckFinding] = [*goal.findings, *_said(motion)]
+        findings: list[found_in.CheckFinding] = [*goal.findings, *_said(motion)]
         if motion.angle is not None and not np.isfinite(motion.angle):
-            return CheckedMotion(motion.kind, placed, before, None, None, (*findings, ArcGoesOn(None, turns=False)))
+            return CheckedMotion(
+                motion.kind, placed, before, None, None, (*findings, found_in.ArcGoesOn(None, turns=False))
+            )
         if not goal.known:
             return CheckedMotion(motion.kind, placed, before, None, None, tuple(findings))
         if not is_given(motion):
             assumed = self.rules.assumed
             joint = motion.kind == "joint"
-            findings.append(SpeedNotGiven(*((assumed.joint_share, "share") if joint else (assumed.tool_speed, "m/s"))))
+            findings.append(
+                found_in.SpeedNotGiven(*((assumed.joint_share, "share") if joint else (assumed.tool_speed, "m/s")))
+            )
         if before is None:
-            findings.append(PathNotKnown())
+            findings.append(found_in.PathNotKnown())
             findings += () if goal.joints is None else limit_findings(placed.arm, goal.joints)
             return CheckedMotion(motion.kind, placed, None, None, goal.joints, tuple(findings))
         if motion.kind == "joint":
@@ -760,7 +739,7 @@ class StepChecker:
         return self._tool_move(placed, goal, before, findings)
 
     def _joint_move(
-        self, placed: PlacedMotion, goal: Goal, before: Reals, findings: list[CheckFinding]
+        self, placed: PlacedMotion, goal: Goal, before: Reals, findings: list[found_in.CheckFinding]
     ) -> CheckedMotion:
         findings += [each for each in placed.missing if each not in findings]
         if goal.joints is None:
@@ -775,7 +754,7 @@ class StepChecker:
         return self._measured(CheckedMotion("joint", placed, before, way, way.end, found, moments=way.moments))
 
     def _tool_move(
-        self, placed: PlacedMotion, goal: Goal, before: Reals, findings: list[CheckFinding]
+        self, placed: PlacedMotion, goal: Goal, before: Reals, findings: list[found_in.CheckFinding]
     ) -> CheckedMotion:
         kind = placed.motion.kind
         if placed.missing:
@@ -789,22 +768,22 @@ class StepChecker:
             end = forward(placed.arm, given)
         via = self._via(placed, before) if kind == "arc" else None
         if kind == "arc" and via is None:
-            return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, ArcHasNoCircle()))
+            return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, found_in.ArcHasNoCircle()))
         if placed.motion.angle is not None:  # it goes elsewhere
-            findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
+            findings = [each for each in findings if not isinstance(each, found_in.TargetOutOfReach)]
             turns = bool(np.abs(end[:3, :3] - forward(placed.arm, before)[:3, :3]).max() > SAME_JOINTS)
-            findings.append(ArcGoesOn(float(np.degrees(placed.motion.angle)), turns))
+            findings.append(found_in.ArcGoesOn(float(np.degrees(placed.motion.angle)), turns))
             given = None
         way = tool_motion_path(placed.arm, placed.motion, before, (end, given, via), self.rules)
         if way is None:
             return CheckedMotion(kind, placed, before, None, before, tuple(findings), stays=True)
         if not isinstance(way, MotionPath):
             return CheckedMotion(kind, placed, before, None, goal.joints, (*findings, way))
-        if any(isinstance(each, StretchOutOfReach) for each in way.findings):
-            findings = [each for each in findings if not isinstance(each, TargetOutOfReach)]
+        if any(isinstance(each, found_in.StretchOutOfReach) for each in way.findings):
+            findings = [each for each in findings if not isinstance(each, found_in.TargetOutOfReach)]
         seen = (*findings, *way.findings)
         target = placed.motion.target
-        if isinstance(target, PoseTarget) and target.branch is not None and way.end is not None:
+        if isinstance(target, instructions.PoseTarget) and target.branch is not None and way.end is not None:
             arrived = solutions_meant(target.branch, way.arm, way.end[None])[0]
             seen += () if arrived else (_branch_not_met(target, joint=False),)
         return self._measured(CheckedMotion(kind, placed, before, way, way.end, seen, moments=way.moments))
@@ -812,10 +791,10 @@ class StepChecker:
     def _via(self, placed: PlacedMotion, before: Reals) -> Reals | None:
         """The arc's point (3,), m."""
         target = placed.motion.via
-        if isinstance(target, PoseTarget) and placed.base is not None:
+        if isinstance(target, instructions.PoseTarget) and placed.base is not None:
             point: Reals = (placed.base @ target.pose)[:3, 3]
             return point
-        if isinstance(target, JointTarget):
+        if isinstance(target, instructions.JointTarget):
             return forward(placed.arm, np.where(np.isnan(target.joints), before, target.joints))[:3, 3]
         return None
 
@@ -830,12 +809,12 @@ class StepChecker:
         least = float(along.distance[along.least]) if along.least >= 0 else None
         if not along.contacts:
             return self._clear(replace(motion, clearance=least), along)
-        touches: dict[Pair, BodiesTouch] = {}
+        touches: dict[Pair, found_in.BodiesTouch] = {}
         for touch in (each for contact in along.contacts for each in contact.touches):  # in the order of time
             at = None if motion.kind == "joint" else way.along_mm(touch.start)
-            first = touches.get(touch.pair, BodiesTouch(touch.pair, touch.start, at, 0.0))
+            first = touches.get(touch.pair, found_in.BodiesTouch(touch.pair, touch.start, at, 0.0))
             touches[touch.pair] = replace(first, depth_mm=max(first.depth_mm, touch.depth * 1000))
-        hit = MotionCollides(tuple(touches.values()))
+        hit = found_in.MotionCollides(tuple(touches.values()))
         moments = {**motion.moments, hit: along.contacts[0].start}
         return replace(motion, findings=(*motion.findings, hit), clearance=least, moments=moments)
 
@@ -846,7 +825,7 @@ class StepChecker:
         pair = along.pair[along.least] if along.least >= 0 else None
         if pair is None or motion.clearance is None or motion.clearance >= margin:
             return motion
-        near = ClearOfAssumed(pair, 1000 * motion.clearance, 1000 * margin)
+        near = found_in.ClearOfAssumed(pair, 1000 * motion.clearance, 1000 * margin)
         moments = {**motion.moments, near: float(along.t[along.least])}
         return replace(motion, findings=(*motion.findings, near), moments=moments)
 
@@ -859,9 +838,9 @@ class StepChecker:
         if zone.kind == "fine":
             return
         after = self.motions[second]
-        findings: list[CheckFinding] = []
+        findings: list[found_in.CheckFinding] = []
         if zone.kind in ("named", "velocity"):
-            findings.append(ZoneWithoutSize(zone.text))
+            findings.append(found_in.ZoneWithoutSize(zone.text))
         if motion.way is not None and after.way is not None:
             findings += self._rounded(motion.way, after.way, motion)
         new = tuple(each for each in findings if each not in motion.findings)
@@ -872,7 +851,7 @@ class StepChecker:
 
     def _round_corner(
         self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float]
-    ) -> CheckFinding | None:
+    ) -> found_in.CheckFinding | None:
         """What stands in a way from joints (3, n) before a corner to behind it, over shares of the two motions."""
         assert self.obstacles is not None
         bodies, tolerance = self.obstacles.of(way.arm), self.obstacles.tolerance
@@ -882,18 +861,20 @@ class StepChecker:
         slack = max(way.sagitta(shares[0]), after.sagitta(shares[1]))
         return zone_clearance(bodies, corners, tolerance, patch=patch_of(way.arm, corners, slack))
 
-    def _rounded(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
+    def _rounded(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[found_in.CheckFinding, ...]:
         key = (id(way), id(after))
         if key not in self._corners:
             self._corners[key] = self._zone_findings(way, after, motion)
         return self._corners[key]
 
-    def _zone_findings(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[CheckFinding, ...]:
+    def _zone_findings(
+        self, way: MotionPath, after: MotionPath, motion: CheckedMotion
+    ) -> tuple[found_in.CheckFinding, ...]:
         shares = [_zone_share(motion.placed.motion, part) for part in (way, after)]
-        found: list[CheckFinding] = []
+        found: list[found_in.CheckFinding] = []
         zone = motion.placed.motion.zone
         if zone.kind == "distance" and max(shares) > MOST_OF_A_MOTION + TOLERANCE:
-            found.append(ZoneTooLarge(zone.value * 1000, min(way.length, after.length) * 1000))
+            found.append(found_in.ZoneTooLarge(zone.value * 1000, min(way.length, after.length) * 1000))
         if self.obstacles is None or motion.clearance is None or motion.clearance < 0:
             return tuple(found)
         before, behind = (min(share, MOST_OF_A_MOTION) for share in shares)
@@ -915,7 +896,7 @@ def _bend(way: MotionPath, first: float, last: float) -> Reals:
     return bend_of_line(way.arm, q, way.sagitta((last - first) / BEND_PARTS))
 
 
-def _zone_share(motion: ArmMotion, way: MotionPath) -> float:
+def _zone_share(motion: instructions.ArmMotion, way: MotionPath) -> float:
     """The share of a way that its zone may take; over one half where the zone is larger than that."""
     zone = motion.zone
     match zone.kind:
@@ -943,21 +924,21 @@ def _as_written(q: Reals) -> Reals:
     return found
 
 
-def _said(motion: ArmMotion) -> list[CheckFinding]:
+def _said(motion: instructions.ArmMotion) -> list[found_in.CheckFinding]:
     """What is to be said of a motion whatever the arm does."""
-    found: list[CheckFinding] = []
+    found: list[found_in.CheckFinding] = []
     outer = getattr(motion.target, "external", ())
     if outer:
-        found.append(ExternalAxesLeftOut(tuple(name for name, _ in outer)))
+        found.append(found_in.ExternalAxesLeftOut(tuple(name for name, _ in outer)))
     rates = [rate.value for rate in (motion.speed, motion.acceleration) if rate is not None and rate.unit == "share"]
     if rates and max(rates) > 1 + TOLERANCE:
-        found.append(MoreThanFullSpeed(100 * max(rates)))
+        found.append(found_in.MoreThanFullSpeed(100 * max(rates)))
     if motion.kind == "spline":
-        found.append(SplineAsLine())
+        found.append(found_in.SplineAsLine())
     return found
 
 
-def _key(motion: ArmMotion) -> Hashable:
+def _key(motion: instructions.ArmMotion) -> Hashable:
     """Equal for motions that are the same in all numbers."""
     targets = tuple(_target_key(each) for each in (motion.target, motion.via))
     frames = tuple(
@@ -967,11 +948,11 @@ def _key(motion: ArmMotion) -> Hashable:
     return (motion.kind, targets, motion.angle, rates, motion.zone, frames, motion.load)
 
 
-def _target_key(target: Target | None) -> Hashable:
+def _target_key(target: instructions.Target | None) -> Hashable:
     match target:
-        case JointTarget():
+        case instructions.JointTarget():
             return (target.joints.tobytes(), target.external)
-        case PoseTarget():
+        case instructions.PoseTarget():
             near = None if target.near is None else target.near.tobytes()
             return (target.pose.tobytes(), target.configuration, target.branch is None, near, target.external)
     return target

@@ -13,37 +13,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from er3a.errors import InputError
+from er3a.programs import syntax
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
 from er3a.programs.program_findings import NameTwice, NotUnderstood, ProgramFinding
-from er3a.programs.syntax import (
-    Aggregate,
-    Assign,
-    Beside,
-    Binary,
-    Branch,
-    Call,
-    Constant,
-    Doing,
-    Element,
-    Expression,
-    Fixed,
-    GoTo,
-    Invocation,
-    Listed,
-    Member,
-    Move,
-    Opaque,
-    Operation,
-    Return,
-    Routine,
-    RoutineParameter,
-    Unary,
-    Unclear,
-    Variable,
-    Waiting,
-    expressions_of,
-    inner,
-)
 
 MOST_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*)[^=\"'(]*=(?!=)")
@@ -58,8 +30,8 @@ class Block:
     start: int
     exits: list[int] = field(default_factory=list)  # jumps behind the block
     skips: list[int] = field(default_factory=list)  # branches or jumps to the next arm, or to the next round
-    subject: Expression | None = None
-    step: Expression | None = None
+    subject: syntax.Expression | None = None
+    step: syntax.Expression | None = None
     word: str = ""  # what it is called in the text
 
 
@@ -69,33 +41,33 @@ LOOPS = ("loop", "while", "for", "repeat")
 class CodeBuilder:
     """The code of one routine."""
 
-    def __init__(self, name: str, parameters: tuple[RoutineParameter, ...], place: Place, thread: bool = False):
+    def __init__(self, name: str, parameters: tuple[syntax.RoutineParameter, ...], place: Place, thread: bool = False):
         self.name, self.parameters, self.place, self.thread = name, parameters, place, thread
-        self.code: list[Operation] = []
+        self.code: list[syntax.Operation] = []
         self.blocks: list[Block] = []
         self._labels: dict[str, int] = {}
         self._gotos: list[tuple[int, str]] = []
         self._hidden = 0
 
-    def add(self, operation: Operation) -> None:
+    def add(self, operation: syntax.Operation) -> None:
         """One more operation."""
         self.code.append(operation)
 
     def remark(self, place: Place, text: str) -> None:
         """A comment."""
-        self.add(Fixed(place, Remark(text)))
+        self.add(syntax.Fixed(place, Remark(text)))
 
     def aside(self, place: Place, text: str) -> None:
         """An instruction that moves nothing."""
-        self.add(Fixed(place, Aside(text)))
+        self.add(syntax.Fixed(place, Aside(text)))
 
-    def beside(self, place: Place, what: Invocation, text: str, kind: Literal["thread", "interrupt"]) -> None:
+    def beside(self, place: Place, what: syntax.Invocation, text: str, kind: Literal["thread", "interrupt"]) -> None:
         """A routine that runs beside the program from here on."""
-        self.add(Beside(place, what, text, kind))
+        self.add(syntax.Beside(place, what, text, kind))
 
     def unknown(self, place: Place, text: str, may_move: bool = True) -> None:
         """An instruction that is not understood."""
-        self.add(Fixed(place, Unknown(text, may_move)))
+        self.add(syntax.Fixed(place, Unknown(text, may_move)))
 
     def unread(self, place: Place, text: str, may_move: bool = True, folds: bool = False) -> None:
         """A statement that is not understood; what it assigns something to has no known value from here.
@@ -108,18 +80,20 @@ class CodeBuilder:
         assigned = ASSIGNED.match(text)
         if assigned is not None:
             name = assigned[1].upper() if folds else assigned[1]
-            self.add(Assign(place, Variable(name), Constant(Unclear(name)), text, local=False))
+            self.add(
+                syntax.Assign(place, syntax.Variable(name), syntax.Constant(syntax.Unclear(name)), text, local=False)
+            )
 
     def inside(self, *kinds: str) -> bool:
         """Whether the innermost block is one of these."""
         return bool(self.blocks) and self.blocks[-1].kind in kinds
 
-    def open_if(self, place: Place, condition: Expression, text: str) -> None:
+    def open_if(self, place: Place, condition: syntax.Expression, text: str) -> None:
         """``IF condition``."""
         self._open("if", place)
         self._test(place, condition, text)
 
-    def next_arm(self, place: Place, condition: Expression | None, text: str) -> None:
+    def next_arm(self, place: Place, condition: syntax.Expression | None, text: str) -> None:
         """``ELSE``, or ``ELSEIF`` with its condition."""
         block = self._innermost("if", place)
         block.exits.append(self._jump(place))
@@ -128,9 +102,9 @@ class CodeBuilder:
         if condition is not None:
             self._test(place, condition, text)
 
-    def open_while(self, place: Place, condition: Expression, text: str) -> None:
+    def open_while(self, place: Place, condition: syntax.Expression, text: str) -> None:
         """``WHILE condition``; a condition that is always true makes a loop for ever."""
-        if isinstance(condition, Constant) and condition.value is True:
+        if isinstance(condition, syntax.Constant) and condition.value is True:
             self._open("loop", place, "while")
             return
         self._open("while", place)
@@ -145,28 +119,34 @@ class CodeBuilder:
         self._open("repeat", place)
 
     def open_for(
-        self, place: Place, name: str, first: Expression, last: Expression, step: Expression | None, text: str
+        self,
+        place: Place,
+        name: str,
+        first: syntax.Expression,
+        last: syntax.Expression,
+        step: syntax.Expression | None,
+        text: str,
     ) -> None:
         """``FOR name = first TO last STEP step``; the last and the step are fixed when the loop is entered."""
         if len(self.blocks) >= MOST_NESTED:
             self._open("for", place)
         self._hidden += 1
-        limit, by = (Variable(f"%{part}{self._hidden}") for part in ("last", "step"))
-        counter = Variable(name)
-        self.add(Assign(place, counter, first, text))
-        self.add(Assign(place, limit, last, text, local=True))
-        self.add(Assign(place, by, Constant(1) if step is None else step, text, local=True))
+        limit, by = (syntax.Variable(f"%{part}{self._hidden}") for part in ("last", "step"))
+        counter = syntax.Variable(name)
+        self.add(syntax.Assign(place, counter, first, text))
+        self.add(syntax.Assign(place, limit, last, text, local=True))
+        self.add(syntax.Assign(place, by, syntax.Constant(1) if step is None else step, text, local=True))
         self._open("for", place)
         self.blocks[-1].subject, self.blocks[-1].step = counter, by
-        span = Binary("*", Binary("-", limit, counter), by)
-        self._test(place, Binary(">=", span, Constant(0)), text)
+        span = syntax.Binary("*", syntax.Binary("-", limit, counter), by)
+        self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text)
 
-    def open_switch(self, place: Place, subject: Expression) -> None:
+    def open_switch(self, place: Place, subject: syntax.Expression) -> None:
         """``SWITCH subject``."""
         self._open("switch", place)
         self.blocks[-1].subject = subject
 
-    def case(self, place: Place, values: list[Expression] | None, text: str) -> None:
+    def case(self, place: Place, values: list[syntax.Expression] | None, text: str) -> None:
         """``CASE values``, or ``DEFAULT`` for None."""
         block = self._innermost("switch", place)
         if block.skips or block.exits:
@@ -176,23 +156,23 @@ class CodeBuilder:
         if values is None:
             return
         assert block.subject is not None
-        tests: list[Expression] = [Binary("==", block.subject, value) for value in values]
+        tests: list[syntax.Expression] = [syntax.Binary("==", block.subject, value) for value in values]
         condition = tests[0]
         for test in tests[1:]:
-            condition = Binary("OR", condition, test)
+            condition = syntax.Binary("OR", condition, test)
         self._test(place, condition, text)
 
-    def close(self, kind: str, place: Place, until: Expression | None = None, text: str = "") -> None:
+    def close(self, kind: str, place: Place, until: syntax.Expression | None = None, text: str = "") -> None:
         """End of the innermost block, which must be of this kind."""
         block = self._innermost(kind, place)
         if kind == "repeat":
             assert until is not None
             self._patch(block.skips)
-            self.add(Branch(place, until, block.start, text))
+            self.add(syntax.Branch(place, until, block.start, text))
         elif block.kind in LOOPS:
             if block.kind == "for":
                 self._count(block, place)
-            self.add(GoTo(place, block.start, endless=block.kind == "loop"))
+            self.add(syntax.GoTo(place, block.start, endless=block.kind == "loop"))
         if kind != "repeat":
             self._patch(block.skips)
         self._patch(block.exits)
@@ -210,7 +190,7 @@ class CodeBuilder:
             return
         if loop.kind == "for":
             self._count(loop, place)
-        self.add(GoTo(place, loop.start, endless=loop.kind == "loop"))
+        self.add(syntax.GoTo(place, loop.start, endless=loop.kind == "loop"))
 
     def label(self, name: str) -> None:
         """A place to go to."""
@@ -220,7 +200,7 @@ class CodeBuilder:
         """``GOTO name``."""
         self._gotos.append((self._jump(place), name))
 
-    def routine(self, end: Place) -> Routine:
+    def routine(self, end: Place) -> syntax.Routine:
         """The finished routine.
 
         Raises
@@ -235,8 +215,8 @@ class CodeBuilder:
             place = self.code[at].place
             if name not in self._labels:
                 raise fault(place, f"there is no label '{name}'", "Name a label of this routine")
-            self.code[at] = GoTo(place, self._labels[name], endless=self._labels[name] <= at)
-        return Routine(self.name, self.parameters, (*self.code, Return(end)), self.place, self.thread)
+            self.code[at] = syntax.GoTo(place, self._labels[name], endless=self._labels[name] <= at)
+        return syntax.Routine(self.name, self.parameters, (*self.code, syntax.Return(end)), self.place, self.thread)
 
     def _open(self, kind: str, place: Place, word: str = "") -> None:
         if len(self.blocks) >= MOST_NESTED:
@@ -253,7 +233,7 @@ class CodeBuilder:
     def _count(self, block: Block, place: Place) -> None:
         assert block.subject is not None
         assert block.step is not None
-        self.add(Assign(place, block.subject, Binary("+", block.subject, block.step), ""))
+        self.add(syntax.Assign(place, block.subject, syntax.Binary("+", block.subject, block.step), ""))
 
     def _loop(self, place: Place) -> Block:
         for block in reversed(self.blocks):
@@ -261,26 +241,26 @@ class CodeBuilder:
                 return block
         raise fault(place, "leaves a loop, but none is open", "Remove it")
 
-    def _test(self, place: Place, condition: Expression, text: str) -> None:
+    def _test(self, place: Place, condition: syntax.Expression, text: str) -> None:
         self.blocks[-1].skips.append(len(self.code))
-        self.add(Branch(place, condition, -1, text))
+        self.add(syntax.Branch(place, condition, -1, text))
 
     def _jump(self, place: Place) -> int:
-        self.add(GoTo(place, -1))
+        self.add(syntax.GoTo(place, -1))
         return len(self.code) - 1
 
     def _patch(self, places: list[int]) -> None:
         for at in places:
             operation = self.code[at]
-            if isinstance(operation, Branch):
+            if isinstance(operation, syntax.Branch):
                 self.code[at] = replace(operation, otherwise=len(self.code))
-            elif isinstance(operation, GoTo):
+            elif isinstance(operation, syntax.GoTo):
                 self.code[at] = replace(operation, to=len(self.code))
 
 
-def negated(condition: Expression) -> Expression:
+def negated(condition: syntax.Expression) -> syntax.Expression:
     """The opposite of a condition."""
-    return Unary("NOT", condition)
+    return syntax.Unary("NOT", condition)
 
 
 def fault(place: Place, problem: str, remedy: str) -> InputError:
@@ -288,16 +268,16 @@ def fault(place: Place, problem: str, remedy: str) -> InputError:
     return InputError(place.file, place.where, problem, remedy)
 
 
-Each = Callable[[Expression], Expression]
+Each = Callable[[syntax.Expression], syntax.Expression]
 
 
-def linked(routines: Iterable[Routine]) -> tuple[dict[str, Routine], tuple[ProgramFinding, ...]]:
+def linked(routines: Iterable[syntax.Routine]) -> tuple[dict[str, syntax.Routine], tuple[ProgramFinding, ...]]:
     """The routines by name, with calls of each other taken out of expressions; and what is to be said of the text.
 
     Of two routines with one name the later one counts; the other is kept under a name that nothing calls.
     """
     found: list[ProgramFinding] = []
-    by_name: dict[str, Routine] = {}
+    by_name: dict[str, syntax.Routine] = {}
     for routine in routines:
         if routine.name in by_name:
             found.append(NameTwice(routine.name, routine.place))
@@ -309,7 +289,7 @@ def linked(routines: Iterable[Routine]) -> tuple[dict[str, Routine], tuple[Progr
     return {name: _linked(routine, by_name) for name, routine in by_name.items()}, tuple(found)
 
 
-def lacks_data(routines: Iterable[Routine], data: Iterable[Assign], known: Container[str]) -> bool:
+def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign], known: Container[str]) -> bool:
     """Whether routines use a variable that nothing of what was read gives.
 
     Parameters
@@ -321,71 +301,75 @@ def lacks_data(routines: Iterable[Routine], data: Iterable[Assign], known: Conta
     for routine in routines:
         given |= {parameter.name for parameter in routine.parameters}
         for operation in routine.code:
-            expressions = expressions_of(operation)
-            if isinstance(operation, Assign):
+            expressions = syntax.expressions_of(operation)
+            if isinstance(operation, syntax.Assign):
                 given.add(_variable(operation.target))
                 expressions = () if operation.value is None else (operation.value,)
-            elif isinstance(operation, Move):
+            elif isinstance(operation, syntax.Move):
                 expressions = tuple(each for each in operation.arguments[:1] if each is not None)
             used.update(name for each in expressions for name in _variables(each))
     return any(name[0] not in "$%" and name not in known for name in used - given)
 
 
-def _variable(target: Expression) -> str:
-    while isinstance(target, (Member, Element)):
+def _variable(target: syntax.Expression) -> str:
+    while isinstance(target, (syntax.Member, syntax.Element)):
         target = target.of
-    return target.name if isinstance(target, Variable) else ""
+    return target.name if isinstance(target, syntax.Variable) else ""
 
 
-def _variables(expression: Expression) -> Iterable[str]:
-    if isinstance(expression, Variable):
+def _variables(expression: syntax.Expression) -> Iterable[str]:
+    if isinstance(expression, syntax.Variable):
         yield expression.name
-    for each in inner(expression):
+    for each in syntax.inner(expression):
         yield from _variables(each)
 
 
-def not_understood(code: Iterable[Operation]) -> Iterable[NotUnderstood]:
+def not_understood(code: Iterable[syntax.Operation]) -> Iterable[NotUnderstood]:
     """What is kept in code without being understood."""
     for operation in code:
         if _plain(operation):
             continue
-        if isinstance(operation, Fixed) and isinstance(operation.instruction, Unknown):
+        if isinstance(operation, syntax.Fixed) and isinstance(operation.instruction, Unknown):
             yield NotUnderstood(operation.instruction.text, operation.place)
         else:
-            for expression in expressions_of(operation):
+            for expression in syntax.expressions_of(operation):
                 yield from (NotUnderstood(text, operation.place) for text in _opaque(expression))
 
 
-def _plain(operation: Operation) -> bool:
+def _plain(operation: syntax.Operation) -> bool:
     """Whether an operation is a motion to values and names alone, as most lines of long programs are."""
     return (
-        type(operation) is Move
-        and all(type(each) is Constant for _, each in operation.settings)
-        and all(type(each) is Constant or type(each) is Variable for each in operation.arguments)
+        type(operation) is syntax.Move
+        and all(type(each) is syntax.Constant for _, each in operation.settings)
+        and all(type(each) is syntax.Constant or type(each) is syntax.Variable for each in operation.arguments)
     )
 
 
-def _opaque(expression: Expression) -> Iterable[str]:
-    if isinstance(expression, Opaque):
+def _opaque(expression: syntax.Expression) -> Iterable[str]:
+    if isinstance(expression, syntax.Opaque):
         yield expression.text
-    for each in inner(expression):
+    for each in syntax.inner(expression):
         yield from _opaque(each)
 
 
-def _linked(routine: Routine, known: Mapping[str, Routine]) -> Routine:
-    parts = (each for operation in routine.code if not _plain(operation) for each in expressions_of(operation))
+def _linked(routine: syntax.Routine, known: Mapping[str, syntax.Routine]) -> syntax.Routine:
+    parts = (each for operation in routine.code if not _plain(operation) for each in syntax.expressions_of(operation))
     if not any(_calls(each, known) for each in parts):
         return routine
-    code: list[Operation] = []
+    code: list[syntax.Operation] = []
     starts: list[int] = []
     for operation in routine.code:
         starts.append(len(code))
         calls = _Calls(known, operation.place)
-        if isinstance(operation, Doing) and isinstance(operation.what, Invocation) and operation.what.function in known:
+        if (
+            isinstance(operation, syntax.Doing)
+            and isinstance(operation.what, syntax.Invocation)
+            and operation.what.function in known
+        ):
             call = operation.what
             arguments = tuple(None if each is None else calls.out(each) for each in call.arguments)
             keywords = tuple((name, calls.out(each)) for name, each in call.keywords)
-            last: Operation = Call(operation.place, call.function, arguments, keywords, operation.text)
+            last: syntax.Operation = syntax.Call(operation.place, call.function, arguments, keywords, operation.text)
         else:
             last = mapped(operation, calls.out)
         code += [*calls.found, last]
@@ -393,80 +377,80 @@ def _linked(routine: Routine, known: Mapping[str, Routine]) -> Routine:
     return replace(routine, code=tuple(_moved(operation, starts) for operation in code))
 
 
-def _moved(operation: Operation, starts: list[int]) -> Operation:
-    if isinstance(operation, GoTo):
+def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:
+    if isinstance(operation, syntax.GoTo):
         return replace(operation, to=starts[operation.to])
-    if isinstance(operation, Branch):
+    if isinstance(operation, syntax.Branch):
         return replace(operation, otherwise=starts[operation.otherwise])
     return operation
 
 
-def _calls(expression: Expression, known: Mapping[str, Routine]) -> bool:
-    if isinstance(expression, Invocation) and expression.function in known:
+def _calls(expression: syntax.Expression, known: Mapping[str, syntax.Routine]) -> bool:
+    if isinstance(expression, syntax.Invocation) and expression.function in known:
         return True
-    return any(_calls(each, known) for each in inner(expression))
+    return any(_calls(each, known) for each in syntax.inner(expression))
 
 
 class _Calls:
     """Takes calls out of expressions, the innermost first."""
 
-    def __init__(self, known: Mapping[str, Routine], place: Place):
+    def __init__(self, known: Mapping[str, syntax.Routine], place: Place):
         self.known, self.place = known, place
-        self.found: list[Call] = []
+        self.found: list[syntax.Call] = []
 
-    def out(self, expression: Expression) -> Expression:
+    def out(self, expression: syntax.Expression) -> syntax.Expression:
         if not _calls(expression, self.known):
             return expression
         expression = within(expression, self.out)
-        if not isinstance(expression, Invocation) or expression.function not in self.known:
+        if not isinstance(expression, syntax.Invocation) or expression.function not in self.known:
             return expression
         result = f"%value{len(self.found) + 1}"
         name = expression.function
-        self.found.append(Call(self.place, name, expression.arguments, expression.keywords, name, result))
-        return Variable(result)
+        self.found.append(syntax.Call(self.place, name, expression.arguments, expression.keywords, name, result))
+        return syntax.Variable(result)
 
 
-def within(expression: Expression, each: Each) -> Expression:
+def within(expression: syntax.Expression, each: Each) -> syntax.Expression:
     """An expression with those right below it replaced."""
     match expression:
-        case Member(of=of):
+        case syntax.Member(of=of):
             return replace(expression, of=each(of))
-        case Unary(of=of):
+        case syntax.Unary(of=of):
             return replace(expression, of=each(of))
-        case Element(of=of, indices=indices):
+        case syntax.Element(of=of, indices=indices):
             return replace(expression, of=each(of), indices=tuple(map(each, indices)))
-        case Invocation(arguments=arguments, keywords=keywords):
+        case syntax.Invocation(arguments=arguments, keywords=keywords):
             placed = tuple(None if one is None else each(one) for one in arguments)
             return replace(expression, arguments=placed, keywords=tuple((name, each(one)) for name, one in keywords))
-        case Binary(left=left, right=right):
+        case syntax.Binary(left=left, right=right):
             return replace(expression, left=each(left), right=each(right))
-        case Aggregate(items=items):
+        case syntax.Aggregate(items=items):
             return replace(expression, items=tuple((name, each(one)) for name, one in items))
-        case Listed(items=listed):
+        case syntax.Listed(items=listed):
             return replace(expression, items=tuple(map(each, listed)))
         case _:
             return expression
 
 
-def mapped(operation: Operation, each: Each) -> Operation:
+def mapped(operation: syntax.Operation, each: Each) -> syntax.Operation:
     """An operation with its expressions replaced."""
     match operation:
-        case Assign(value=value):
+        case syntax.Assign(value=value):
             return replace(operation, value=None if value is None else each(value))
-        case Branch(condition=condition):
+        case syntax.Branch(condition=condition):
             return replace(operation, condition=each(condition))
-        case Return(value=value):
+        case syntax.Return(value=value):
             return replace(operation, value=None if value is None else each(value))
-        case Move(arguments=arguments, settings=settings):
+        case syntax.Move(arguments=arguments, settings=settings):
             placed = tuple(None if one is None else each(one) for one in arguments)
             return replace(operation, arguments=placed, settings=tuple((name, each(one)) for name, one in settings))
-        case Waiting(of=of):
+        case syntax.Waiting(of=of):
             return replace(operation, of=None if of is None else each(of))
-        case Doing(what=what):
+        case syntax.Doing(what=what):
             return replace(operation, what=each(what))
-        case Beside(what=what):
+        case syntax.Beside(what=what):
             mapped_what = within(what, each)
-            assert isinstance(mapped_what, Invocation)
+            assert isinstance(mapped_what, syntax.Invocation)
             return replace(operation, what=mapped_what)
         case _:
             return operation

@@ -17,28 +17,8 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.numerics.arrays import Reals
+from er3a.programs import syntax
 from er3a.programs.instructions import ArmMotion, Instruction, JointTarget, NamedFrame, PoseTarget, arc_end
-from er3a.programs.syntax import (
-    Aggregate,
-    Binary,
-    Constant,
-    Doing,
-    Element,
-    Expression,
-    Invocation,
-    Listed,
-    Member,
-    Move,
-    Opaque,
-    Program,
-    Record,
-    Solved,
-    Unary,
-    Unclear,
-    Value,
-    Variable,
-    number,
-)
 
 NO_FRAME = NamedFrame()
 MOST_ROBOT_AXES = 6
@@ -202,14 +182,14 @@ class Dialect(ABC):
     whole_division: bool = False
     first_index: int = 1
 
-    def __init__(self, program: Program) -> None:  # noqa: B027 - most languages need nothing of it
+    def __init__(self, program: syntax.Program) -> None:  # noqa: B027 - most languages need nothing of it
         """For the program that is run, whose declarations a language may need."""
 
     def is_signal(self, name: str) -> bool:
         """Whether an assignment to this name sets an output."""
         return False
 
-    def is_followed(self, name: str, value: Value) -> bool:
+    def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
         return True
 
@@ -217,32 +197,32 @@ class Dialect(ABC):
         """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""
         return False
 
-    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """The value of a name that the language itself gives, if it does: a frame, where the arm stands."""
         return None
 
-    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
+    def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
         """The value of ``[...]`` or ``p[...]``."""
         return values
 
-    def product(self, left: Value, right: Value) -> Value:
+    def product(self, left: syntax.Value, right: syntax.Value) -> syntax.Value:
         """``left : right``, of two positions."""
-        return Unclear("a product")
+        return syntax.Unclear("a product")
 
     @abstractmethod
-    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """The value of a function that is not in the program."""
 
     @abstractmethod
-    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
         """The motion, from where the arm stands."""
 
     @abstractmethod
-    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
         """A call of a function that is not in the program; None if it only sets variables."""
 
     @abstractmethod
-    def harmless(self, call: Invocation) -> bool:
+    def harmless(self, call: syntax.Invocation) -> bool:
         """Whether a function that is not in the program neither moves the arm nor sets what motions depend on."""
 
 
@@ -262,8 +242,8 @@ class ProgramMemory:
     def __init__(self, functions: Dialect, cell: Cell):
         self.functions, self.cell = functions, cell
         self.here = Position(cell.start)
-        self.shared: dict[str, Value] = {}
-        self.local: dict[str, Value] = {}
+        self.shared: dict[str, syntax.Value] = {}
+        self.local: dict[str, syntax.Value] = {}
         self.types: dict[str, str] = {}
         self.kept: dict[object, object] = {}
         self.beside: frozenset[str] = frozenset()
@@ -276,30 +256,30 @@ class ProgramMemory:
         other.beside = self.beside
         return other
 
-    def read(self, name: str) -> Value | None:
+    def read(self, name: str) -> syntax.Value | None:
         """The value of a whole name, or None."""
         if name in self.local:
             return self.local[name]
         if self.beside and root(name) in self.beside:
-            return Unclear(name)
+            return syntax.Unclear(name)
         value = self.shared.get(name)
         return self.functions.constant(self, name) if value is None else value
 
-    def write(self, name: str, value: Value, local: bool = False) -> None:
+    def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
         """Give a whole name a value."""
         self.kept.clear()
-        if name in WITH_FIELDS and isinstance(value, Record):
+        if name in WITH_FIELDS and isinstance(value, syntax.Record):
             self.shared.update({f"{name}.{field}": part for field, part in value.items})
         if local or (self.local and root(name) in self.local):
             self.local[name] = value
         else:
             self.shared[name] = value
 
-    def assign(self, target: Expression, value: Value, local: bool = False) -> None:
+    def assign(self, target: syntax.Expression, value: syntax.Value, local: bool = False) -> None:
         """Give a variable, a field or an element a value."""
-        if isinstance(target, Member) and self._set_field(target, value):
+        if isinstance(target, syntax.Member) and self._set_field(target, value):
             return
-        if isinstance(target, Element):
+        if isinstance(target, syntax.Element):
             changed = self._with_element(target, value)
             if changed is not None:
                 self.assign(target.of, changed)
@@ -308,9 +288,9 @@ class ProgramMemory:
         if key is not None:
             self.write(key, self._typed(key, value), local)
         else:  # an element changes, but which one is not known: none of its list is known from here
-            while isinstance(target, (Member, Element)):
+            while isinstance(target, (syntax.Member, syntax.Element)):
                 target = target.of
-            if isinstance(target, Variable):
+            if isinstance(target, syntax.Variable):
                 self.forget(target.name)
 
     def forget(self, variable: str) -> None:
@@ -318,94 +298,98 @@ class ProgramMemory:
         self.kept.clear()
         for values in (self.local, self.shared):
             for name in [each for each in values if each.startswith(variable) and root(each) == variable]:
-                values[name] = Unclear(name)
+                values[name] = syntax.Unclear(name)
 
-    def _set_field(self, target: Member, value: Value) -> bool:
+    def _set_field(self, target: syntax.Member, value: syntax.Value) -> bool:
         """Give a field of a kept value a value; False if the field is kept under its whole name."""
         of, name = self.value(target.of), self.key(target.of)
-        if isinstance(of, Record):
+        if isinstance(of, syntax.Record):
             self.assign(target.of, of.having(target.name, value))
             return True
-        if name is None or not isinstance(of, Unclear) or self.read(name) is None:
+        if name is None or not isinstance(of, syntax.Unclear) or self.read(name) is None:
             return False
         if of.text == name:  # declared, without a value yet
-            self.assign(target.of, Record("", ((target.name, value),)))
+            self.assign(target.of, syntax.Record("", ((target.name, value),)))
         return True
 
-    def key(self, target: Expression) -> str | None:
+    def key(self, target: syntax.Expression) -> str | None:
         """The whole name of a variable, field or element; None if an index is unclear or it is none of these."""
         match target:
-            case Variable(name=name):
+            case syntax.Variable(name=name):
                 return name
-            case Member(of=of, name=name):
+            case syntax.Member(of=of, name=name):
                 start = self.key(of)
                 return None if start is None else f"{start}.{name}"
-            case Element(of=of, indices=indices):
+            case syntax.Element(of=of, indices=indices):
                 start = self.key(of)
-                found = [number(self.value(each)) for each in indices]
+                found = [syntax.number(self.value(each)) for each in indices]
                 if start is None or None in found:
                     return None
                 return f"{start}[{','.join(f'{each:g}' for each in found)}]"
         return None
 
-    def value(self, expression: Expression) -> Value:
+    def value(self, expression: syntax.Expression) -> syntax.Value:
         """The value of an expression."""
         match expression:
-            case Constant(value=value):
+            case syntax.Constant(value=value):
                 return value
-            case Variable(name=name):
+            case syntax.Variable(name=name):
                 found = self.read(name)
-                return Unclear(name) if found is None else found
-            case Member() | Element():
+                return syntax.Unclear(name) if found is None else found
+            case syntax.Member() | syntax.Element():
                 return self._part(expression)
-            case Unary(operator=sign, of=of):
+            case syntax.Unary(operator=sign, of=of):
                 return _unary(sign, self.value(of))
-            case Binary():
+            case syntax.Binary():
                 return self._binary(expression)
-            case Invocation(function=function):
+            case syntax.Invocation(function=function):
                 return self.functions.function(self, function, expression)
-            case Aggregate(kind=kind, items=items):
-                return Record(kind, tuple((name, self.value(each)) for name, each in items))
-            case Listed(kind=kind, items=listed):
+            case syntax.Aggregate(kind=kind, items=items):
+                return syntax.Record(kind, tuple((name, self.value(each)) for name, each in items))
+            case syntax.Listed(kind=kind, items=listed):
                 return self.functions.listed(kind, tuple(map(self.value, listed)))
-            case Opaque(text=text):
-                return Unclear(text)
+            case syntax.Opaque(text=text):
+                return syntax.Unclear(text)
 
-    def _part(self, expression: Member | Element) -> Value:
+    def _part(self, expression: syntax.Member | syntax.Element) -> syntax.Value:
         of = self.value(expression.of)
-        if isinstance(of, Record) and isinstance(expression, Member):
+        if isinstance(of, syntax.Record) and isinstance(expression, syntax.Member):
             found = of.get(expression.name)
-        elif isinstance(of, (Record, tuple)) and isinstance(expression, Element) and len(expression.indices) == 1:
-            values = of.values() if isinstance(of, Record) else of
-            at = number(self.value(expression.indices[0]))
+        elif (
+            isinstance(of, (syntax.Record, tuple))
+            and isinstance(expression, syntax.Element)
+            and len(expression.indices) == 1
+        ):
+            values = of.values() if isinstance(of, syntax.Record) else of
+            at = syntax.number(self.value(expression.indices[0]))
             place = None if at is None else at - self.functions.first_index
             found = values[int(place)] if place is not None and 0 <= place < len(values) else None
         else:
             key = self.key(expression)
             found = None if key is None else self.read(key)
-            if found is None and isinstance(of, Unclear):
-                return Unclear(key or of.text)
-        return Unclear(self.key(expression) or "an element") if found is None else found
+            if found is None and isinstance(of, syntax.Unclear):
+                return syntax.Unclear(key or of.text)
+        return syntax.Unclear(self.key(expression) or "an element") if found is None else found
 
-    def _with_element(self, target: Element, value: Value) -> Value | None:
+    def _with_element(self, target: syntax.Element, value: syntax.Value) -> syntax.Value | None:
         """The list or record that an element belongs to, with that element changed; None if it belongs to none."""
         of = self.value(target.of)
-        if isinstance(of, Solved):  # which only the arm's table gives
-            return Unclear("a changed solution of get_inverse_kin")
-        at = number(self.value(target.indices[0])) if len(target.indices) == 1 else None
-        if not isinstance(of, (tuple, Record)):
+        if isinstance(of, syntax.Solved):  # which only the arm's table gives
+            return syntax.Unclear("a changed solution of get_inverse_kin")
+        at = syntax.number(self.value(target.indices[0])) if len(target.indices) == 1 else None
+        if not isinstance(of, (tuple, syntax.Record)):
             return None
         if at is None:
-            return Unclear("a list with a changed element")
+            return syntax.Unclear("a list with a changed element")
         place = int(at) - self.functions.first_index
-        values = of.values() if isinstance(of, Record) else of
+        values = of.values() if isinstance(of, syntax.Record) else of
         if not 0 <= place < len(values):
             return None
-        if isinstance(of, Record):
+        if isinstance(of, syntax.Record):
             return of.having(of.items[place][0], value)
         return (*of[:place], value, *of[place + 1 :])
 
-    def _typed(self, key: str, value: Value) -> Value:
+    def _typed(self, key: str, value: syntax.Value) -> syntax.Value:
         kind = self.types.get(root(key), "")
         if not isinstance(value, bool) and isinstance(value, (int, float)):
             if kind in ("REAL", "LREAL") and not isinstance(value, float):
@@ -414,7 +398,7 @@ class ProgramMemory:
                 return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
         return value
 
-    def _binary(self, expression: Binary) -> Value:
+    def _binary(self, expression: syntax.Binary) -> syntax.Value:
         sign, left = expression.operator, self.value(expression.left)
         logic = SAME.get(sign)
         if logic == "AND" and left is False:
@@ -431,22 +415,26 @@ class ProgramMemory:
         if sign == ":":
             return self.functions.product(left, right)
         for side in (left, right):
-            if isinstance(side, Unclear):
+            if isinstance(side, syntax.Unclear):
                 return side
         if sign in ("==", "=", "<>", "!="):
             return (left == right) == (sign in ("==", "="))
         if sign in BITWISE:
-            return BITWISE[sign](left, right) if _is_whole(left) and _is_whole(right) else Unclear(f"... {sign} ...")
+            return (
+                BITWISE[sign](left, right)
+                if _is_whole(left) and _is_whole(right)
+                else syntax.Unclear(f"... {sign} ...")
+            )
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
         return self._computed(sign, left, right)
 
-    def _computed(self, sign: str, left: Value, right: Value) -> Value:
+    def _computed(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:
         if sign == "+" and isinstance(left, str) and isinstance(right, str) and len(left + right) < LONGEST_TEXT:
             return left + right
-        a, b = number(left), number(right)
+        a, b = syntax.number(left), syntax.number(right)
         if a is None or b is None:
-            return Unclear(f"... {sign} ...")
+            return syntax.Unclear(f"... {sign} ...")
         if sign in COMPARISONS:
             return COMPARISONS[sign](a, b)
         whole = isinstance(left, int) and isinstance(right, int)
@@ -455,12 +443,12 @@ class ProgramMemory:
                 return int(a / b) if whole and self.functions.whole_division else a / b
             if sign in ("^", "**"):
                 power = a**b
-                return Unclear("a root") if isinstance(power, complex) else power
+                return syntax.Unclear("a root") if isinstance(power, complex) else power
             if sign not in ARITHMETIC:
-                return Unclear(f"... {sign} ...")
+                return syntax.Unclear(f"... {sign} ...")
             found = ARITHMETIC[sign](a, b)
         except (ZeroDivisionError, OverflowError, ValueError):
-            return Unclear("a division by zero or an overflow")
+            return syntax.Unclear("a division by zero or an overflow")
         return int(found) if whole and abs(found) < 2**53 else found
 
 
@@ -471,19 +459,19 @@ def root(name: str) -> str:
     return name[: min(ends)] if ends else name
 
 
-def _is_whole(value: Value) -> TypeGuard[int]:
+def _is_whole(value: syntax.Value) -> TypeGuard[int]:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def _unary(sign: str, value: Value) -> Value:
-    if isinstance(value, Unclear):
+def _unary(sign: str, value: syntax.Value) -> syntax.Value:
+    if isinstance(value, syntax.Unclear):
         return value
     if sign == "B_NOT":
-        return ~value if _is_whole(value) else Unclear(f"{sign} ...")
+        return ~value if _is_whole(value) else syntax.Unclear(f"{sign} ...")
     if sign in ("NOT", "not", "!"):
-        return not value if isinstance(value, bool) else Unclear(f"{sign} ...")
-    plain = number(value)
+        return not value if isinstance(value, bool) else syntax.Unclear(f"{sign} ...")
+    plain = syntax.number(value)
     if plain is None:
-        return Unclear(f"{sign} ...")
+        return syntax.Unclear(f"{sign} ...")
     assert isinstance(value, (int, float))
     return -value if sign == "-" else value

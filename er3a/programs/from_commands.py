@@ -11,36 +11,14 @@ import scipy
 
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.planning.commands import (
-    JointCommand,
-    JointMoveCommand,
-    JointSequenceCommand,
-    JointTableCommand,
-    SegmentCommand,
-    ToolCommand,
-    ToolMoveCommand,
-    ToolSequenceCommand,
-    ToolTableCommand,
-)
+from er3a.planning import commands
 from er3a.planning.profiles import Times
-from er3a.programs.instructions import (
-    FINE,
-    ArmMotion,
-    Instruction,
-    JointTarget,
-    Listing,
-    MotionKind,
-    NamedFrame,
-    Pause,
-    PoseTarget,
-    Rate,
-    Zone,
-)
+from er3a.programs import instructions
 from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
 from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
-TO_START = Rate(0.1, "share")
+TO_START = instructions.Rate(0.1, "share")
 HALF_TURN = 1e-9  # rad
 TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
 
@@ -54,13 +32,13 @@ class PathListing:
     start : (n,), rad, its first target
     """
 
-    listing: Listing
+    listing: instructions.Listing
     start: Reals
     findings: tuple[WriteFinding, ...] = ()
 
 
 def listing_of(
-    command: JointCommand | ToolCommand,
+    command: commands.JointCommand | commands.ToolCommand,
     robot: Robot,
     start: Reals,
     name: str = "path",
@@ -80,54 +58,68 @@ def listing_of(
     """
     making = _Making(robot, start, load)
     match command:
-        case JointMoveCommand():
-            making.joints(command.end[None], np.array([command.duration]), [FINE])
-        case JointSequenceCommand():
+        case commands.JointMoveCommand():
+            making.joints(command.end[None], np.array([command.duration]), [instructions.FINE])
+        case commands.JointSequenceCommand():
             points = command.points[1:]
-            zones = [Zone("angle", command.blend)] * (len(points) - 1) + [FINE]
+            zones = [instructions.Zone("angle", command.blend)] * (len(points) - 1) + [instructions.FINE]
             making.joints(points, _shared(_joint_sizes(command.points), command.duration), _plain(zones))
-        case JointTableCommand():
+        case commands.JointTableCommand():
             points = command.points[1:]
-            zone = Zone("angle", command.blend) if command.blend is not None else Zone("named", 0.0, "half")
-            zones = [zone] * (len(points) - 1) + [FINE]
+            zone = (
+                instructions.Zone("angle", command.blend)
+                if command.blend is not None
+                else instructions.Zone("named", 0.0, "half")
+            )
+            zones = [zone] * (len(points) - 1) + [instructions.FINE]
             making.halts = _halts(command.timing, len(points))
             making.joints(points, _row_times(command.timing, _joint_sizes(command.points)), _plain(zones))
-        case ToolMoveCommand():
+        case commands.ToolMoveCommand():
             making.segments((command.segment,), command.duration, ends)
-        case ToolSequenceCommand():
+        case commands.ToolSequenceCommand():
             making.segments(command.segments, command.duration, ends)
-        case ToolTableCommand():
-            sizes = making.sizes(tuple(map(SegmentCommand, command.poses[1:])))
+        case commands.ToolTableCommand():
+            sizes = making.sizes(tuple(map(commands.SegmentCommand, command.poses[1:])))
             halves = np.append(np.minimum(sizes[:-1], sizes[1:]) / 2, 0.0)  # as er3a.planning.commands rounds corners
             blends = halves if command.blend is None else np.minimum(halves, command.blend)
-            parts = tuple(SegmentCommand(pose, blend=float(blend)) for pose, blend in zip(command.poses[1:], blends))
+            parts = tuple(
+                commands.SegmentCommand(pose, blend=float(blend)) for pose, blend in zip(command.poses[1:], blends)
+            )
             making.halts = _halts(command.timing, len(parts))
             making.segments(parts, _row_times(command.timing, sizes), ends)
         case _:
             assert_never(command)
     findings = (HalfTurnsSplit(making.split),) if making.split else ()
-    return PathListing(Listing(name, tuple(making.found), title), start, findings)
+    return PathListing(instructions.Listing(name, tuple(making.found), title), start, findings)
 
 
 class _Making:
     """Puts the instructions of a path together."""
 
     def __init__(self, robot: Robot, start: Reals, load: MassBody | str | None):
-        self.tool, self.base, self.load = NamedFrame("", robot.tool), NamedFrame("", np.eye(4)), load
+        self.tool, self.base, self.load = (
+            instructions.NamedFrame("", robot.tool),
+            instructions.NamedFrame("", np.eye(4)),
+            load,
+        )
         self.to_robot = np.linalg.inv(robot.base)
         self.pose: Reals = self.to_robot @ forward(robot, start)
-        self.found: list[Instruction] = [self._motion("joint", JointTarget(start), TO_START, FINE)]
+        self.found: list[instructions.Instruction] = [
+            self._motion("joint", instructions.JointTarget(start), TO_START, instructions.FINE)
+        ]
         self.split = 0
         self.halts: dict[int, float] = {}
 
-    def joints(self, points: Reals, times: Reals, zones: list[Zone]) -> None:
+    def joints(self, points: Reals, times: Reals, zones: list[instructions.Zone]) -> None:
         """Joint motions to points (k, n)."""
         for i, (point, seconds, zone) in enumerate(zip(points, times, zones)):
-            blend = FINE if i in self.halts else zone
-            self.found.append(self._motion("joint", JointTarget(point), Rate(float(seconds), "s"), blend))
+            blend = instructions.FINE if i in self.halts else zone
+            self.found.append(
+                self._motion("joint", instructions.JointTarget(point), instructions.Rate(float(seconds), "s"), blend)
+            )
             self._rest(i)
 
-    def sizes(self, parts: tuple[SegmentCommand, ...]) -> Reals:
+    def sizes(self, parts: tuple[commands.SegmentCommand, ...]) -> Reals:
         """Lengths of segments (m), where a turn counts too."""
         found, pose = [], self.pose
         for part in parts:
@@ -137,19 +129,23 @@ class _Making:
             pose = end
         return np.array(found)
 
-    def segments(self, parts: tuple[SegmentCommand, ...], timing: float | Reals, ends: Reals | None) -> None:
+    def segments(self, parts: tuple[commands.SegmentCommand, ...], timing: float | Reals, ends: Reals | None) -> None:
         """Lines and arcs; ``timing`` in all, or of each."""
         times = _shared(self.sizes(parts), timing) if isinstance(timing, float | int) else timing
         for i, part in enumerate(parts):
             end = self.to_robot @ part.end
-            zone = Zone("distance", part.blend) if part.blend > 0 and i not in self.halts else FINE
+            zone = (
+                instructions.Zone("distance", part.blend)
+                if part.blend > 0 and i not in self.halts
+                else instructions.FINE
+            )
             seconds = float(times[i])
             joints = None if ends is None else ends[i]
             if part.via is not None:
                 via = end.copy()
                 via[:3, 3] = (self.to_robot @ np.append(part.via, 1.0))[:3]
-                rate, target = Rate(seconds, "s"), PoseTarget(end, joints=joints)
-                self.found.append(self._motion("arc", target, rate, zone, PoseTarget(via)))
+                rate, target = instructions.Rate(seconds, "s"), instructions.PoseTarget(end, joints=joints)
+                self.found.append(self._motion("arc", target, rate, zone, instructions.PoseTarget(via)))
             else:
                 self._line(end, part.half_turn_axis, seconds, zone, joints)
             self.pose = end
@@ -157,9 +153,11 @@ class _Making:
 
     def _rest(self, number: int) -> None:
         if number in self.halts:
-            self.found.append(Pause(self.halts[number]))
+            self.found.append(instructions.Pause(self.halts[number]))
 
-    def _line(self, end: Reals, axis: Reals | None, seconds: float, zone: Zone, joints: Reals | None) -> None:
+    def _line(
+        self, end: Reals, axis: Reals | None, seconds: float, zone: instructions.Zone, joints: Reals | None
+    ) -> None:
         turn = _turn(self.pose, end)
         if abs(float(np.linalg.norm(turn)) - np.pi) < HALF_TURN:
             self.split += 1
@@ -170,23 +168,31 @@ class _Making:
                 scipy.spatial.transform.Rotation.from_rotvec(sense * turn / 2).as_matrix() @ self.pose[:3, :3]
             )
             seconds /= 2
-            self.found.append(self._motion("line", PoseTarget(middle), Rate(seconds, "s"), FINE))
-        self.found.append(self._motion("line", PoseTarget(end, joints=joints), Rate(seconds, "s"), zone))
+            self.found.append(
+                self._motion(
+                    "line", instructions.PoseTarget(middle), instructions.Rate(seconds, "s"), instructions.FINE
+                )
+            )
+        self.found.append(
+            self._motion("line", instructions.PoseTarget(end, joints=joints), instructions.Rate(seconds, "s"), zone)
+        )
 
     def _motion(
         self,
-        kind: MotionKind,
-        target: JointTarget | PoseTarget,
-        speed: Rate,
-        zone: Zone,
-        via: PoseTarget | None = None,
-    ) -> ArmMotion:
-        return ArmMotion(kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base, load=self.load)
+        kind: instructions.MotionKind,
+        target: instructions.JointTarget | instructions.PoseTarget,
+        speed: instructions.Rate,
+        zone: instructions.Zone,
+        via: instructions.PoseTarget | None = None,
+    ) -> instructions.ArmMotion:
+        return instructions.ArmMotion(
+            kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base, load=self.load
+        )
 
 
-def _plain(zones: list[Zone]) -> list[Zone]:
+def _plain(zones: list[instructions.Zone]) -> list[instructions.Zone]:
     """Zones of no size are stops."""
-    return [FINE if zone.kind == "angle" and zone.value <= 0 else zone for zone in zones]
+    return [instructions.FINE if zone.kind == "angle" and zone.value <= 0 else zone for zone in zones]
 
 
 def _joint_sizes(points: Reals) -> Reals:

@@ -28,65 +28,27 @@ from er3a.errors import InputError, ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
+from er3a.programs import instructions, syntax
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, root
 from er3a.programs.execution import Ending, EndKind, Execution, KeepOn, RunLimits, Step
-from er3a.programs.instructions import (
-    ArmMotion,
-    Aside,
-    Decision,
-    Instruction,
-    MovesBeside,
-    Output,
-    Pause,
-    Place,
-    Unknown,
-)
 from er3a.programs.languages import LANGUAGES, not_written
-from er3a.programs.syntax import (
-    START,
-    Assign,
-    Beside,
-    Branch,
-    Call,
-    Doing,
-    Element,
-    Expression,
-    Fixed,
-    GoTo,
-    Halt,
-    Invocation,
-    Member,
-    Move,
-    Operation,
-    Program,
-    Return,
-    Routine,
-    Unclear,
-    Value,
-    Variable,
-    Waiting,
-    expressions_of,
-    inner,
-    number,
-    shown,
-)
 from er3a.robots.robot import Robot
 
 
-def names(expression: Expression | None) -> Iterable[str]:
+def names(expression: syntax.Expression | None) -> Iterable[str]:
     """All variables in an expression."""
-    if isinstance(expression, Variable):
+    if isinstance(expression, syntax.Variable):
         yield root(expression.name)
-    for each in inner(expression):
+    for each in syntax.inner(expression):
         yield from names(each)
 
 
-def target_name(target: Expression) -> str:
+def target_name(target: syntax.Expression) -> str:
     """The variable that an assignment changes."""
     return next(iter(names(target)), "")
 
 
-def deciding(program: Program, modal: frozenset[str]) -> frozenset[str]:
+def deciding(program: syntax.Program, modal: frozenset[str]) -> frozenset[str]:
     """Names of the variables that change while the program runs and on which its motions depend.
 
     Parameters
@@ -97,14 +59,14 @@ def deciding(program: Program, modal: frozenset[str]) -> frozenset[str]:
     sources: dict[str, set[str]] = defaultdict(set)
     assigned = set(modal)
     for operation in program.operations():
-        if isinstance(operation, Fixed):
+        if isinstance(operation, syntax.Fixed):
             continue
-        used = {name for each in expressions_of(operation) for name in names(each)}
-        if isinstance(operation, (Branch, Move, Call, Beside, Return, Doing)):
+        used = {name for each in syntax.expressions_of(operation) for name in names(each)}
+        if isinstance(operation, (syntax.Branch, syntax.Move, syntax.Call, syntax.Beside, syntax.Return, syntax.Doing)):
             needed |= used
-            if isinstance(operation, Call):
+            if isinstance(operation, syntax.Call):
                 assigned |= {*used, operation.result}
-        elif isinstance(operation, Assign):
+        elif isinstance(operation, syntax.Assign):
             name = target_name(operation.target)
             assigned.add(name)
             sources[name] |= used
@@ -118,19 +80,19 @@ def deciding(program: Program, modal: frozenset[str]) -> frozenset[str]:
     return frozenset(needed & assigned)
 
 
-def changed_beside(program: Program, dialect: Dialect, itself: str = "") -> frozenset[str]:
+def changed_beside(program: syntax.Program, dialect: Dialect, itself: str = "") -> frozenset[str]:
     """Names of the variables that threads and interrupts, but for one ``itself``, change beside the program.
 
     What motions depend on without naming it, as the tool, is not among them: a routine that sets it is named as one
     that moves the arm beside the program, and the two are followed apart.
     """
     routines = program.routines
-    asked = {each.what.function for each in program.operations() if isinstance(each, Beside)}
+    asked = {each.what.function for each in program.operations() if isinstance(each, syntax.Beside)}
     started = {name for name in routines if (name in asked or routines[name].thread) and name != itself}
     return _changed_in(program, _with_called(program, started), dialect) - dialect.modal
 
 
-def _with_called(program: Program, names: Iterable[str]) -> set[str]:
+def _with_called(program: syntax.Program, names: Iterable[str]) -> set[str]:
     """Routines with those that they call or start."""
     found: set[str] = set()
     waiting = [name for name in names if name in program.routines]
@@ -142,39 +104,39 @@ def _with_called(program: Program, names: Iterable[str]) -> set[str]:
     return found
 
 
-def _next(operation: Operation) -> tuple[str, ...]:
+def _next(operation: syntax.Operation) -> tuple[str, ...]:
     """The routine that an operation calls or starts, if it does."""
-    if isinstance(operation, Call):
+    if isinstance(operation, syntax.Call):
         return (operation.routine,)
-    return (operation.what.function,) if isinstance(operation, Beside) else ()
+    return (operation.what.function,) if isinstance(operation, syntax.Beside) else ()
 
 
-def _changed_in(program: Program, names: Iterable[str], dialect: Dialect) -> frozenset[str]:
+def _changed_in(program: syntax.Program, names: Iterable[str], dialect: Dialect) -> frozenset[str]:
     """Variables, not local ones, that routines change."""
     return frozenset(each for name in names for op in program.routines[name].code for each in _shared(op, dialect))
 
 
-def _shared(operation: Operation, dialect: Dialect) -> Iterable[str]:
+def _shared(operation: syntax.Operation, dialect: Dialect) -> Iterable[str]:
     """Variables, not local ones, that an operation changes."""
-    if isinstance(operation, Assign):
+    if isinstance(operation, syntax.Assign):
         return () if operation.local else (target_name(operation.target),)
-    if isinstance(operation, Doing) and not (
-        isinstance(operation.what, Invocation) and dialect.harmless(operation.what)
+    if isinstance(operation, syntax.Doing) and not (
+        isinstance(operation.what, syntax.Invocation) and dialect.harmless(operation.what)
     ):
         return dialect.modal
     return ()
 
 
-def strange_call(operation: Operation, dialect: Dialect) -> str:
+def strange_call(operation: syntax.Operation, dialect: Dialect) -> str:
     """A function in an operation's expressions that is not known, and so may do anything; empty if there is none."""
-    waiting = list(expressions_of(operation))
-    if isinstance(operation, Doing) and isinstance(operation.what, Invocation):
-        waiting = list(inner(operation.what))
+    waiting = list(syntax.expressions_of(operation))
+    if isinstance(operation, syntax.Doing) and isinstance(operation.what, syntax.Invocation):
+        waiting = list(syntax.inner(operation.what))
     while waiting:
         each = waiting.pop()
-        if isinstance(each, Invocation) and not dialect.harmless(each):
+        if isinstance(each, syntax.Invocation) and not dialect.harmless(each):
             return f"{each.function}(...)"
-        waiting += inner(each)
+        waiting += syntax.inner(each)
     return ""
 
 
@@ -192,7 +154,7 @@ class QuietBranch:
     changed: frozenset[str]
 
 
-def quiet_branches(program: Program, dialect: Dialect) -> dict[tuple[str, int], QuietBranch]:
+def quiet_branches(program: syntax.Program, dialect: Dialect) -> dict[tuple[str, int], QuietBranch]:
     """The quiet branches by routine and number: no side moves the arm, or changes what decides where it goes."""
     moving = _moving(program, dialect)
     changes = _changes(program)
@@ -201,11 +163,11 @@ def quiet_branches(program: Program, dialect: Dialect) -> dict[tuple[str, int], 
     needed = set(dialect.modal)
     for routine in program.routines.values():
         for at, used, operation in _uses(routine):
-            if isinstance(operation, Branch):
+            if isinstance(operation, syntax.Branch):
                 conditions[routine.name, at] = used
-            elif isinstance(operation, (Move, Doing)) and _moves(operation, moving, dialect):
+            elif isinstance(operation, (syntax.Move, syntax.Doing)) and _moves(operation, moving, dialect):
                 needed |= used
-        if any(isinstance(operation, Branch) for operation in routine.code):
+        if any(isinstance(operation, syntax.Branch) for operation in routine.code):
             found |= _quiet_in(routine, moving, changes, dialect)
     sources = _sources(program)
     waiting = [*needed, *(name for key, used in conditions.items() if key not in found for name in used)]
@@ -220,7 +182,7 @@ def quiet_branches(program: Program, dialect: Dialect) -> dict[tuple[str, int], 
     return found
 
 
-def _moving(program: Program, dialect: Dialect) -> set[str]:
+def _moving(program: syntax.Program, dialect: Dialect) -> set[str]:
     """Routines that may move the arm."""
     moving: set[str] = set()
     while True:
@@ -234,36 +196,39 @@ def _moving(program: Program, dialect: Dialect) -> set[str]:
         moving |= more
 
 
-def _moves(operation: Operation, moving: set[str], dialect: Dialect) -> bool:
+def _moves(operation: syntax.Operation, moving: set[str], dialect: Dialect) -> bool:
     match operation:
-        case Move() | Fixed(instruction=ArmMotion()):
+        case syntax.Move() | syntax.Fixed(instruction=instructions.ArmMotion()):
             return True
-        case Doing(what=what) if not (isinstance(what, Invocation) and dialect.harmless(what)):
+        case syntax.Doing(what=what) if not (isinstance(what, syntax.Invocation) and dialect.harmless(what)):
             return True
-        case Call(routine=routine) if routine in moving:
+        case syntax.Call(routine=routine) if routine in moving:
             return True
-        case Beside(what=what) if what.function in moving:
+        case syntax.Beside(what=what) if what.function in moving:
             return True
     return _may_move(operation, dialect)
 
 
-def _may_move(operation: Operation, dialect: Dialect) -> bool:
+def _may_move(operation: syntax.Operation, dialect: Dialect) -> bool:
     """Whether an operation that is no motion may move the arm for all that is known."""
     match operation:
-        case Fixed(instruction=Unknown(may_move=may_move)):
+        case syntax.Fixed(instruction=instructions.Unknown(may_move=may_move)):
             return may_move
-        case Doing(what=Invocation() as call) if dialect.harmless(call) or call.function in dialect.setters:
+        case syntax.Doing(what=syntax.Invocation() as call) if (
+            dialect.harmless(call) or call.function in dialect.setters
+        ):
             pass
-        case Doing():
+        case syntax.Doing():
             return True
     return bool(strange_call(operation, dialect))
 
 
-def _changes(program: Program) -> dict[str, set[str]]:
+def _changes(program: syntax.Program) -> dict[str, set[str]]:
     """Variables that each routine may change, with those that it calls."""
     own = {name: {each for op in routine.code for each in _changed(op)} for name, routine in program.routines.items()}
     called = {
-        name: {op.routine for op in routine.code if isinstance(op, Call)} for name, routine in program.routines.items()
+        name: {op.routine for op in routine.code if isinstance(op, syntax.Call)}
+        for name, routine in program.routines.items()
     }
     while True:
         grown = {name: own[name].union(*(own[each] for each in called[name])) for name in own}
@@ -272,10 +237,10 @@ def _changes(program: Program) -> dict[str, set[str]]:
         own = grown
 
 
-def _changed(operation: Operation) -> Iterator[str]:
-    if isinstance(operation, Assign):
+def _changed(operation: syntax.Operation) -> Iterator[str]:
+    if isinstance(operation, syntax.Assign):
         yield target_name(operation.target)
-    elif isinstance(operation, Call):  # parameters may go both ways
+    elif isinstance(operation, syntax.Call):  # parameters may go both ways
         yield from (name for each in operation.arguments for name in names(each))
 
 
@@ -283,26 +248,26 @@ def _value_of(routine: str) -> str:
     return f"%of {routine}"
 
 
-def _uses(routine: Routine) -> Iterator[tuple[int, set[str], Operation]]:
+def _uses(routine: syntax.Routine) -> Iterator[tuple[int, set[str], syntax.Operation]]:
     """Variables that operations use, with the values of calls named by what was called."""
     results: dict[str, str] = {}
     for at, operation in enumerate(routine.code):
-        used = {name for each in expressions_of(operation) for name in names(each)}
+        used = {name for each in syntax.expressions_of(operation) for name in names(each)}
         yield at, {results.get(name, name) for name in used}, operation
-        if isinstance(operation, Call) and operation.result:
+        if isinstance(operation, syntax.Call) and operation.result:
             results[operation.result] = _value_of(operation.routine)
 
 
-def _sources(program: Program) -> dict[str, set[str]]:
+def _sources(program: syntax.Program) -> dict[str, set[str]]:
     """Variables by the variables that are made of them."""
     sources: dict[str, set[str]] = defaultdict(set)
     for routine in program.routines.values():
         for _, used, operation in _uses(routine):
-            if isinstance(operation, Assign):
+            if isinstance(operation, syntax.Assign):
                 sources[target_name(operation.target)] |= used
-            elif isinstance(operation, Return):
+            elif isinstance(operation, syntax.Return):
                 sources[_value_of(routine.name)] |= used
-            elif isinstance(operation, Call):
+            elif isinstance(operation, syntax.Call):
                 parameters = {each.name for each in program.routines[operation.routine].parameters}
                 for name in parameters:
                     sources[name] |= used
@@ -312,14 +277,14 @@ def _sources(program: Program) -> dict[str, set[str]]:
 
 
 def _quiet_in(
-    routine: Routine, moving: set[str], changes: dict[str, set[str]], dialect: Dialect
+    routine: syntax.Routine, moving: set[str], changes: dict[str, set[str]], dialect: Dialect
 ) -> dict[tuple[str, int], QuietBranch]:
     """Branches of a routine between which and the place where their sides meet nothing moves the arm."""
     graph = _Graph(routine)
     loud = [_moves(each, moving, dialect) for each in routine.code]
     found = {}
     for at, operation in enumerate(routine.code):
-        if not isinstance(operation, Branch) or (to := graph.meeting[at]) < 0:
+        if not isinstance(operation, syntax.Branch) or (to := graph.meeting[at]) < 0:
             continue
         between = graph.between(at, to, loud)
         if between is None:
@@ -327,9 +292,9 @@ def _quiet_in(
         changed = {name for i in between for name in _changed(routine.code[i])}
         for i in between:
             each = routine.code[i]
-            if isinstance(each, Call):
+            if isinstance(each, syntax.Call):
                 changed |= changes[each.routine]
-            elif isinstance(each, Return) and each.value is not None:
+            elif isinstance(each, syntax.Return) and each.value is not None:
                 changed.add(_value_of(routine.name))
         found[routine.name, at] = QuietBranch(min(to, len(routine.code) - 1), frozenset(changed))
     return found
@@ -343,7 +308,7 @@ class _Graph:
     meeting : by operation, the first that every way from it comes to; -1 where there is none
     """
 
-    def __init__(self, routine: Routine):
+    def __init__(self, routine: syntax.Routine):
         self.end = len(routine.code)
         self.after: list[tuple[int, ...]] = [self._after(i, each) for i, each in enumerate(routine.code)]
         self.after.append(())
@@ -351,20 +316,20 @@ class _Graph:
         before = self._before()
         reaching = set(self._order(before))
         for i, operation in enumerate(routine.code):
-            if isinstance(operation, GoTo) and operation.to <= i and i not in reaching:
+            if isinstance(operation, syntax.GoTo) and operation.to <= i and i not in reaching:
                 self.endless.add(i)
                 before[self.end].append(i)
         self.meeting = self._meetings(before)
 
-    def _after(self, at: int, operation: Operation) -> tuple[int, ...]:
+    def _after(self, at: int, operation: syntax.Operation) -> tuple[int, ...]:
         match operation:
-            case GoTo(to=to):
+            case syntax.GoTo(to=to):
                 return (to,)
-            case Branch(otherwise=otherwise):
+            case syntax.Branch(otherwise=otherwise):
                 return (at + 1, otherwise)
-            case Return():
+            case syntax.Return():
                 return (self.end,)
-            case Halt():
+            case syntax.Halt():
                 return ()
         return (at + 1,)
 
@@ -442,12 +407,12 @@ ASKED_EVERY = 64  # operations
 class Frame:
     """A routine that runs."""
 
-    routine: Routine
+    routine: syntax.Routine
     at: int = 0
-    local: dict[str, Value] = field(default_factory=dict)
-    calls: tuple[Place, ...] = ()
+    local: dict[str, syntax.Value] = field(default_factory=dict)
+    calls: tuple[instructions.Place, ...] = ()
     result: str = ""
-    outs: tuple[tuple[str, Expression], ...] = ()
+    outs: tuple[tuple[str, syntax.Expression], ...] = ()
 
     def copy(self) -> Frame:
         """Another that goes its own way from here."""
@@ -479,7 +444,7 @@ class Machine:
     """One run of a program."""
 
     def __init__(
-        self, program: Program, dialect: Dialect, cell: Cell, limits: RunLimits, keep_on: KeepOn | None = None
+        self, program: syntax.Program, dialect: Dialect, cell: Cell, limits: RunLimits, keep_on: KeepOn | None = None
     ):
         self.program, self.dialect, self.cell, self.limits = program, dialect, cell, limits
         self.keep_on = keep_on
@@ -507,7 +472,7 @@ class Machine:
         self.ways = 1
         self.numbers = 1  # of ways that were begun, those that joined others too
         self.sides: Counter[tuple[str, int, bool]] = Counter()  # how often each side of a branch was taken
-        self.cut: set[Place] = set()
+        self.cut: set[instructions.Place] = set()
         self.first_after: dict[int, int] = {}  # step by the one before it
 
     def run(self) -> Execution:
@@ -525,7 +490,7 @@ class Machine:
             self._follow(self.waiting.pop())
         return Execution(self.program, tuple(self.steps), tuple(self.endings), self._unmet())
 
-    def _unmet(self) -> tuple[Place, ...]:
+    def _unmet(self) -> tuple[instructions.Place, ...]:
         """Instructions that are no motions, may move the arm for all that is known, and were not carried out."""
         return tuple(
             operation.place
@@ -559,56 +524,61 @@ class Machine:
             frame.at += 1
             self.passed.add((frame.routine.name, at))
             if (strange := self.strange.get((frame.routine.name, at))) is not None:
-                self._note(way, operation.place, Unknown(strange))
+                self._note(way, operation.place, instructions.Unknown(strange))
                 way.memory.here = Position()
-            if isinstance(operation, GoTo):
+            if isinstance(operation, syntax.GoTo):
                 frame.at, back = operation.to, operation.to <= at
                 if operation.endless and back and self._drifts(way, frame.routine.name, at):
                     self._end(way, "drifts", operation.place, limit=self.limits.rounds)
                     return
-            elif isinstance(operation, Branch):
+            elif isinstance(operation, syntax.Branch):
                 back = self._branch(way, frame, operation, at)
-            elif isinstance(operation, Call):
+            elif isinstance(operation, syntax.Call):
                 if len(way.frames) > self.limits.depth:
                     self._end(way, "recursion", operation.place, limit=self.limits.depth)
                     return
                 self._call(way, operation)
-            elif isinstance(operation, Beside):
+            elif isinstance(operation, syntax.Beside):
                 self._start(way, operation)
-            elif isinstance(operation, (Return, Halt)):
-                if isinstance(operation, Halt) or len(way.frames) == 1:
+            elif isinstance(operation, (syntax.Return, syntax.Halt)):
+                if isinstance(operation, syntax.Halt) or len(way.frames) == 1:
                     self._end(way, "end", operation.place)
                     return
                 self._return(way, operation)
             else:
                 self._carry_out(way, frame, operation)
 
-    def _carry_out(self, way: ExecutionPath, frame: Frame, operation: Move | Assign | Waiting | Doing | Fixed) -> None:
+    def _carry_out(
+        self,
+        way: ExecutionPath,
+        frame: Frame,
+        operation: syntax.Move | syntax.Assign | syntax.Waiting | syntax.Doing | syntax.Fixed,
+    ) -> None:
         memory = way.memory
-        if isinstance(operation, Move):
+        if isinstance(operation, syntax.Move):
             motion = self.dialect.motion(memory, operation)
             self._note(way, operation.place, motion)
             memory.here = memory.here.after(motion, memory.cell.flange)
-        elif isinstance(operation, Fixed):
+        elif isinstance(operation, syntax.Fixed):
             self._note(way, operation.place, operation.instruction)
-            if isinstance(operation.instruction, ArmMotion):
+            if isinstance(operation.instruction, instructions.ArmMotion):
                 memory.here = memory.here.after(operation.instruction, memory.cell.flange)
-            elif isinstance(operation.instruction, Unknown) and operation.instruction.may_move:
+            elif isinstance(operation.instruction, instructions.Unknown) and operation.instruction.may_move:
                 memory.here = Position()
-        elif isinstance(operation, Assign):
+        elif isinstance(operation, syntax.Assign):
             signal = self._assign(memory, operation)
             if signal is not None:
                 self._note(way, operation.place, signal)
-        elif isinstance(operation, Waiting):
+        elif isinstance(operation, syntax.Waiting):
             self._note(way, operation.place, self._pause(memory, operation))
         else:
             done = self.dialect.carry_out(memory, operation)
             if done is not None:
                 self._note(way, operation.place, done)
-                if isinstance(done, Unknown) and done.may_move:
+                if isinstance(done, instructions.Unknown) and done.may_move:
                     memory.here = Position()
 
-    def _note(self, way: ExecutionPath, place: Place, instruction: Instruction) -> None:
+    def _note(self, way: ExecutionPath, place: instructions.Place, instruction: instructions.Instruction) -> None:
         self.first_after.setdefault(way.step, len(self.steps))
         self.steps.append(Step(instruction, place, way.frames[-1].calls, way.step))
         way.step = len(self.steps) - 1
@@ -618,43 +588,49 @@ class Machine:
             self.stopped = not self.keep_on("following", len(self.steps), 0)
         return self.stopped
 
-    def _end(self, way: ExecutionPath, kind: EndKind, place: Place, behind: int | None = None, limit: int = 0) -> None:
+    def _end(
+        self, way: ExecutionPath, kind: EndKind, place: instructions.Place, behind: int | None = None, limit: int = 0
+    ) -> None:
         """``behind``: the step in front of the one that follows."""
         follows = None if behind is None else self.first_after.get(behind)
         self.endings.append(Ending(kind, way.step, place, follows, limit, way.beside))
 
-    def _assign(self, memory: ProgramMemory, each: Assign) -> Output | Unknown | None:
-        if each.type_name and isinstance(each.target, Variable):
+    def _assign(self, memory: ProgramMemory, each: syntax.Assign) -> instructions.Output | instructions.Unknown | None:
+        if each.type_name and isinstance(each.target, syntax.Variable):
             memory.types[each.target.name] = each.type_name
         if each.value is None:
-            if isinstance(each.target, Variable) and each.target.name not in memory.local:
-                memory.write(each.target.name, Unclear(each.target.name), each.local)
+            if isinstance(each.target, syntax.Variable) and each.target.name not in memory.local:
+                memory.write(each.target.name, syntax.Unclear(each.target.name), each.local)
             return None
         value = memory.value(each.value)
         name = memory.key(each.target) or each.text
         if self.dialect.is_signal(name):
             memory.write(name, value)
-            return Output(name, shown(value))
+            return instructions.Output(name, syntax.shown(value))
         declared = each.type_name == "global" or not self.dialect.local_by_default
         local = each.local or (not declared and self._is_new(memory, name))
         memory.assign(each.target, value, local)
         if self.dialect.named(name):
             memory.write(name + "%name", each.text.partition("=")[2].strip())
-        return None if self.dialect.is_followed(name, value) else Unknown(each.text, may_move=False)
+        return None if self.dialect.is_followed(name, value) else instructions.Unknown(each.text, may_move=False)
 
     def _is_new(self, memory: ProgramMemory, name: str) -> bool:
         start = root(name)
         return start not in memory.shared and start not in memory.local and memory.local.get("%inside") is True
 
-    def _pause(self, memory: ProgramMemory, waiting: Waiting) -> Pause:
+    def _pause(self, memory: ProgramMemory, waiting: syntax.Waiting) -> instructions.Pause:
         if waiting.kind == "operator":
-            return Pause()
+            return instructions.Pause()
         if waiting.kind == "condition" or waiting.of is None:
-            return Pause(condition=waiting.text)
-        seconds = number(memory.value(waiting.of))
-        return Pause(seconds) if seconds is not None and seconds >= 0 else Pause(condition=waiting.text)
+            return instructions.Pause(condition=waiting.text)
+        seconds = syntax.number(memory.value(waiting.of))
+        return (
+            instructions.Pause(seconds)
+            if seconds is not None and seconds >= 0
+            else instructions.Pause(condition=waiting.text)
+        )
 
-    def _branch(self, way: ExecutionPath, frame: Frame, branch: Branch, at: int) -> bool:
+    def _branch(self, way: ExecutionPath, frame: Frame, branch: syntax.Branch, at: int) -> bool:
         """Go on, on the side that the condition chooses, or on both; whether that is backwards."""
         holds = way.memory.value(branch.condition)
         if isinstance(holds, bool):
@@ -663,7 +639,7 @@ class Machine:
             return not holds and branch.otherwise <= at
         quiet = self.quiet.get((frame.routine.name, at))
         if quiet is not None:
-            self._note(way, branch.place, Decision(branch.text, True))
+            self._note(way, branch.place, instructions.Decision(branch.text, True))
             for name in quiet.changed:
                 way.memory.forget(name)
             frame.at = quiet.to
@@ -686,34 +662,34 @@ class Machine:
             self.cut.add(branch.place)
         taken = self.sides[yes] <= self.sides[no]
         self.sides[yes if taken else no] += 1
-        self._note(way, branch.place, Decision(branch.text, taken))
+        self._note(way, branch.place, instructions.Decision(branch.text, taken))
         if not taken:
             frame.at = branch.otherwise
         return not taken and branch.otherwise <= at
 
-    def _take_sides(self, branch: Branch, holding: ExecutionPath, other: ExecutionPath) -> None:
+    def _take_sides(self, branch: syntax.Branch, holding: ExecutionPath, other: ExecutionPath) -> None:
         """One way on the side of the condition, another on the other side."""
         other.frames[-1].at = branch.otherwise
-        self._note(holding, branch.place, Decision(branch.text, True))
-        self._note(other, branch.place, Decision(branch.text, False))
+        self._note(holding, branch.place, instructions.Decision(branch.text, True))
+        self._note(other, branch.place, instructions.Decision(branch.text, False))
 
-    def _call(self, way: ExecutionPath, call: Call) -> None:
+    def _call(self, way: ExecutionPath, call: syntax.Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
         local, fits = _locals(routine, call.arguments, call.keywords, memory)
-        if call.result == START:
+        if call.result == syntax.START:
             del local["%inside"]
         if not fits:
-            self._note(way, call.place, Unknown(call.text, may_move=False))
+            self._note(way, call.place, instructions.Unknown(call.text, may_move=False))
         outs = tuple(
             (parameter.name, given)
             for parameter, given in zip(routine.parameters, call.arguments)
-            if parameter.out and isinstance(given, (Variable, Member, Element))
+            if parameter.out and isinstance(given, (syntax.Variable, syntax.Member, syntax.Element))
         )
         calls = (*way.frames[-1].calls, call.place)
         way.frames.append(Frame(routine, 0, local, calls, call.result, outs))
         memory.local = local
 
-    def _start(self, way: ExecutionPath, start: Beside) -> None:
+    def _start(self, way: ExecutionPath, start: syntax.Beside) -> None:
         """Follow a routine that moves the arm beside the program, on a way that begins here.
 
         The program's own way goes on. Behind the start of a thread it does not know where the arm stands; an interrupt,
@@ -724,10 +700,10 @@ class Machine:
         unknown = routine is None and (start.kind == "thread" or not self.dialect.harmless(start.what))
         sets = _changed_in(self.program, _with_called(self.program, (name,)), self.dialect) & self.dialect.modal
         if not unknown and name not in self.moving and not sets:
-            self._note(way, start.place, Aside(start.text))
+            self._note(way, start.place, instructions.Aside(start.text))
             return
         before = way.step
-        self._note(way, start.place, MovesBeside(name, start.kind, start.text))
+        self._note(way, start.place, instructions.MovesBeside(name, start.kind, start.text))
         if routine is not None:
             other = way.fork(self.numbers, len(self.seen))
             other.step, other.beside = before, True
@@ -743,9 +719,9 @@ class Machine:
                 self.numbers += 1
                 self.waiting.insert(0, other)
                 if start.kind == "interrupt":
-                    self._note(other, start.place, MovesBeside(name, "entered", start.text))
+                    self._note(other, start.place, instructions.MovesBeside(name, "entered", start.text))
                 if not fits:
-                    self._note(other, start.place, Unknown(start.text, may_move=False))
+                    self._note(other, start.place, instructions.Unknown(start.text, may_move=False))
         if start.kind == "thread":
             way.memory.here = Position()
 
@@ -763,20 +739,20 @@ class Machine:
                     continue
                 seen.add(at)
                 operation = code[at]
-                waiting += [operation.to] if isinstance(operation, GoTo) else [at + 1]
-                waiting += [operation.otherwise] if isinstance(operation, Branch) else []
+                waiting += [operation.to] if isinstance(operation, syntax.GoTo) else [at + 1]
+                waiting += [operation.otherwise] if isinstance(operation, syntax.Branch) else []
                 found.update(_shared(operation, self.dialect))
                 called.update(_next(operation))
         found |= _changed_in(self.program, _with_called(self.program, called), self.dialect)
         return frozenset(found) - self.dialect.modal
 
-    def _return(self, way: ExecutionPath, operation: Return) -> None:
+    def _return(self, way: ExecutionPath, operation: syntax.Return) -> None:
         memory = way.memory
-        value: Value = Unclear("a value") if operation.value is None else memory.value(operation.value)
+        value: syntax.Value = syntax.Unclear("a value") if operation.value is None else memory.value(operation.value)
         frame = way.frames.pop()
         memory.local = way.frames[-1].local
         for name, target in frame.outs:
-            memory.assign(target, frame.local.get(name, Unclear(name)))
+            memory.assign(target, frame.local.get(name, syntax.Unclear(name)))
         if frame.result:
             memory.write(frame.result, value, local=True)
 
@@ -801,7 +777,7 @@ class Machine:
         own = other == way.number or any(other == earlier and count < until for earlier, until in way.line)
         return ("repeats" if own else "joins"), step
 
-    def _kept(self, values: dict[str, Value]) -> frozenset[tuple[str, Value]]:
+    def _kept(self, values: dict[str, syntax.Value]) -> frozenset[tuple[str, syntax.Value]]:
         new = values.keys() - self.names_met
         self.names_met |= new
         self.deciding_names += [name for name in new if name[0] == "%" or root(name) in self.deciding]
@@ -809,14 +785,14 @@ class Machine:
 
 
 def _locals(
-    routine: Routine,
-    arguments: tuple[Expression | None, ...],
-    keywords: tuple[tuple[str, Expression], ...],
+    routine: syntax.Routine,
+    arguments: tuple[syntax.Expression | None, ...],
+    keywords: tuple[tuple[str, syntax.Expression], ...],
     memory: ProgramMemory,
-) -> tuple[dict[str, Value], bool]:
+) -> tuple[dict[str, syntax.Value], bool]:
     """Variables of a routine that begins, and whether it has a parameter for each argument."""
     by_name = {name: memory.value(each) for name, each in keywords}
-    local: dict[str, Value] = {"%inside": True}
+    local: dict[str, syntax.Value] = {"%inside": True}
     for i, parameter in enumerate(routine.parameters):
         given = arguments[i] if i < len(arguments) else None
         if given is not None:
@@ -826,27 +802,27 @@ def _locals(
         elif parameter.default is not None:
             local[parameter.name] = memory.value(parameter.default)
         else:
-            local[parameter.name] = Unclear(parameter.name)
+            local[parameter.name] = syntax.Unclear(parameter.name)
     fits = len(arguments) <= len(routine.parameters) and by_name.keys() <= {each.name for each in routine.parameters}
     return local, fits
 
 
-def _labels(routine: Routine) -> frozenset[int]:
+def _labels(routine: syntax.Routine) -> frozenset[int]:
     """Where jumps of a routine lead to."""
-    jumps = (each.to for each in routine.code if isinstance(each, GoTo))
-    branches = (each.otherwise for each in routine.code if isinstance(each, Branch))
+    jumps = (each.to for each in routine.code if isinstance(each, syntax.GoTo))
+    branches = (each.otherwise for each in routine.code if isinstance(each, syntax.Branch))
     return frozenset((*jumps, *branches))
 
 
-def _loops(routine: Routine) -> frozenset[int]:
+def _loops(routine: syntax.Routine) -> frozenset[int]:
     """Branches whose condition keeps a loop going: behind them, the code jumps back to before them."""
-    jumps = [(i, each.to) for i, each in enumerate(routine.code) if isinstance(each, GoTo) and each.to <= i]
-    branches = [(i, each.otherwise) for i, each in enumerate(routine.code) if isinstance(each, Branch)]
+    jumps = [(i, each.to) for i, each in enumerate(routine.code) if isinstance(each, syntax.GoTo) and each.to <= i]
+    branches = [(i, each.otherwise) for i, each in enumerate(routine.code) if isinstance(each, syntax.Branch)]
     return frozenset(at for at, end in branches if any(to <= at < i < end for i, to in jumps))
 
 
 def execute(
-    program: Program,
+    program: syntax.Program,
     robot: Robot | None = None,
     start: Reals | None = None,
     frames: Mapping[str, Reals] | None = None,
@@ -887,7 +863,7 @@ def execute(
     return Machine(program, LANGUAGES[program.language].dialect(program), cell, limits or RunLimits(), keep_on).run()
 
 
-def _not_meant(program: Program, robot: Robot) -> str:
+def _not_meant(program: syntax.Program, robot: Robot) -> str:
     """Why a program is none of an arm's; empty if it is."""
     if not program.slides:
         return not_written(program.language, robot)

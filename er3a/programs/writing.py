@@ -19,39 +19,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import factors_where_defined
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Flags, Reals
-from er3a.programs.instructions import (
-    ArmMotion,
-    Aside,
-    Decision,
-    Disabled,
-    Instruction,
-    JointTarget,
-    Listing,
-    MeantSolution,
-    MovesBeside,
-    NamedFrame,
-    Output,
-    Pause,
-    PoseTarget,
-    Remark,
-    Unknown,
-    arc_length,
-    arc_poses,
-)
-from er3a.programs.program_findings import (
-    ArcsSplit,
-    HalfTurnsSplit,
-    NotTranslated,
-    SpeedsCut,
-    SpeedsEstimated,
-    SplinesAsLines,
-    TargetsLeftOut,
-    ToolNotGiven,
-    ValuesRounded,
-    WriteFinding,
-    WrittenUnsafe,
-    ZonesDropped,
-)
+from er3a.programs import instructions, program_findings
 from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
@@ -60,7 +28,7 @@ MOST_STEPS = 10_000  # on a way that no arm can take
 MOST_AT_ONCE = 2_000  # motions whose joints are solved together
 MOST_ROUNDS = 10  # over them
 
-Frames = tuple[NamedFrame, NamedFrame]
+Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 
 
@@ -74,7 +42,7 @@ class ReadyMotion:
     pose, pose_before, via : (4, 4), m, in its base for its tool; None where unknown
     """
 
-    motion: ArmMotion
+    motion: instructions.ArmMotion
     resolver: Resolver
     number: int
     pose: Reals | None
@@ -97,7 +65,7 @@ class ReadyMotion:
         if self.pose is None or self.pose_before is None:
             return None
         if self.motion.kind == "arc" and self.via is not None:
-            return arc_length(self.pose_before, self.via, self.pose)
+            return instructions.arc_length(self.pose_before, self.via, self.pose)
         return float(np.linalg.norm(self.pose[:3, 3] - self.pose_before[:3, 3]))
 
 
@@ -113,24 +81,24 @@ class Resolver:
     def __init__(self, robot: Robot | None, start: Reals | None):
         self.arm = None if robot is None else robot.without_tool().replace(base=np.eye(4))
         self.start = start
-        self.motions: list[tuple[ArmMotion, Reals | None]] = []  # with the pose before
+        self.motions: list[tuple[instructions.ArmMotion, Reals | None]] = []  # with the pose before
         self.pose: Reals | None = None
         self._solved: list[Reals | None] = []
 
-    def ready(self, motion: ArmMotion) -> ReadyMotion:
+    def ready(self, motion: instructions.ArmMotion) -> ReadyMotion:
         """A motion with its start and end; the arm is at its end then."""
         frames = (motion.tool, motion.base)
         pose_before = self._pose_in(frames)
         number = len(self.motions)
         self.motions.append((motion, pose_before))
         target = motion.target
-        if isinstance(target, PoseTarget):
+        if isinstance(target, instructions.PoseTarget):
             self.pose = target.pose
         else:
-            joints = self.joints_after(number) if isinstance(target, JointTarget) else None
+            joints = self.joints_after(number) if isinstance(target, instructions.JointTarget) else None
             self.pose = None if joints is None else self._forward(joints, frames)
-        via = motion.via.pose if isinstance(motion.via, PoseTarget) else None
-        if isinstance(motion.via, JointTarget):
+        via = motion.via.pose if isinstance(motion.via, instructions.PoseTarget) else None
+        if isinstance(motion.via, instructions.JointTarget):
             via = self._forward(motion.via.joints, frames)
         ready = ReadyMotion(motion, self, number, self.pose, pose_before, via)
         if motion.angle is not None:
@@ -142,7 +110,11 @@ class Resolver:
         if number < 0:
             return self.start
         motion, _ = self.motions[number]
-        given = motion.target.joints if isinstance(motion.target, JointTarget) and motion.angle is None else None
+        given = (
+            motion.target.joints
+            if isinstance(motion.target, instructions.JointTarget) and motion.angle is None
+            else None
+        )
         if given is not None and not np.isnan(given).any():
             return given
         while len(self._solved) <= number:
@@ -150,7 +122,7 @@ class Resolver:
         return self._solved[number]
 
     def solve(
-        self, poses: Reals, frames: Frames, near: Reals | None, branch: MeantSolution | None = None
+        self, poses: Reals, frames: Frames, near: Reals | None, branch: instructions.MeantSolution | None = None
     ) -> list[Reals | None]:
         """Joints (n,) of poses (k, 4, 4) one after another, each nearest to those before and within the limits.
 
@@ -201,14 +173,14 @@ class Resolver:
         if len(found) <= ends[-1] and self._solved[-1] is not None:
             self._solved.append(None)
 
-    def _end(self, motion: ArmMotion, before: Reals | None) -> Reals | None:
+    def _end(self, motion: instructions.ArmMotion, before: Reals | None) -> Reals | None:
         target = motion.target
-        if isinstance(target, JointTarget):
+        if isinstance(target, instructions.JointTarget):
             joints = target.joints
             if not np.isnan(joints).any():
                 return joints
             return None if before is None else np.where(np.isnan(joints), before, joints)
-        if not isinstance(target, PoseTarget) or target.joints is not None:
+        if not isinstance(target, instructions.PoseTarget) or target.joints is not None:
             return getattr(target, "joints", None)
         near = before if target.near is None else target.near
         branch = target.branch if motion.kind == "joint" else None
@@ -219,7 +191,7 @@ class Resolver:
         if not self.motions:
             return None if self.start is None else self._forward(self.start, frames)
         last, _ = self.motions[-1]
-        if isinstance(last.target, JointTarget):
+        if isinstance(last.target, instructions.JointTarget):
             joints = self.joints_after(len(self.motions) - 1)
             return None if joints is None else self._forward(joints, frames)
         old = _frames(last)
@@ -240,7 +212,7 @@ class Resolver:
         return found
 
 
-def _frames(motion: ArmMotion) -> Frames:
+def _frames(motion: instructions.ArmMotion) -> Frames:
     return motion.tool, motion.base
 
 
@@ -248,14 +220,14 @@ def _same(a: Frames, b: Frames) -> bool:
     return all(one.name == other.name and one.pose is other.pose for one, other in zip(a, b))
 
 
-def _is_followed(motion: ArmMotion) -> bool:
+def _is_followed(motion: instructions.ArmMotion) -> bool:
     """Whether the joints at a motion's end come from following its way."""
     target = motion.target
-    given = isinstance(target, PoseTarget) and target.joints is None and target.near is None
+    given = isinstance(target, instructions.PoseTarget) and target.joints is None and target.near is None
     return given and motion.kind != "joint" and motion.angle is None
 
 
-def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals) -> Flags:
+def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Reals) -> Flags:
     """Which of joint vectors (k, n) in rad are meant: (k,).
 
     The wrist centre's sides are compared with those in the arm's zero pose; what has no side there, or has no such
@@ -275,7 +247,7 @@ def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals) -> Flags:
     return met
 
 
-def _chain(found: Solutions, reference: Reals, arm: Robot, branch: MeantSolution | None) -> list[Reals]:
+def _chain(found: Solutions, reference: Reals, arm: Robot, branch: instructions.MeantSolution | None) -> list[Reals]:
     """The solution of each pose that is nearest to the one before, up to the first pose that has none."""
     chain: list[Reals] = []
     rows = np.where((found.solved & found.within_limits)[..., None], found.q, np.inf)
@@ -291,15 +263,15 @@ def _chain(found: Solutions, reference: Reals, arm: Robot, branch: MeantSolution
     return chain
 
 
-def with_default_frames(instruction: Instruction, robot: Robot | None) -> Instruction:
+def with_default_frames(instruction: instructions.Instruction, robot: Robot | None) -> instructions.Instruction:
     """A motion whose tool or base is not given at all, with the robot's own tool and base."""
-    if not isinstance(instruction, ArmMotion) or robot is None:
+    if not isinstance(instruction, instructions.ArmMotion) or robot is None:
         return instruction
     tool, base = instruction.tool, instruction.base
     if not tool.name and tool.pose is None:
-        tool = NamedFrame("", robot.tool)
+        tool = instructions.NamedFrame("", robot.tool)
     if not base.name and base.pose is None:
-        base = NamedFrame("", np.eye(4))
+        base = instructions.NamedFrame("", np.eye(4))
     return replace(instruction, tool=tool, base=base)
 
 
@@ -312,17 +284,17 @@ def _changed(pose: Reals, old: Frames, new: Frames) -> Reals | None:
     return found
 
 
-def _between(motion: ArmMotion, start: Reals) -> Reals:
+def _between(motion: instructions.ArmMotion, start: Reals) -> Reals:
     """Poses (k, 4, 4) on the way and at its end, near enough to each other that the arm's branch is the same."""
-    assert isinstance(motion.target, PoseTarget)
+    assert isinstance(motion.target, instructions.PoseTarget)
     end = motion.target.pose
     turn = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
     way = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
     count = int(min(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1), MOST_STEPS)) + 1
     shares = np.arange(1, count + 1) / count
     poses = None
-    if motion.kind == "arc" and isinstance(motion.via, PoseTarget):
-        poses = arc_poses(start, motion.via.pose, end, shares)
+    if motion.kind == "arc" and isinstance(motion.via, instructions.PoseTarget):
+        poses = instructions.arc_poses(start, motion.via.pose, end, shares)
     if poses is None:
         poses = np.tile(np.eye(4), (count, 1, 1))
         poses[:, :3, 3] = start[:3, 3] + shares[:, None] * (end[:3, 3] - start[:3, 3])
@@ -363,7 +335,7 @@ class WrittenProgram(ByValue):
 
     name: str
     files: Mapping[str, str]
-    findings: tuple[WriteFinding, ...]
+    findings: tuple[program_findings.WriteFinding, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -381,36 +353,43 @@ class WriteOptions(ByValue):
     robot: Robot | None = None
     start: Reals | None = None
     arc_deviation: float = ARC_DEVIATION
-    notes: tuple[WriteFinding, ...] = ()
+    notes: tuple[program_findings.WriteFinding, ...] = ()
     head: tuple[str, ...] = ()
 
 
 class Writer(ABC):
-    """Writes a sequence, instruction by instruction.
+    """Writes a sequence, instruction by instruction: as most languages do, each says what differs.
 
     Attributes
     ----------
     languages : names of those whose own text (signals, conditions, calls) it writes as it stands
+    remark, ends : what a comment begins with, and what ends a line of this language
+    loop : the lines around what is done for ever
+    wait : for a time in s, for the operator, for a condition
     """
 
     languages: tuple[str, ...] = ()
     longest_name = 24
+    indent = remark = ends = ""
+    loop = ("", "")
+    wait = ("{}", "", "{}")
 
-    def __init__(self, listing: Listing, options: WriteOptions):
+    def __init__(self, listing: instructions.Listing, options: WriteOptions):
         self.listing, self.options, self.robot = listing, options, options.robot
         self.resolver = Resolver(options.robot, options.start)
         self.name = program_name(listing.name, self.longest_name)
         self.count: Counter[str] = Counter()
         self.tools: list[str] = []
         self.lines: list[str] = []
+        self.settings: dict[str, str] = {}
         self.said: list[str] = []
         self.load: MassBody | str | None = None
         self.own = listing.language in self.languages
 
     def write(self) -> WrittenProgram:
         """The files."""
-        instructions = [with_default_frames(each, self.robot) for each in self.listing.instructions]
-        ready = [self.resolver.ready(each) if isinstance(each, ArmMotion) else each for each in instructions]
+        framed = [with_default_frames(each, self.robot) for each in self.listing.instructions]
+        ready = [self.resolver.ready(each) if isinstance(each, instructions.ArmMotion) else each for each in framed]
         for i, instruction in enumerate(ready):
             if i == self.listing.repeats_from:
                 self.begin_loop()
@@ -432,35 +411,52 @@ class Writer(ABC):
         """A motion."""
 
     @abstractmethod
-    def begin_loop(self) -> None:
-        """What follows is done for ever."""
-
-    @abstractmethod
-    def end_loop(self) -> None:
-        """The end of what is done for ever."""
-
-    @abstractmethod
-    def comment(self, text: str) -> None:
-        """A comment of one line."""
-
-    @abstractmethod
-    def pause(self, pause: Pause) -> None:
-        """A wait for a time, for the operator, or for a condition in this language."""
-
-    @abstractmethod
-    def output(self, output: Output) -> None:
+    def output(self, output: instructions.Output) -> None:
         """A signal in this language."""
 
-    @abstractmethod
+    def line(self, text: str) -> None:
+        """A line of the program."""
+        self.lines.append(self.indent + text)
+
+    def set_once(self, key: str, line: str) -> None:
+        """A line that sets something, unless it is set so already."""
+        if self.settings.get(key) != line:
+            self.settings[key] = line
+            self.line(line)
+
+    def begin_loop(self) -> None:
+        """What follows is done for ever; what was set before does not count within."""
+        self.line(self.loop[0])
+        self.settings.clear()
+
+    def end_loop(self) -> None:
+        """The end of what is done for ever."""
+        self.line(self.loop[1])
+
+    def comment(self, text: str) -> None:
+        """A comment of one line."""
+        self.line(f"{self.remark} {ascii_text(text)}")
+
+    def pause(self, pause: instructions.Pause) -> None:
+        """A wait for a time, for the operator, or for a condition in this language."""
+        seconds, operator, condition = self.wait
+        if pause.seconds is not None:
+            self.line(seconds.format(short(pause.seconds)))
+        elif pause.condition is not None:
+            self.verbatim(condition.format(pause.condition))
+        else:
+            self.line(operator)
+
     def verbatim(self, text: str) -> None:
         """Text of this language."""
+        self.line(text + self.ends)
 
     def set_load(self, load: MassBody | None) -> None:
         """What hangs on the flange from here; None for what is not known. A language without a word for it names it."""
         if load is not None:
             self.name_tool(f"a load of {load.mass:g} kg")
 
-    def left_out(self, motion: ArmMotion) -> None:
+    def left_out(self, motion: instructions.ArmMotion) -> None:
         """A motion whose target can't be written."""
         self.count["left out"] += 1
         text = getattr(motion.target, "text", "") or "a target that needs the arm's table"
@@ -471,7 +467,7 @@ class Writer(ABC):
         if name not in self.tools:
             self.tools.append(name)
 
-    def _add(self, instruction: Instruction | ReadyMotion) -> None:
+    def _add(self, instruction: instructions.Instruction | ReadyMotion) -> None:
         match instruction:
             case ReadyMotion(motion=motion):
                 if motion.load != self.load:
@@ -481,23 +477,23 @@ class Writer(ABC):
                     else:
                         self.set_load(motion.load)
                 self.motion(instruction)
-            case Remark(text=text):
+            case instructions.Remark(text=text):
                 self._remark(text)
-            case Disabled(text=text):
+            case instructions.Disabled(text=text):
                 self.comment(f"disabled: {text}")
-            case Aside(text=text) | Unknown(text=text) | MovesBeside(text=text):
+            case instructions.Aside(text=text) | instructions.Unknown(text=text) | instructions.MovesBeside(text=text):
                 self._foreign(text, self.own)
-            case Pause(condition=condition):
+            case instructions.Pause(condition=condition):
                 if condition is None or self.own:
                     self.pause(instruction)
                 else:
                     self._foreign(f"wait for {condition}", False)
-            case Output():
+            case instructions.Output():
                 if self.own:
                     self.output(instruction)
                 else:
                     self._foreign(f"{instruction.name} = {instruction.value}", False)
-            case Decision():
+            case instructions.Decision():
                 pass
 
     def _remark(self, text: str) -> None:
@@ -514,50 +510,50 @@ class Writer(ABC):
             self.count["foreign"] += 1
             self.comment(f"not translated: {' '.join(text.split())}")
 
-    def _findings(self) -> tuple[WriteFinding, ...]:
+    def _findings(self) -> tuple[program_findings.WriteFinding, ...]:
         count = self.count
-        found: list[WriteFinding] = []
+        found: list[program_findings.WriteFinding] = []
         if count["arcs"]:
-            found.append(ArcsSplit(count["arcs"], count["chords"], self.options.arc_deviation))
+            found.append(program_findings.ArcsSplit(count["arcs"], count["chords"], self.options.arc_deviation))
         found += [make(count[key]) for key, make in COUNTED.items() if count[key]]
-        return (*found, *map(ToolNotGiven, self.tools))
+        return (*found, *map(program_findings.ToolNotGiven, self.tools))
 
 
 COUNTED = {
-    "zones": ZonesDropped,
-    "splines": SplinesAsLines,
-    "estimated": SpeedsEstimated,
-    "cut": SpeedsCut,
-    "left out": TargetsLeftOut,
-    "rounded": ValuesRounded,
-    "foreign": NotTranslated,
+    "zones": program_findings.ZonesDropped,
+    "splines": program_findings.SplinesAsLines,
+    "estimated": program_findings.SpeedsEstimated,
+    "cut": program_findings.SpeedsCut,
+    "left out": program_findings.TargetsLeftOut,
+    "rounded": program_findings.ValuesRounded,
+    "foreign": program_findings.NotTranslated,
 }
 
 
-def head_line(finding: WriteFinding) -> str:
+def head_line(finding: program_findings.WriteFinding) -> str:
     """A finding as a line of a file's head; these files are read by controllers, so it is plain ASCII."""
     match finding:
-        case ArcsSplit(arcs=arcs, lines=lines, deviation_m=deviation):
+        case program_findings.ArcsSplit(arcs=arcs, lines=lines, deviation_m=deviation):
             return f"{arcs} arc(s) as {lines} lines that stay within {deviation * 1000:g} mm"
-        case ZonesDropped(zones=count):
+        case program_findings.ZonesDropped(zones=count):
             return f"{count} zone(s) without equal in this language: the arm stops there"
-        case SplinesAsLines(points=count):
+        case program_findings.SplinesAsLines(points=count):
             return f"{count} point(s) of splines as straight lines"
-        case SpeedsEstimated(motions=count):
+        case program_findings.SpeedsEstimated(motions=count):
             return f"{count} duration(s) as speeds: the controller's ramps decide the time"
-        case SpeedsCut(motions=count):
+        case program_findings.SpeedsCut(motions=count):
             return f"{count} speed(s) above the joints' greatest, which was taken"
-        case HalfTurnsSplit(lines=count):
+        case program_findings.HalfTurnsSplit(lines=count):
             return f"{count} line(s) that turn the tool by 180 deg in two halves, to fix the sense"
-        case TargetsLeftOut(motions=count):
+        case program_findings.TargetsLeftOut(motions=count):
             return f"{count} motion(s) left out: their targets are not known"
-        case ToolNotGiven(name=name):
+        case program_findings.ToolNotGiven(name=name):
             return f"set this tool or base on the controller: {ascii_text(name)}"
-        case ValuesRounded(values=count):
+        case program_findings.ValuesRounded(values=count):
             return f"{count} speed(s) or zone(s) rounded down to the next that has a name"
-        case WrittenUnsafe(path=path, verdict=verdict):
+        case program_findings.WrittenUnsafe(path=path, verdict=verdict):
             return f"NOT SAFE: the path {ascii_text(path)} {ascii_text(verdict)}; written because it was asked for"
-        case NotTranslated(instructions=count):
+        case program_findings.NotTranslated(instructions=count):
             return f"{count} instruction(s) of the other language as comments"
 
 
@@ -638,21 +634,20 @@ def leading_joint_speed(ready: ReadyMotion, robot: Robot | None) -> float | None
 
 def tool_speed(ready: ReadyMotion) -> float | None:
     """The speed of a line or arc, m/s; None if the program's is not known."""
-    speed = ready.motion.speed
-    if speed is None or speed.unit not in ("m/s", "s"):
-        return None
-    if speed.unit == "m/s":
-        return speed.value
-    length = ready.length
-    return length / speed.value if length and speed.value > 0 else None
+    return _by_length(ready, "m/s")
 
 
 def duration(ready: ReadyMotion) -> float | None:
     """How long a motion takes, s, where the program gives that, or the speed of its tool."""
+    return _by_length(ready, "s")
+
+
+def _by_length(ready: ReadyMotion, unit: str) -> float | None:
+    """A program's speed (m/s) or time (s) in one of both units, the other one by the length of the way."""
     speed = ready.motion.speed
     if speed is None or speed.unit not in ("m/s", "s"):
         return None
-    if speed.unit == "s":
+    if speed.unit == unit:
         return speed.value
     length = ready.length
     return length / speed.value if length and speed.value > 0 else None

@@ -11,49 +11,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from er3a.references.quantities import (
-    COORDINATES,
-    ZERO_POSE,
-    AxisAngle,
-    AxisCoordinate,
-    AxisDistance,
-    Extremity,
-    FlangeTurn,
-    Limit,
-    Point,
-    PointCoordinate,
-    Pose,
-    PoseOutside,
-    Rotation3,
-    SectionAxis,
-    SectionCoordinate,
-    SectionExtent,
-    Segment,
-    SegmentAngle,
-    Side,
-    SlideLimit,
-    SlideSpeed,
-    Speed,
-    Vector,
-)
+from er3a.references import quantities, subjects
 from er3a.references.reference import Documents, Reference, ReferenceSet, Row, Scalar
 from er3a.references.seen import Seen, SeenMotion, TableEntry
-from er3a.references.subjects import (
-    AxisDirection,
-    AxisPosition,
-    CornerLabel,
-    DrawingCorner,
-    DrawingExtent,
-    EntryOfTable,
-    JointLimit,
-    JointSpeed,
-    MotionOfJoint,
-    OrientationAtPose,
-    PointAtPose,
-    PoseExcess,
-    Reach,
-    SegmentInclination,
-)
 
 ALONG = 0.9999
 POSE_SLACK_DEG = 1e-3
@@ -95,19 +55,19 @@ class AxisRow(Row):
     kind: ClassVar[str] = "axes"
     groups: ClassVar[tuple[str, ...]] = ("axes",)
     joint: int
-    direction: Vector
-    point_mm: Vector | None
+    direction: quantities.Vector
+    point_mm: quantities.Vector | None
     signed: bool
     uncertainty_mm: float
     uncertainty_deg: float
 
     def scalars(self) -> Iterator[Scalar]:
-        angle = AxisAngle(self.joint, self.direction, self.signed)
-        yield AxisDirection(self.joint, self.signed), "axes", angle, 0.0, self.uncertainty_deg
-        for coordinate, along, expected in zip(COORDINATES, self.direction, self.point_mm or ()):
+        angle = quantities.AxisAngle(self.joint, self.direction, self.signed)
+        yield subjects.AxisDirection(self.joint, self.signed), "axes", angle, 0.0, self.uncertainty_deg
+        for coordinate, along, expected in zip(quantities.COORDINATES, self.direction, self.point_mm or ()):
             if self.point_mm and abs(along) < ALONG:
-                quantity = AxisCoordinate(self.joint, coordinate, self.point_mm)
-                yield AxisPosition(self.joint, coordinate), "axes", quantity, expected, self.uncertainty_mm
+                quantity = quantities.AxisCoordinate(self.joint, coordinate, self.point_mm)
+                yield subjects.AxisPosition(self.joint, coordinate), "axes", quantity, expected, self.uncertainty_mm
 
 
 @dataclass(frozen=True)
@@ -118,34 +78,34 @@ class PositionRow(Row):
     kind: ClassVar[str] = "positions"
     groups: ClassVar[tuple[str, ...]] = ("zero_pose", "key_poses")
     name: str
-    point: Point
-    pose: Pose
+    point: quantities.Point
+    pose: quantities.Pose
     xyz_mm: tuple[float | None, float | None, float | None]
     uncertainty_mm: float
-    orientation: Rotation3 | None = None
+    orientation: quantities.Rotation3 | None = None
     uncertainty_deg: float = 0.0
 
     @property
     def group(self) -> str:
         """zero_pose or key_poses."""
-        return "zero_pose" if self.pose == ZERO_POSE else "key_poses"
+        return "zero_pose" if self.pose == quantities.ZERO_POSE else "key_poses"
 
     def scalars(self) -> Iterator[Scalar]:
-        for coordinate, expected in zip(COORDINATES, self.xyz_mm):
+        for coordinate, expected in zip(quantities.COORDINATES, self.xyz_mm):
             if expected is not None:
-                subject = PointAtPose(self.name, self.point, coordinate)
-                quantity = PointCoordinate(self.pose, self.point, coordinate)
+                subject = subjects.PointAtPose(self.name, self.point, coordinate)
+                quantity = quantities.PointCoordinate(self.pose, self.point, coordinate)
                 yield subject, self.group, quantity, expected, self.uncertainty_mm
         if self.orientation is not None:
-            for coordinate in COORDINATES:
-                turn = FlangeTurn(self.pose, self.orientation, coordinate)
-                yield OrientationAtPose(self.name, coordinate), self.group, turn, 0.0, self.uncertainty_deg
+            for coordinate in quantities.COORDINATES:
+                turn = quantities.FlangeTurn(self.pose, self.orientation, coordinate)
+                yield subjects.OrientationAtPose(self.name, coordinate), self.group, turn, 0.0, self.uncertainty_deg
         if self.xyz_mm == (None, None, None) and self.orientation is None:
             yield self.within_limits()
 
     def within_limits(self) -> Scalar:
         """That the pose lies within the joint limits."""
-        return PoseExcess(self.name), self.group, PoseOutside(self.pose), 0.0, POSE_SLACK_DEG
+        return subjects.PoseExcess(self.name), self.group, quantities.PoseOutside(self.pose), 0.0, POSE_SLACK_DEG
 
 
 @dataclass(frozen=True)
@@ -154,18 +114,18 @@ class DirectionRow(Row):
 
     kind: ClassVar[str] = "directions"
     groups: ClassVar[tuple[str, ...]] = ("zero_pose",)
-    segment: Segment
+    segment: quantities.Segment
     angle_from_vertical_deg: float
     uncertainty_deg: float
 
     def scalars(self) -> Iterator[Scalar]:
-        quantity = SegmentAngle(self.segment)
-        subject = SegmentInclination(self.segment)
+        quantity = quantities.SegmentAngle(self.segment)
+        subject = subjects.SegmentInclination(self.segment)
         yield subject, "zero_pose", quantity, self.angle_from_vertical_deg, self.uncertainty_deg
 
 
-ENVELOPE_CORNERS: Mapping[str, CornerLabel] = {"x": "x", "abs_x": "abs_x", "z": "z"}
-ENVELOPE_EXTENTS: Mapping[str, tuple[Extremity, SectionAxis]] = {
+ENVELOPE_CORNERS: Mapping[str, subjects.CornerLabel] = {"x": "x", "abs_x": "abs_x", "z": "z"}
+ENVELOPE_EXTENTS: Mapping[str, tuple[quantities.Extremity, quantities.SectionAxis]] = {
     "greatest_x": ("greatest", "x"),
     "least_x": ("least", "x"),
     "greatest_z": ("greatest", "z"),
@@ -190,13 +150,15 @@ class EnvelopeRow(Row):
     def scalars(self) -> Iterator[Scalar]:
         if self.corner_deg is None:
             extreme, axis = ENVELOPE_EXTENTS[self.quantity]
-            extent = SectionExtent("wrist_centre", extreme, axis)
-            yield DrawingExtent(extreme, axis), "envelope", extent, self.value_mm, self.uncertainty_mm
+            extent = quantities.SectionExtent("wrist_centre", extreme, axis)
+            yield subjects.DrawingExtent(extreme, axis), "envelope", extent, self.value_mm, self.uncertainty_mm
             return
         q2, q3 = self.corner_deg
         label = ENVELOPE_CORNERS[self.quantity]
-        corner = SectionCoordinate((0.0, q2, q3, 0.0, 0.0, 0.0), "z" if label == "z" else "x", label == "abs_x")
-        yield DrawingCorner(q2, q3, label), "envelope", corner, self.value_mm, self.uncertainty_mm
+        corner = quantities.SectionCoordinate(
+            (0.0, q2, q3, 0.0, 0.0, 0.0), "z" if label == "z" else "x", label == "abs_x"
+        )
+        yield subjects.DrawingCorner(q2, q3, label), "envelope", corner, self.value_mm, self.uncertainty_mm
 
 
 @dataclass(frozen=True)
@@ -205,15 +167,15 @@ class ReachRow(Row):
 
     kind: ClassVar[str] = "reach"
     groups: ClassVar[tuple[str, ...]] = ("reach",)
-    point: Point
+    point: quantities.Point
     from_axis: int
-    extreme: Extremity
+    extreme: quantities.Extremity
     value_mm: float
     uncertainty_mm: float
 
     def scalars(self) -> Iterator[Scalar]:
-        subject = Reach(self.extreme, self.point, self.from_axis)
-        quantity = AxisDistance(self.point, self.extreme, self.from_axis)
+        subject = subjects.Reach(self.extreme, self.point, self.from_axis)
+        quantity = quantities.AxisDistance(self.point, self.extreme, self.from_axis)
         yield subject, "reach", quantity, self.value_mm, self.uncertainty_mm
 
 
@@ -230,10 +192,10 @@ class LimitRow(Row):
     slides: bool = False
 
     def scalars(self) -> Iterator[Scalar]:
-        sides: tuple[tuple[Side, float | None], ...] = (("lower", self.lower), ("upper", self.upper))
+        sides: tuple[tuple[quantities.Side, float | None], ...] = (("lower", self.lower), ("upper", self.upper))
         for side, expected in sides:
-            quantity = (SlideLimit if self.slides else Limit)(self.joint, side)
-            yield JointLimit(self.joint, side), "limits", quantity, expected, self.uncertainty
+            quantity = (quantities.SlideLimit if self.slides else quantities.Limit)(self.joint, side)
+            yield subjects.JointLimit(self.joint, side), "limits", quantity, expected, self.uncertainty
 
 
 @dataclass(frozen=True)
@@ -248,8 +210,8 @@ class SpeedRow(Row):
     slides: bool = False
 
     def scalars(self) -> Iterator[Scalar]:
-        quantity = (SlideSpeed if self.slides else Speed)(self.joint)
-        yield JointSpeed(self.joint), "speeds", quantity, self.speed, self.uncertainty
+        quantity = (quantities.SlideSpeed if self.slides else quantities.Speed)(self.joint)
+        yield subjects.JointSpeed(self.joint), "speeds", quantity, self.speed, self.uncertainty
 
 
 @dataclass(frozen=True)
@@ -258,15 +220,21 @@ class ObservationRow(Row):
 
     kind: ClassVar[str] = "observations"
     groups: ClassVar[tuple[str, ...]] = ("key_poses",)
-    pose: Pose
+    pose: quantities.Pose
     joint: int
-    point: Point
+    point: quantities.Point
     seen: Seen
     uncertainty_deg: float
 
     def scalars(self) -> Iterator[Scalar]:
         quantity = SeenMotion(self.pose, self.joint, self.point, self.seen)
-        yield MotionOfJoint(self.joint, self.point, self.seen), "key_poses", quantity, 0.0, self.uncertainty_deg
+        yield (
+            subjects.MotionOfJoint(self.joint, self.point, self.seen),
+            "key_poses",
+            quantity,
+            0.0,
+            self.uncertainty_deg,
+        )
 
 
 @dataclass(frozen=True)
@@ -282,7 +250,7 @@ class LengthRow(Row):
 
     def scalars(self) -> Iterator[Scalar]:
         quantity = TableEntry(self.length, self.joint)
-        yield EntryOfTable(self.length, self.joint), "axes", quantity, self.value_mm, self.uncertainty_mm
+        yield subjects.EntryOfTable(self.length, self.joint), "axes", quantity, self.value_mm, self.uncertainty_mm
 
 
 @dataclass(frozen=True)
@@ -298,7 +266,7 @@ class AngleRow(Row):
 
     def scalars(self) -> Iterator[Scalar]:
         quantity = TableEntry(self.angle, self.joint)
-        yield EntryOfTable(self.angle, self.joint), "axes", quantity, self.value_deg, self.uncertainty_deg
+        yield subjects.EntryOfTable(self.angle, self.joint), "axes", quantity, self.value_deg, self.uncertainty_deg
 
 
 KINDS: dict[str, type[Row]] = {
@@ -331,8 +299,8 @@ def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]], documents: Doc
     said = {(reference.source, reference.quantity) for reference in stated}
     reached: dict[object, Reference] = {}
     for row in rows.get(PositionRow.kind, ()):
-        if isinstance(row, PositionRow) and row.pose != ZERO_POSE:
-            key = (row.source, PoseOutside(row.pose))
+        if isinstance(row, PositionRow) and row.pose != quantities.ZERO_POSE:
+            key = (row.source, quantities.PoseOutside(row.pose))
             if key not in said:
                 reached.setdefault(key, row.reference(row.within_limits()))
     return ReferenceSet(name, (*stated, *reached.values()), rows, documents or Documents())

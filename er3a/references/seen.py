@@ -14,18 +14,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.references.quantities import (
-    FRAME_OF_POINT,
-    MM,
-    ModelState,
-    Point,
-    Quantity,
-    QuantityAtPose,
-    Unit,
-    Vector,
-    angle_between,
-    turned_apart,
-)
+from er3a.references import quantities
 
 Seen = Literal[
     "up", "down", "left", "right", "forward", "back",
@@ -34,7 +23,7 @@ Seen = Literal[
     "clockwise_looking_forward", "clockwise_looking_back",
 ]  # fmt: skip
 SEEN: tuple[Seen, ...] = get_args(Seen)
-TOWARD: dict[str, Vector] = {
+TOWARD: dict[str, quantities.Vector] = {
     "up": (0.0, 0.0, 1.0),
     "down": (0.0, 0.0, -1.0),
     "left": (0.0, 1.0, 0.0),
@@ -51,20 +40,20 @@ PARALLEL = np.sin(np.radians(1.0))
 
 
 @dataclass(frozen=True)
-class SeenMotion(QuantityAtPose):
+class SeenMotion(quantities.QuantityAtPose):
     """Angle between a motion while one joint is jogged in + and the direction in which it was seen; 90 if nothing
     moves."""
 
     joint: int
-    point: Point
+    point: quantities.Point
     seen: Seen = field(compare=False)
-    unit: ClassVar[Unit] = "deg"
+    unit: ClassVar[quantities.Unit] = "deg"
 
-    def value(self, state: ModelState) -> Reals:
-        return angle_between(*self._directions(state), True)
+    def value(self, state: quantities.ModelState) -> Reals:
+        return quantities.angle_between(*self._directions(state), True)
 
-    def off(self, state: ModelState, expected: float) -> Reals:
-        return turned_apart(*self._directions(state)) if expected == 0 else super().off(state, expected)
+    def off(self, state: quantities.ModelState, expected: float) -> Reals:
+        return quantities.turned_apart(*self._directions(state)) if expected == 0 else super().off(state, expected)
 
     @property
     def vector(self) -> Hashable:
@@ -75,22 +64,22 @@ class SeenMotion(QuantityAtPose):
         """Whether a point moves, or the tool tilts or turns."""
         return MANNERS.get(self.seen.partition("_")[0], "moves") if "_" in self.seen else "moves"
 
-    def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+    def apart(self, expected: float, other: quantities.Quantity, other_expected: float) -> float:
         if not isinstance(other, SeenMotion) or other.manner != self.manner:
             return 0.0
-        return float(angle_between(self._seen_toward(), other._seen_toward(), True))
+        return float(quantities.angle_between(self._seen_toward(), other._seen_toward(), True))
 
     def _seen_toward(self) -> Reals:
         return np.array(TOWARD[self.seen.rpartition("_")[2]])
 
-    def _directions(self, state: ModelState) -> tuple[Reals, Reals]:
+    def _directions(self, state: quantities.ModelState) -> tuple[Reals, Reals]:
         """The motion's direction and the one that was seen, (..., 3) each."""
         T = state.at(self.pose)
         moves = {self.joint - 1: 1.0} if state.coupling is None else dict(enumerate(state.coupling[:, self.joint - 1]))
         motion = np.zeros_like(T[..., 0, :3, 2])
         for row, factor in moves.items():
             axis = factor * T[..., row, :3, 2] * state.direction[..., row, None]
-            arm = T[..., FRAME_OF_POINT[self.point], :3, 3] - T[..., row, :3, 3]
+            arm = T[..., quantities.FRAME_OF_POINT[self.point], :3, 3] - T[..., row, :3, 3]
             if state.sliding is not None and state.sliding[row]:
                 motion = motion + (axis if self.manner == "moves" else 0.0)
             elif self.manner == "turns":
@@ -104,7 +93,7 @@ class SeenMotion(QuantityAtPose):
 
 
 @dataclass(frozen=True)
-class TableEntry(Quantity):
+class TableEntry(quantities.Quantity):
     """An entry of the table itself, measured by itself: a length (a, d) in mm, or an angle (alpha, offset) in deg.
 
     A length d is the way along an axis between the common normals with the axes before and after it that are not
@@ -115,16 +104,16 @@ class TableEntry(Quantity):
     joint: int
 
     @property
-    def unit(self) -> Unit:  # type: ignore[override]
+    def unit(self) -> quantities.Unit:  # type: ignore[override]
         """mm or deg."""
         return "mm" if self.column in ("a", "d") else "deg"
 
-    def value(self, state: ModelState) -> Reals:
+    def value(self, state: quantities.ModelState) -> Reals:
         column = state.columns[self.column]
         if self.column == "d":
-            return self._along_parallel(column, state.columns["twist"]) * MM
+            return self._along_parallel(column, state.columns["twist"]) * quantities.MM
         entry = column[..., self.joint - 1]
-        return entry * MM if self.unit == "mm" else np.degrees(entry)
+        return entry * quantities.MM if self.unit == "mm" else np.degrees(entry)
 
     def _along_parallel(self, d: Reals, twist: Reals) -> Reals:
         """Sum (...,) of d over the axes that are parallel to the joint's, each counted along it."""
@@ -138,10 +127,10 @@ class TableEntry(Quantity):
                 total = total + factor * d[..., k + 1 if k >= at else k]
         return total
 
-    def off(self, state: ModelState, expected: float) -> Reals:
+    def off(self, state: quantities.ModelState, expected: float) -> Reals:
         off = self.value(state) - expected
         return (off if self.unit == "mm" else off - 360.0 * np.round(off / 360.0))[..., None]
 
-    def apart(self, expected: float, other: Quantity, other_expected: float) -> float:
+    def apart(self, expected: float, other: quantities.Quantity, other_expected: float) -> float:
         off = expected - other_expected
         return abs(off) if self.unit == "mm" else abs(off - 360.0 * round(off / 360.0))

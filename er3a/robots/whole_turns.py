@@ -283,7 +283,7 @@ def _nearest(Q: Reals, refs: Reals, lattice: Lattice, limits: Limits, out: tuple
     value, at = np.empty((rows + 1, m)), np.zeros(rows, np.int64)
     for pose in range(Q.shape[0]):
         q, ref, lower, upper = Q[pose], refs[pose], lowers[pose], uppers[pose]
-        left[pose], farthest, total = np.inf, np.inf, np.inf
+        left[pose], max_move, total = np.inf, np.inf, np.inf
         least, most, low, high = _room(q, lattice, (lower, upper, away))
         if (least > most).any():
             continue
@@ -318,11 +318,11 @@ def _nearest(Q: Reals, refs: Reals, lattice: Lattice, limits: Limits, out: tuple
             else:
                 alike = True
             if fits and alike:
-                fits = move < farthest - LIMIT_TOLERANCE or (move <= farthest + LIMIT_TOLERANCE and moves < total)
+                fits = move < max_move - LIMIT_TOLERANCE or (move <= max_move + LIMIT_TOLERANCE and moves < total)
             if fits and i < rows:
                 at[i] = -1
                 continue
             if fits:
-                left[pose], farthest, total = beyond, move, moves
+                left[pose], max_move, total = beyond, move, moves
                 found[pose] = value[rows, :n]
             i -= 1

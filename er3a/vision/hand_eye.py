@@ -30,51 +30,9 @@ import scipy
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.geometry.transforms import rotation_angle, rpy_of
 from er3a.numerics.arrays import Flags, Reals
-from er3a.vision.calibration_set import (
-    CalibrationSet,
-    inverted,
-    log_rotation,
-    moved,
-    posed,
-    quaternion_of,
-    skew,
-    step_between,
-    transposed,
-)
+from er3a.vision import calibration_set, vision_findings
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
 from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, refine, residuals, whitening
-from er3a.vision.vision_findings import (
-    READINGS,
-    AllSamplesEqual,
-    AngleOrder,
-    BoardScale,
-    CalibrationWarning,
-    DirectionStatus,
-    DirectionTried,
-    FarFromFit,
-    FewSamples,
-    HandEyeError,
-    LittleMotion,
-    MoreScatter,
-    NoMajority,
-    NoRotation,
-    NothingFits,
-    OtherDirection,
-    OtherReading,
-    ParallelTurns,
-    PositionAxes,
-    QuaternionOrder,
-    RepeatedPose,
-    RotationMismatch,
-    RotationReading,
-    Streams,
-    Suspect,
-    SuspectKind,
-    TooFewSamples,
-    TransposedRotations,
-    UnexplainedResiduals,
-    grave_warnings,
-)
 
 DEVIATIONS = 6.0  # of the angle between two samples; beyond, a pair is in conflict
 MOST_DEVIATION = np.radians(2.0)  # of a camera that is of any use
@@ -82,13 +40,13 @@ ROUNDING = 1e-6  # rad
 SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
 COPY_DECIMALS = 9  # of m and of rotation matrices
 FALSE_ALARMS = 0.01  # of sound sets in which a sample is called far from the fit
-BOARD_TURNS: dict[SuspectKind, tuple[str, tuple[float, ...]]] = {  # axis of the board, and deg
+BOARD_TURNS: dict[vision_findings.SuspectKind, tuple[str, tuple[float, ...]]] = {  # axis of the board, and deg
     "half_turn_x": ("x", (180.0,)),
     "half_turn_y": ("y", (180.0,)),
     "half_turn_z": ("z", (180.0,)),
     "quarter_turn_z": ("z", (90.0, -90.0)),
 }
-MEND_KINDS: tuple[SuspectKind, ...] = (*BOARD_TURNS, "mirrored_tilt")
+MEND_KINDS: tuple[vision_findings.SuspectKind, ...] = (*BOARD_TURNS, "mirrored_tilt")
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +63,8 @@ class AngleCheck(ByValue):
     mismatch: Reals
     tolerance: float
     used: Flags
-    found: tuple[RotationMismatch, ...]
-    warning: NoMajority | None
+    found: tuple[vision_findings.RotationMismatch, ...]
+    warning: vision_findings.NoMajority | None
 
 
 def angles_between(R: Reals) -> Reals:
@@ -114,20 +72,22 @@ def angles_between(R: Reals) -> Reals:
     return rotation_angle(R[:, None], R[None])
 
 
-def check_angles(samples: CalibrationSet) -> AngleCheck:
+def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
     """Find samples whose turning angles contradict the others'."""
     hand, eye = samples.flange[:, :3, :3], samples.target[:, :3, :3]
     turned = angles_between(hand)
-    mismatch = np.abs(turned - angles_between(transposed(eye)))
+    mismatch = np.abs(turned - angles_between(calibration_set.transposed(eye)))
     upper = np.triu_indices(len(samples), 1)
     tolerance = _tolerance(samples, mismatch[upper])
     used = _agreeing(mismatch > tolerance)
     if used.sum() <= len(samples) / 2:
         conflict = mismatch[upper] > tolerance
-        warning = NoMajority(int(conflict.sum()), len(conflict), float(np.degrees(np.median(mismatch[upper]))))
+        warning = vision_findings.NoMajority(
+            int(conflict.sum()), len(conflict), float(np.degrees(np.median(mismatch[upper])))
+        )
         return AngleCheck(mismatch, tolerance, np.ones(len(samples), bool), (), warning)
     found = tuple(
-        RotationMismatch(
+        vision_findings.RotationMismatch(
             samples.names[i],
             _mending_turn(samples.target, turned, int(i), used, tolerance),
             float(np.degrees(np.median(mismatch[i, used]))),
@@ -137,7 +97,7 @@ def check_angles(samples: CalibrationSet) -> AngleCheck:
     return AngleCheck(mismatch, tolerance, used, found, None)
 
 
-def _tolerance(samples: CalibrationSet, mismatch: Reals) -> float:
+def _tolerance(samples: calibration_set.CalibrationSet, mismatch: Reals) -> float:
     """Half of the mismatches of sound pairs lie below 0.674 standard deviations."""
     deviation = min(float(np.median(mismatch)) / 0.674, MOST_DEVIATION)
     if samples.camera_covariance is not None:
@@ -160,19 +120,21 @@ def _agreeing(conflict: Flags) -> Flags:
         used[int(count.argmax())] = False
 
 
-def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: float) -> SuspectKind:
+def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: float) -> vision_findings.SuspectKind:
     best = tolerance
-    mending: SuspectKind = "rotation"
+    mending: vision_findings.SuspectKind = "rotation"
     for kind in MEND_KINDS:
         for R in _mended(target[i], kind):
-            angle = rotation_angle(transposed(R)[None], transposed(target[used, :3, :3]))
+            angle = rotation_angle(
+                calibration_set.transposed(R)[None], calibration_set.transposed(target[used, :3, :3])
+            )
             off = float(np.median(np.abs(angle - turned[i, used])))
             if off < best:
                 best, mending = off, kind
     return mending
 
 
-def _mended(T: Reals, kind: SuspectKind) -> list[Reals]:
+def _mended(T: Reals, kind: vision_findings.SuspectKind) -> list[Reals]:
     """The rotations (3, 3) that a detection may have been mistaken for."""
     R = T[:3, :3]
     if kind == "mirrored_tilt":
@@ -183,7 +145,9 @@ def _mended(T: Reals, kind: SuspectKind) -> list[Reals]:
     return [R @ scipy.spatial.transform.Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
 
 
-def worst_sample(samples: CalibrationSet, refined: Refined) -> tuple[int, FarFromFit] | None:
+def worst_sample(
+    samples: calibration_set.CalibrationSet, refined: Refined
+) -> tuple[int, vision_findings.FarFromFit] | None:
     """The sample whose residuals are too large beside those of all others; None if there is none.
 
     Each sample's six residuals, with the share that it pulls towards itself taken back, over the others' scatter are
@@ -203,26 +167,30 @@ def worst_sample(samples: CalibrationSet, refined: Refined) -> tuple[int, FarFro
         return None
     own = refined.residual[worst] / np.maximum(1 - refined.leverage[worst], 0.02)
     off_mm, off_deg = 1000 * np.linalg.norm(own[:3]), np.degrees(np.linalg.norm(own[3:]))
-    return worst, FarFromFit(samples.names[worst], float(off_mm), float(off_deg), float(probability[worst]))
+    return worst, vision_findings.FarFromFit(
+        samples.names[worst], float(off_mm), float(off_deg), float(probability[worst])
+    )
 
 
-def repeated_poses(samples: CalibrationSet) -> tuple[RepeatedPose, ...]:
+def repeated_poses(samples: calibration_set.CalibrationSet) -> tuple[vision_findings.RepeatedPose, ...]:
     """Samples taken where the flange had been before."""
     found = []
     for i in range(1, len(samples)):
-        step = step_between(np.broadcast_to(samples.flange[i], (i, 4, 4)), samples.flange[:i])
+        step = calibration_set.step_between(np.broadcast_to(samples.flange[i], (i, 4, 4)), samples.flange[:i])
         near = (np.linalg.norm(step[:, :3], axis=1) < SAME_POSITION_M) & (
             np.linalg.norm(step[:, 3:], axis=1) < SAME_ROTATION_RAD
         )
         if near.any():
             first = int(near.argmax())
-            seen = step_between(samples.target[first], samples.target[i])
+            seen = calibration_set.step_between(samples.target[first], samples.target[i])
             apart_mm, apart_deg = 1000 * np.linalg.norm(seen[:3]), np.degrees(np.linalg.norm(seen[3:]))
-            found.append(RepeatedPose(samples.names[i], samples.names[first], float(apart_mm), float(apart_deg)))
+            found.append(
+                vision_findings.RepeatedPose(samples.names[i], samples.names[first], float(apart_mm), float(apart_deg))
+            )
     return tuple(found)
 
 
-def _copies(samples: CalibrationSet) -> Flags:
+def _copies(samples: calibration_set.CalibrationSet) -> Flags:
     """Samples (N,) equal to an earlier one in both poses, which measure nothing and would narrow intervals."""
     rows = np.concatenate([samples.flange, samples.target], axis=1).reshape(len(samples), -1).round(COPY_DECIMALS)
     copies = np.ones(len(samples), bool)
@@ -232,7 +200,7 @@ def _copies(samples: CalibrationSet) -> Flags:
 
 MUCH_DISTANCE, MUCH_ROTATION = 0.01, np.radians(3)  # m, rad
 MUCH_BETTER = 5
-STREAMS: tuple[Streams, ...] = ("flange", "target", "both")
+STREAMS: tuple[vision_findings.Streams, ...] = ("flange", "target", "both")
 NAMED = {"x": "roll", "y": "pitch", "z": "yaw"}
 SWAPPED = {"z": "roll", "y": "pitch", "x": "yaw"}
 COLUMNS = ("roll", "pitch", "yaw")
@@ -253,7 +221,7 @@ def _products() -> dict[str, tuple[str, list[int]]]:
 PRODUCTS = _products()
 
 
-def other_reading(samples: CalibrationSet, residual: Reals) -> OtherReading | None:
+def other_reading(samples: calibration_set.CalibrationSet, residual: Reals) -> vision_findings.OtherReading | None:
     """The convention by which the samples fit much better; None if they fit, or if none makes them.
 
     Parameters
@@ -265,9 +233,12 @@ def other_reading(samples: CalibrationSet, residual: Reals) -> OtherReading | No
     given, turned = _misfit(residual)
     if given < 1:
         return None
-    best: tuple[float, RotationReading] | None = None
+    best: tuple[float, vision_findings.RotationReading] | None = None
     for again, finding in _readings(samples, turned):
-        mismatch = np.abs(angles_between(again.flange[:, :3, :3]) - angles_between(transposed(again.target)[:, :3, :3]))
+        mismatch = np.abs(
+            angles_between(again.flange[:, :3, :3])
+            - angles_between(calibration_set.transposed(again.target)[:, :3, :3])
+        )
         if np.median(mismatch) > MOST_DEVIATION:
             continue
         try:
@@ -289,7 +260,7 @@ SIGNED_AXES: dict[str, Reals] = {
 LEAST_MISREAD = 3e-3  # m; residuals below are no wrong axes
 
 
-def position_axes(samples: CalibrationSet) -> PositionAxes | None:
+def position_axes(samples: calibration_set.CalibrationSet) -> vision_findings.PositionAxes | None:
     """Axes negated or swapped in the positions of a stream, by which the samples fit much better; None if by none.
 
     Turning angles and orientations don't show that. With the rotation that the orientations alone give, positions of
@@ -314,15 +285,15 @@ def position_axes(samples: CalibrationSet) -> PositionAxes | None:
         return rms
 
     whole = np.broadcast_to(flange, (len(read), *flange.shape))
-    streams: dict[Streams, Reals] = {
+    streams: dict[vision_findings.Streams, Reals] = {
         "target": misfit(np.einsum("kij,nj->kni", read, seen), whole),
         "flange": misfit(np.broadcast_to(seen, whole.shape), np.einsum("kij,nj->kni", read, flange)),
     }
-    best: Streams = min(streams, key=lambda stream: round(float(streams[stream].min()), 9))
+    best: vision_findings.Streams = min(streams, key=lambda stream: round(float(streams[stream].min()), 9))
     given, k = float(streams[best][0]), int(streams[best].argmin())
     if given < LEAST_MISREAD or streams[best][k] > given / MUCH_BETTER:
         return None
-    return PositionAxes(best, [*SIGNED_AXES][k], 1000 * given, 1000 * float(streams[best][k]))
+    return vision_findings.PositionAxes(best, [*SIGNED_AXES][k], 1000 * given, 1000 * float(streams[best][k]))
 
 
 def _misfit(residual: Reals) -> tuple[float, float]:
@@ -331,32 +302,41 @@ def _misfit(residual: Reals) -> tuple[float, float]:
     return distance / MUCH_DISTANCE + turn / MUCH_ROTATION, float(np.degrees(turn))
 
 
-def _readings(samples: CalibrationSet, given: float) -> Iterator[tuple[CalibrationSet, RotationReading]]:
+def _readings(
+    samples: calibration_set.CalibrationSet, given: float
+) -> Iterator[tuple[calibration_set.CalibrationSet, vision_findings.RotationReading]]:
     for stream in STREAMS:
         for shift in (0, 2):  # x, y, z, w taken for w, x, y, z, and the other way round
-            yield _with(samples, stream, partial(_rolled, shift=shift)), QuaternionOrder(stream, given, given)
+            yield (
+                _with(samples, stream, partial(_rolled, shift=shift)),
+                vision_findings.QuaternionOrder(stream, given, given),
+            )
         for text, (axes, columns) in PRODUCTS.items():
             turned = partial(_product, axes=axes, columns=columns)
-            yield _with(samples, stream, turned), AngleOrder(stream, text, given, given)
-        yield _with(samples, stream, _transposed), TransposedRotations(stream, given, given)
+            yield _with(samples, stream, turned), vision_findings.AngleOrder(stream, text, given, given)
+        yield _with(samples, stream, _transposed), vision_findings.TransposedRotations(stream, given, given)
 
 
-def _with(samples: CalibrationSet, stream: Streams, rotations: Callable[[Reals], Reals]) -> CalibrationSet:
+def _with(
+    samples: calibration_set.CalibrationSet, stream: vision_findings.Streams, rotations: Callable[[Reals], Reals]
+) -> calibration_set.CalibrationSet:
     """The samples with other rotations of a stream."""
     T, B = samples.flange, samples.target
     if stream != "target":
-        T = posed(rotations(T), T[:, :3, 3])
+        T = calibration_set.posed(rotations(T), T[:, :3, 3])
     if stream != "flange":
-        B = posed(rotations(B), B[:, :3, 3])
+        B = calibration_set.posed(rotations(B), B[:, :3, 3])
     return replace(samples, flange=T, target=B)
 
 
 def _transposed(T: Reals) -> Reals:
-    return transposed(T[:, :3, :3])
+    return calibration_set.transposed(T[:, :3, :3])
 
 
 def _rolled(T: Reals, shift: int) -> Reals:
-    R: Reals = scipy.spatial.transform.Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
+    R: Reals = scipy.spatial.transform.Rotation.from_quat(
+        np.roll(calibration_set.quaternion_of(T), shift, axis=1)
+    ).as_matrix()
     return R
 
 
@@ -432,7 +412,7 @@ class HandEye(ByValue, Displayed):
     without_suspects : (2,), m and rad: how far X moves if the samples taken out are left in; None if there are none
     """
 
-    samples: CalibrationSet
+    samples: calibration_set.CalibrationSet
     used: Flags
     X: Reals
     Y: Reals
@@ -444,9 +424,9 @@ class HandEye(ByValue, Displayed):
     greatest_turn: float
     axes_apart: float
     methods: tuple[MethodAnswer, ...]
-    directions: tuple[DirectionTried, ...]
-    suspects: tuple[Suspect, ...]
-    warnings: tuple[CalibrationWarning, ...]
+    directions: tuple[vision_findings.DirectionTried, ...]
+    suspects: tuple[vision_findings.Suspect, ...]
+    warnings: tuple[vision_findings.CalibrationWarning, ...]
     without_suspects: Reals | None
     touch: TouchCheck | None
     mismatch: Reals
@@ -468,7 +448,7 @@ class HandEye(ByValue, Displayed):
         return Sheet(heading, columns, shown, left_out, facts)
 
 
-def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
+def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     """Estimate where camera and board are, with 95 % intervals, and judge every sample.
 
     Parameters
@@ -487,7 +467,7 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     _check_determined(samples)
     angles = check_angles(samples)
     used = angles.used & ~_copies(samples)
-    suspects: list[Suspect] = list(angles.found)
+    suspects: list[vision_findings.Suspect] = list(angles.found)
     greatest, apart = _check_determined(samples.take(used))
     refined = _fitted(samples.take(used))
     while used.sum() > FEW_SAMPLES and (worst := worst_sample(samples.take(used), refined)):
@@ -496,7 +476,7 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
         greatest, apart = _check_determined(samples.take(used))
         refined = _fitted(samples.take(used))
     kept = samples.take(used)
-    warnings: list[CalibrationWarning] = [angles.warning] if angles.warning else []
+    warnings: list[vision_findings.CalibrationWarning] = [angles.warning] if angles.warning else []
     directions = directions_tried(kept, refined)
     warnings += _warnings(kept, refined, greatest, apart, directions)
     covariance = refined.covariance + _shared_covariance(kept, refined)
@@ -542,24 +522,24 @@ def start(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
             cost = float(np.sum((residuals(F, B, X, Y)[0] / np.repeat(deviations, 3)) ** 2))
             best = min(best or (np.inf, X, Y), (cost, X, Y), key=lambda each: each[0])
     if best is None:
-        raise HandEyeError(NothingFits())
+        raise vision_findings.HandEyeError(vision_findings.NothingFits())
     return best[1], best[2]
 
 
-def _fitted(samples: CalibrationSet) -> Refined:
+def _fitted(samples: calibration_set.CalibrationSet) -> Refined:
     seen = PoseObservations(
         samples.setup, samples.hand, samples.target, samples.camera_covariance, samples.flange_covariance
     )
     try:
         found = refine(seen, *start(samples.hand, samples.target, np.array([1e-3, 5e-3])))
     except np.linalg.LinAlgError:
-        raise HandEyeError(NothingFits()) from None
+        raise vision_findings.HandEyeError(vision_findings.NothingFits()) from None
     if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():
-        raise HandEyeError(NothingFits())
+        raise vision_findings.HandEyeError(vision_findings.NothingFits())
     return found
 
 
-def _shared_covariance(samples: CalibrationSet, refined: Refined) -> Reals:
+def _shared_covariance(samples: calibration_set.CalibrationSet, refined: Refined) -> Reals:
     """What errors that all samples share add to the covariance of the two poses, (12, 12)."""
     if samples.shared is None:
         return np.zeros((UNKNOWNS, UNKNOWNS))
@@ -574,59 +554,61 @@ def _shared_covariance(samples: CalibrationSet, refined: Refined) -> Reals:
     return added
 
 
-def _check_determined(samples: CalibrationSet) -> tuple[float, float]:
+def _check_determined(samples: calibration_set.CalibrationSet) -> tuple[float, float]:
     """The largest turn between two samples and how far the rotation axes leave one direction, rad."""
     if len(samples) < LEAST_SAMPLES:
-        raise HandEyeError(TooFewSamples(len(samples), LEAST_SAMPLES))
+        raise vision_findings.HandEyeError(vision_findings.TooFewSamples(len(samples), LEAST_SAMPLES))
     for stream in ("flange", "target"):
         poses = getattr(samples, stream)
-        if np.abs(step_between(poses[:1], poses)).max() < EQUAL:
-            raise HandEyeError(AllSamplesEqual(stream))  # type: ignore[arg-type]
+        if np.abs(calibration_set.step_between(poses[:1], poses)).max() < EQUAL:
+            raise vision_findings.HandEyeError(vision_findings.AllSamplesEqual(stream))  # type: ignore[arg-type]
     R = samples.hand[:, :3, :3]
     greatest = float(angles_between(R).max())
     if greatest < LEAST_TURN:
-        raise HandEyeError(NoRotation(float(np.degrees(greatest))))
+        raise vision_findings.HandEyeError(vision_findings.NoRotation(float(np.degrees(greatest))))
     i, j = np.triu_indices(len(samples), 1)
-    turns = log_rotation(transposed(R[j]) @ R[i])
+    turns = calibration_set.log_rotation(calibration_set.transposed(R[j]) @ R[i])
     _, size, axes = np.linalg.svd(turns, full_matrices=False)
     apart = float(np.arctan2(size[1], size[0]))
     if apart < LEAST_SPREAD:
-        raise HandEyeError(ParallelTurns(tuple(axes[0].tolist()), float(np.degrees(apart))))
+        raise vision_findings.HandEyeError(
+            vision_findings.ParallelTurns(tuple(axes[0].tolist()), float(np.degrees(apart)))
+        )
     return greatest, apart
 
 
 def _warnings(
-    samples: CalibrationSet,
+    samples: calibration_set.CalibrationSet,
     refined: Refined,
     greatest: float,
     apart: float,
-    directions: tuple[DirectionTried, ...],
-) -> list[CalibrationWarning]:
-    found: list[CalibrationWarning] = []
+    directions: tuple[vision_findings.DirectionTried, ...],
+) -> list[vision_findings.CalibrationWarning]:
+    found: list[vision_findings.CalibrationWarning] = []
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
-        found.append(LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
+        found.append(vision_findings.LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
     if len(samples) <= FEW_SAMPLES:
-        found.append(FewSamples(len(samples)))
+        found.append(vision_findings.FewSamples(len(samples)))
     free = 6 * len(samples) - 12
     largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
-        found.append(MoreScatter(float(refined.scatter), largest))
+        found.append(vision_findings.MoreScatter(float(refined.scatter), largest))
     if reading := other_reading(samples, refined.residual):
         return [*found, reading]
     if directions[0].status == "excluded":
         best = next(each for each in directions if each.status == "best")
-        return [*found, OtherDirection(best.flange_inverted, best.target_inverted)]
+        return [*found, vision_findings.OtherDirection(best.flange_inverted, best.target_inverted)]
     factor, half_width = board_scale(samples, refined)
     if abs(factor - 1) > max(2 * half_width, LEAST_SCALE_ERROR) and factor > SURE_SCALE * half_width:
-        found.append(BoardScale(factor, half_width))
+        found.append(vision_findings.BoardScale(factor, half_width))
     size, turn = _misfit(refined.residual)
-    if size > 1 and not grave_warnings(found):
+    if size > 1 and not vision_findings.grave_warnings(found):
         distance = float(1000 * np.sqrt((refined.residual[:, :3] ** 2).mean()))
-        found.append(UnexplainedResiduals(distance, turn, READINGS))
+        found.append(vision_findings.UnexplainedResiduals(distance, turn, vision_findings.READINGS))
     return found
 
 
-def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float]:
+def board_scale(samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[float, float]:
     """The factor by which distances seen have to grow to fit best, and half its 95 % interval."""
     X, Y, s = refined.X, refined.Y, 1.0
     weight = 1 / np.repeat(refined.deviations, 3)
@@ -639,7 +621,7 @@ def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float
         r = (raw * weight).ravel()
         inverse = np.linalg.pinv(J.T @ J)
         step = -inverse @ (J.T @ r)
-        X, Y, s = moved(X, step[:6]), moved(Y, step[6:12]), float(s + step[12])
+        X, Y, s = calibration_set.moved(X, step[:6]), calibration_set.moved(Y, step[6:12]), float(s + step[12])
         if np.abs(step).max() < 1e-10:
             break
     free = len(r) - 13
@@ -647,14 +629,16 @@ def board_scale(samples: CalibrationSet, refined: Refined) -> tuple[float, float
     return s, float(scipy.special.stdtrit(max(free, 1), (1 + SURE) / 2) * scatter * np.sqrt(inverse[12, 12]))
 
 
-def _answer(name: MethodName, samples: CalibrationSet, refined: Refined, half_width: Reals) -> MethodAnswer:
+def _answer(
+    name: MethodName, samples: calibration_set.CalibrationSet, refined: Refined, half_width: Reals
+) -> MethodAnswer:
     try:
         X, Y = solved_by(name, samples.hand, samples.target)
     except np.linalg.LinAlgError:
         X, Y = np.full((4, 4), np.nan), np.full((4, 4), np.nan)
     if not (np.isfinite(X).all() and np.isfinite(Y).all()):
         return MethodAnswer(name, None, np.inf, np.inf, np.inf, np.inf, np.inf)
-    step = step_between(refined.X, X)
+    step = calibration_set.step_between(refined.X, X)
     raw = residuals(samples.hand, samples.target, X, Y)[0]
     return MethodAnswer(
         name=name,
@@ -667,7 +651,9 @@ def _answer(name: MethodName, samples: CalibrationSet, refined: Refined, half_wi
     )
 
 
-def directions_tried(samples: CalibrationSet, refined: Refined) -> tuple[DirectionTried, ...]:
+def directions_tried(
+    samples: calibration_set.CalibrationSet, refined: Refined
+) -> tuple[vision_findings.DirectionTried, ...]:
     """The four ways to take the two streams, as given first, judged by their residuals in equal standard deviations.
 
     Both streams inverted is the problem as given with X and Y swapped, F^-1 Y B^-1 = X, so that no residual tells
@@ -677,8 +663,8 @@ def directions_tried(samples: CalibrationSet, refined: Refined) -> tuple[Directi
     free = 6 * len(samples) - 12
     found: list[tuple[float, Reals | None]] = []
     for flange_inverted, target_inverted in DIRECTIONS:
-        F = inverted(samples.hand) if flange_inverted else samples.hand
-        B = inverted(samples.target) if target_inverted else samples.target
+        F = calibration_set.inverted(samples.hand) if flange_inverted else samples.hand
+        B = calibration_set.inverted(samples.target) if target_inverted else samples.target
         raw = _residuals_of(F, B, sigma)
         found.append((np.inf if raw is None else float(np.sum((raw / np.repeat(sigma, 3)) ** 2)), raw))
     costs = np.array([cost for cost, _ in found])
@@ -687,11 +673,11 @@ def directions_tried(samples: CalibrationSet, refined: Refined) -> tuple[Directi
     directions = []
     for k, ((flange_inverted, target_inverted), (cost, raw)) in enumerate(zip(DIRECTIONS, found)):
         probability = float(scipy.special.fdtrc(free, free, cost / costs[best])) if np.isfinite(cost) else 0.0
-        status: DirectionStatus = "excluded" if probability < EXCLUDED else "open"
+        status: vision_findings.DirectionStatus = "excluded" if probability < EXCLUDED else "open"
         status = {best: "best", twin: "same_problem"}.get(k, status)  # type: ignore[assignment]
         rms = [None, None] if raw is None else [float(np.sqrt((raw[:, part] ** 2).mean())) for part in _PARTS]
         directions.append(
-            DirectionTried(
+            vision_findings.DirectionTried(
                 flange_inverted,
                 target_inverted,
                 status,
@@ -710,13 +696,13 @@ def _residuals_of(F: Reals, B: Reals, sigma: Reals) -> Reals | None:
     covariance = np.broadcast_to(np.diag(np.repeat(sigma, 3) ** 2), (len(F), 6, 6))
     try:
         found = refine(PoseObservations("eye_in_hand", F, B, covariance), *start(F, B, sigma))
-    except (np.linalg.LinAlgError, HandEyeError):
+    except (np.linalg.LinAlgError, vision_findings.HandEyeError):
         return None
     return found.residual
 
 
-def _shift_with_all(samples: CalibrationSet, refined: Refined) -> Reals:
-    step = step_between(refined.X, _fitted(samples).X)
+def _shift_with_all(samples: calibration_set.CalibrationSet, refined: Refined) -> Reals:
+    step = calibration_set.step_between(refined.X, _fitted(samples).X)
     return np.array([np.linalg.norm(step[:3]), np.linalg.norm(step[3:])])
 
 
@@ -726,7 +712,7 @@ def _touch(found: HandEye, touched: Reals) -> TouchCheck:
     T, part = (found.X, slice(0, 6)) if fixed else (found.Y, slice(6, 12))
     turned = touched[:, 0] @ T[:3, :3].T
     difference = touched[:, 1] - turned - T[:3, 3]
-    J = np.concatenate([np.broadcast_to(np.eye(3), (len(touched), 3, 3)), -skew(turned)], axis=2)
+    J = np.concatenate([np.broadcast_to(np.eye(3), (len(touched), 3, 3)), -calibration_set.skew(turned)], axis=2)
     own = found.deviations[0] ** 2 if fixed else 0.0
     shared = np.einsum("mik,kl,njl->minj", J, found.covariance[part, part], J).reshape(3 * len(J), -1)
     whole = shared + (own + found.samples.touch_deviation**2 + 1e-18) * np.eye(len(shared))
@@ -745,6 +731,6 @@ def board_poses(found: HandEye) -> Reals:
 def spread_of(found: HandEye) -> tuple[float, float]:
     """Root mean square distance (m) and angle (rad) of the samples' board poses from their mean, of those used."""
     poses = board_poses(found)[found.used]
-    step = step_between(mean_pose(poses), poses)
+    step = calibration_set.step_between(mean_pose(poses), poses)
     size = [np.linalg.norm(step[:, part], axis=1) for part in _PARTS]
     return float(np.sqrt((size[0] ** 2).mean())), float(np.sqrt((size[1] ** 2).mean()))

@@ -26,17 +26,9 @@ from er3a.kinematics.chain import row_values
 from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
+from er3a.vision import likelihood
 from er3a.vision.calibration_set import CalibrationSet, inverse_right_jacobian, inverted, moved, step_between
 from er3a.vision.hand_eye import SURE, HandEye
-from er3a.vision.likelihood import (
-    UNKNOWNS,
-    VARIANCE_ROUNDS,
-    PoseObservations,
-    flange_to_camera,
-    refine,
-    residuals,
-    whitening,
-)
 
 STEP = 1e-6  # m and rad
 STEPS = 40
@@ -108,14 +100,14 @@ class _Problem:
     def linear(self, table: Tables, parameters: list[Parameter], X: Reals, Y: Reals) -> tuple[Reals, Reals, Reals]:
         """F (N, 4, 4), residuals (N, 6), and their derivatives by poses and entries (N, 6, 12 + p)."""
         F = self.hand(self.flange(table)[0])
-        raw, J = residuals(F, self.samples.target, X, Y)
+        raw, J = likelihood.residuals(F, self.samples.target, X, Y)
         count = len(parameters)
         if not count:
             return F, raw, J
         both = STEP * np.concatenate([np.eye(count), -np.eye(count)])
         flange = self.flange(moved_tables(join([table] * (2 * count)), parameters, both))
         shift = step_between(flange[count:], flange[:count]) / (2 * STEP)
-        by_entry = -np.einsum("nij,pnj->nip", flange_to_camera(self.samples.setup, F, X, Y), shift)
+        by_entry = -np.einsum("nij,pnj->nip", likelihood.flange_to_camera(self.samples.setup, F, X, Y), shift)
         by_entry[:, 3:] = inverse_right_jacobian(raw[:, 3:]) @ by_entry[:, 3:]
         return F, raw, np.concatenate([J, by_entry], axis=2)
 
@@ -136,15 +128,15 @@ def correct_table(found: HandEye, robot: Robot, level: LevelName = "all_entries"
     seen = _seen(samples, samples.hand, samples.camera_covariance)
     sigma = np.broadcast_to(np.repeat(found.deviations, 3), (len(samples), 6))
     _, _, J = problem.linear(tables_of(robot), every, found.X, found.Y)
-    kept, held = _identified(whitening(seen, sigma, found.X, found.Y) @ J, every, samples.setup, robot)
-    if 6 * len(samples) - UNKNOWNS - len(kept) < LEAST_FREEDOM:
+    kept, held = _identified(likelihood.whitening(seen, sigma, found.X, found.Y) @ J, every, samples.setup, robot)
+    if 6 * len(samples) - likelihood.UNKNOWNS - len(kept) < LEAST_FREEDOM:
         return NoCorrections("few")
     fit = _fit(problem, kept, found)
     return NoCorrections("steps") if fit is None else _result(problem, (level, kept, held), found, fit)
 
 
-def _seen(samples: CalibrationSet, F: Reals, covariance: Reals | None) -> PoseObservations:
-    return PoseObservations(samples.setup, F, samples.target, covariance, samples.flange_covariance)
+def _seen(samples: CalibrationSet, F: Reals, covariance: Reals | None) -> likelihood.PoseObservations:
+    return likelihood.PoseObservations(samples.setup, F, samples.target, covariance, samples.flange_covariance)
 
 
 def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> tuple[list[Parameter], tuple[Held, ...]]:
@@ -153,9 +145,9 @@ def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> t
     poses = ("T_flange_camera", "T_base_board") if setup == "eye_in_hand" else ("T_base_camera", "T_flange_board")
     names = [*(poses[0],) * 6, *(poses[1],) * 6, *(each.name for each in every)]
     norms = np.linalg.norm(J, axis=0)
-    columns = list(range(UNKNOWNS))
+    columns = list(range(likelihood.UNKNOWNS))
     held: list[Held] = []
-    for k in range(UNKNOWNS, J.shape[1]):
+    for k in range(likelihood.UNKNOWNS, J.shape[1]):
         if norms[k] <= NO_EFFECT * norms.max():
             held.append(MovesNothing(names[k]))
             continue
@@ -168,7 +160,7 @@ def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> t
         entries = (names[k], *dict.fromkeys(partners))
         between = [pair for _, pair in parallel_pairs(robot) if set(entries) == {f"d{joint}" for joint in pair}]
         held.append(NotToldApart(entries, between[0] if between else None))
-    return [every[k - UNKNOWNS] for k in columns[UNKNOWNS:]], tuple(held)
+    return [every[k - likelihood.UNKNOWNS] for k in columns[likelihood.UNKNOWNS :]], tuple(held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,11 +181,11 @@ def _fit(problem: _Problem, kept: list[Parameter], found: HandEye) -> _JointFit 
     samples, given = problem.samples, tables_of(problem.robot)
     stated = samples.camera_covariance is not None
     X, Y, amounts, deviations = found.X, found.Y, np.zeros(len(kept)), found.deviations
-    count = UNKNOWNS + len(kept)
-    for _ in range(1 if stated else VARIANCE_ROUNDS):
+    count = likelihood.UNKNOWNS + len(kept)
+    for _ in range(1 if stated else likelihood.VARIANCE_ROUNDS):
         F = problem.hand(problem.flange(moved_tables(given, kept, amounts[None]))[0])
         sigma = np.broadcast_to(np.repeat(deviations, 3), (len(samples), 6))
-        W = whitening(_seen(samples, F, samples.camera_covariance), sigma, X, Y)
+        W = likelihood.whitening(_seen(samples, F, samples.camera_covariance), sigma, X, Y)
         steps = _steps(problem, kept, W, (X, Y, amounts))
         if steps is None:
             return None
@@ -211,7 +203,7 @@ def _fit(problem: _Problem, kept: list[Parameter], found: HandEye) -> _JointFit 
     scatter = float(np.sqrt(squares / free))
     freedom = np.full(count, free if stated else parts.min())
     if not stated:
-        freedom[:UNKNOWNS] = parts[np.array([0, 0, 0, 1, 1, 1] * 2)]
+        freedom[: likelihood.UNKNOWNS] = parts[np.array([0, 0, 0, 1, 1, 1] * 2)]
     W_inverse = np.linalg.inv(W)
     S: Reals = np.asarray(W_inverse @ np.swapaxes(W_inverse, 1, 2), float)
     return _JointFit(X, Y, amounts, S, squares, inverse * (scatter**2 if stated else 1.0), freedom, scatter)
@@ -234,7 +226,7 @@ def _steps(
         scale = np.linalg.norm(flat, axis=0)
         step = -np.linalg.lstsq(flat / scale, white.ravel(), rcond=None)[0] / scale
         for _ in range(HALVINGS):
-            new = moved(X, step[:6]), moved(Y, step[6:UNKNOWNS]), amounts + step[UNKNOWNS:]
+            new = moved(X, step[:6]), moved(Y, step[6 : likelihood.UNKNOWNS]), amounts + step[likelihood.UNKNOWNS :]
             white_new, J_new = at(*new)
             if (white_new**2).sum() <= (white**2).sum() * (1 + 1e-9):
                 break
@@ -251,11 +243,13 @@ def _result(
     (level, kept, held), robot, samples = asked, problem.robot, problem.samples
     error = np.sqrt(np.diag(fit.covariance))
     half = scipy.special.stdtrit(fit.freedom, (1 + SURE) / 2) * error
-    correlation = (fit.covariance / np.outer(error, error))[UNKNOWNS:, UNKNOWNS:]
+    correlation = (fit.covariance / np.outer(error, error))[likelihood.UNKNOWNS :, likelihood.UNKNOWNS :]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
-    before = refine(PoseObservations(samples.setup, samples.hand, samples.target, fit.S), found.X, found.Y)
+    before = likelihood.refine(
+        likelihood.PoseObservations(samples.setup, samples.hand, samples.target, fit.S), found.X, found.Y
+    )
     squares_before = float((before.whitened**2).sum())
-    free = 6 * len(samples) - UNKNOWNS - len(kept)
+    free = 6 * len(samples) - likelihood.UNKNOWNS - len(kept)
     ratio = (squares_before - fit.squares) / max(len(kept), 1) / (fit.squares / free)
     step = step_between(found.X, fit.X)
     units = np.array([each.in_unit for each in kept])
@@ -269,16 +263,16 @@ def _result(
                 float(amount * each.in_unit),
                 float(own * each.in_unit),
             )
-            for each, amount, own in zip(kept, fit.amounts, error[UNKNOWNS:])
+            for each, amount, own in zip(kept, fit.amounts, error[likelihood.UNKNOWNS :])
         ),
-        entry_half_width=half[UNKNOWNS:] * units,
+        entry_half_width=half[likelihood.UNKNOWNS :] * units,
         held=held,
         close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
         X=fit.X,
         Y=fit.Y,
-        half_width=half[:UNKNOWNS],
+        half_width=half[: likelihood.UNKNOWNS],
         moved=np.array([np.linalg.norm(step[:3]), np.linalg.norm(step[3:])]),
         scatter=fit.scatter,
-        scatter_before=float(np.sqrt(squares_before / (6 * len(samples) - UNKNOWNS))),
+        scatter_before=float(np.sqrt(squares_before / (6 * len(samples) - likelihood.UNKNOWNS))),
         probability=float(scipy.special.fdtrc(len(kept), free, max(ratio, 0.0))) if kept else 1.0,
     )

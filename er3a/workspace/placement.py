@@ -33,18 +33,9 @@ from er3a.kinematics.wrist_partitioned import constants_for_blocks
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import CombinedLimit, Robot
+from er3a.workspace import directions
 from er3a.workspace.capability import manipulability_of
 from er3a.workspace.cell_frame import cell_frame
-from er3a.workspace.directions import (
-    RING,
-    Roll,
-    across,
-    cone_directions,
-    left_to_roll,
-    point_tool,
-    poses,
-    tool_rotations,
-)
 from er3a.workspace.interval_inverse import GOOD, NEVER, States, branches, holds, misses, theta_ranges
 from er3a.workspace.section_arm import FULL_TURN
 from er3a.workspace.tool_inverse import all_solutions, proofs_hold, slot_count
@@ -146,7 +137,7 @@ class Task:
     lowest: float
     clear: float
     margin: float = 0.0
-    step: float = RING
+    step: float = directions.RING
     support: Support | None = None
 
 
@@ -239,7 +230,7 @@ def lattice_spacing(box: Reals, coarsest: float) -> Reals:
 def survey(
     robot: Robot,
     task: Task,
-    roll: Roll,
+    roll: directions.Roll,
     coarsest: float,
     free: Free | None = None,
     *,
@@ -259,7 +250,7 @@ def survey(
     least, least_any = np.full((len(points), slots), NO), np.full(len(points), NO)
     limit_margin = np.zeros((len(points), slots))
     if in_cone is None:
-        rotations = tool_rotations(cone_directions(task.axis, task.half_angle, task.step), roll)
+        rotations = directions.tool_rotations(directions.cone_directions(task.axis, task.half_angle, task.step), roll)
     else:
         rotations = in_cone(points[asked], task.axis, task.half_angle, task.step)
     if rotations.shape[-4]:
@@ -307,7 +298,7 @@ def _over(task: Task, support: Support, points: Reals) -> Flags:
 
 
 def serve(
-    robot: Robot, points: Reals, rotations: Reals, roll: Roll, free: Free | None = None
+    robot: Robot, points: Reals, rotations: Reals, roll: directions.Roll, free: Free | None = None
 ) -> tuple[Reals, Reals, Reals]:
     """How each branch serves points over all directions.
 
@@ -320,7 +311,7 @@ def serve(
     -------
     least, least_any, limit_margin : (n, slots), (n,), (n, slots), as in :class:`Field`
     """
-    asked, slots = left_to_roll(robot, roll), slot_count(robot)
+    asked, slots = directions.left_to_roll(robot, roll), slot_count(robot)
     least, least_any = np.full((len(points), slots), np.inf), np.full(len(points), np.inf)
     limit_margin = np.full((len(points), slots), np.inf)
     alive = np.arange(len(points))
@@ -329,7 +320,7 @@ def serve(
             break
         for part in np.array_split(alive, max(1, len(alive) * direction.shape[1] // _POSES)):
             tried = direction if len(direction) == 1 else direction[part]
-            q_all, within = all_solutions(asked, poses(points[part][:, None], tried).reshape(-1, 4, 4))
+            q_all, within = all_solutions(asked, directions.poses(points[part][:, None], tried).reshape(-1, 4, 4))
             value = np.where(within, manipulability_of(robot, q_all, within), NO).reshape(len(part), -1, slots)
             inside = _limit_margin(asked, q_all)
             rolled = _best_roll(value, q_all.reshape(*value.shape, -1), free, (least[part] <= NO, least_any[part]))[
@@ -390,7 +381,7 @@ def box_points(field: Field, box: Reals, centre: Reals) -> Reals:
     return centre + (np.indices(tuple(points)).reshape(3, -1).T - (points - 1) / 2) * field.spacing
 
 
-def serving_arms(robot: Robot, points: Reals, rotations: Reals, roll: Roll, slot: int, free: Free) -> Reals:
+def serving_arms(robot: Robot, points: Reals, rotations: Reals, roll: directions.Roll, slot: int, free: Free) -> Reals:
     """The arms (m, joints), rad, that serve points along all directions: of one branch, or of the best with ``MIXED``.
 
     Parameters
@@ -398,11 +389,11 @@ def serving_arms(robot: Robot, points: Reals, rotations: Reals, roll: Roll, slot
     points : (n, 3), m; rotations : as :func:`serve` takes them
     free : which arms count; where none does, there is no arm
     """
-    asked, rows, slots = left_to_roll(robot, roll), np.arange(len(points)), slot_count(robot)
+    asked, rows, slots = directions.left_to_roll(robot, roll), np.arange(len(points)), slot_count(robot)
     first = np.zeros((len(points), slots), bool), np.full(len(points), np.inf)
     arms = []
     for direction in _by_direction(rotations):
-        q, within = all_solutions(asked, poses(points[:, None], direction).reshape(-1, 4, 4))
+        q, within = all_solutions(asked, directions.poses(points[:, None], direction).reshape(-1, 4, 4))
         value = np.where(within, manipulability_of(robot, q, within), NO).reshape(len(points), -1, slots)
         q = q.reshape(*value.shape, -1)
         best = _best_roll(value, q, free, first)
@@ -545,7 +536,7 @@ class BoxPlacement:
 def find_places(
     robot: Robot,
     task: Task,
-    roll: Roll,
+    roll: directions.Roll,
     grid: float,
     count: int,
     most_poses: int,
@@ -573,7 +564,9 @@ def find_places(
     return BoxPlacement(field, replace(places, proven=proven), chosen)
 
 
-def choose_places(robot: Robot, task: Task, places: Places, roll: Roll, count: int, most_poses: int) -> Chosen:
+def choose_places(
+    robot: Robot, task: Task, places: Places, roll: directions.Roll, count: int, most_poses: int
+) -> Chosen:
     """Take up to ``count`` places in their order, each put to the proof.
 
     None overlaps one before it, or is one before it turned about axis 1.
@@ -632,7 +625,7 @@ def _turned_about_axis_1(robot: Robot, task: Task, centre: Reals, row: int) -> F
 
 
 def prove_place(
-    robot: Robot, task: Task, centre: Reals, turned: bool, slot: int, roll: Roll, *, most_poses: int
+    robot: Robot, task: Task, centre: Reals, turned: bool, slot: int, roll: directions.Roll, *, most_poses: int
 ) -> tuple[Answer, int]:
     """Decide one place.
 
@@ -663,7 +656,7 @@ def prove_place(
     return _ANSWERS[answer], used
 
 
-def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
+def proven_bricks(robot: Robot, task: Task, field: Field, roll: directions.Roll) -> Flags:
     """Which bricks between eight lattice points are served at every point, by any mix of branches: (nx-1, ny-1, nz-1).
 
     None of an arm without a spherical wrist.
@@ -681,11 +674,11 @@ def proven_bricks(robot: Robot, task: Task, field: Field, roll: Roll) -> Flags:
     return proven
 
 
-def _constants(robot: Robot, task: Task, roll: Roll) -> Constants:
+def _constants(robot: Robot, task: Task, roll: directions.Roll) -> Constants:
     """What the kernels take of an arm and a task."""
-    asked = left_to_roll(robot, roll)
+    asked = directions.left_to_roll(robot, roll)
     arm, ranges = constants_for_blocks(asked), theta_ranges(asked)
-    x, y = across(task.axis[None])
+    x, y = directions.across(task.axis[None])
     frame = np.stack([x[0], y[0], task.axis], axis=1)
     scale = 2.0 / float(arm.upper_arm + arm.forearm)
     return arm, ranges, frame, task.half_angle, np.array(roll.angles), roll.reach, scale
@@ -723,7 +716,9 @@ def _prove(
         rho, delta = np.sqrt(square), np.hypot(size[3], size[4])
         good, lost = False, True
         for j in range(angles.shape[0]):
-            point_tool(T, frame, 0.5 * (p_0 + p_1), 0.5 * (piece[8] + piece[9]), np.cos(angles[j]), np.sin(angles[j]))
+            directions.point_tool(
+                T, frame, 0.5 * (p_0 + p_1), 0.5 * (piece[8] + piece[9]), np.cos(angles[j]), np.sin(angles[j])
+            )
             used += 2
             branches(arm, ranges, T, rho, delta, reach, state, theta_1)
             if _some(ranges, state, theta_1, slot):

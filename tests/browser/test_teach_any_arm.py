@@ -14,7 +14,8 @@ from er3a.collision.distances import RIM
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward, frames, jacobian
-from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
+from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import clearance_data, panel_data, write_teach_page
 from er3a.robots.robot import CombinedLimit, Robot
@@ -27,6 +28,8 @@ pytestmark = pytest.mark.long
 AGREE = 1e-9
 POSES = 60
 LONG = [("R", 100, 90 * (k % 2 * 2 - 1), 150, -170, 170) for k in range(10)]
+COUPLED = np.eye(6)
+COUPLED[2, 1] = 1.0
 ARMS = {
     "scara": scara,
     "gantry": gantry,
@@ -37,16 +40,18 @@ ARMS = {
     "on_a_rail": lambda: made_of([("P", 0, -90, 0, 0, 2000), *LONG[:6]]),
     "modified": lambda: scara().replace(convention="modified"),
     "ur5e": lambda: load_robot("ur5e"),
+    "coupled": lambda: load_robot("er3_600").replace(coupling=COUPLED),
     "iiwa": lambda: load_robot("lbr_iiwa_14"),
 }
 FORWARD = """
 const [panel, joints, done] = arguments;
-import("er3a/kinematics").then(({ conditioning, constantLinks, frames, jacobian }) => {
-  const { table, characteristic_length: length } = panel;
+import("er3a/kinematics").then(({ conditioning, constantLinks, determinantFactors, frames, jacobian }) => {
+  const { table, characteristic_length: length, singular_sets: sets } = panel;
   const links = constantLinks(table);
   done(joints.map((q) => {
     const T = frames(table, links, q);
-    return { T, J: jacobian(table, T), measures: conditioning(table, T, length) };
+    const factors = sets && determinantFactors(T, sets);
+    return { T, J: jacobian(table, T), measures: conditioning(table, T, length), factors };
   }));
 }).catch((error) => done(String(error.stack)));
 """
@@ -97,6 +102,10 @@ def test_frames_jacobian_and_measures_are_python_s(page, name, random):
     expected = conditioning(robot, q, characteristic_length(robot))
     smallest = [one["measures"]["smallestSingularValue"] for one in found]
     assert smallest == pytest.approx(expected.smallest_singular_value, abs=AGREE)
+    named = determinant_factors(robot, q) if has_branches(robot) else None
+    assert (found[0]["factors"] is None) == (named is None)
+    for kind in TYPES if named else ():
+        assert [one["factors"][kind] for one in found] == pytest.approx(getattr(named, kind), abs=AGREE)
 
 
 @pytest.mark.parametrize(

@@ -317,7 +317,7 @@ def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_
 @pytest.mark.parametrize(
     ("degrees", "state", "told"),
     [
-        ((10, 20, 30, 40, 3, 0), "near", "Near the wrist singularity: axes 4 and 6 are 3.0° from collinear."),
+        ((10, 20, 30, 40, 3, 0), "near", "Near the wrist singularity: axes 4 and 6 are 3.0° from parallel."),
         ((10, 20, 30, 40, 0, 0), "at", "At the wrist singularity"),
         ((0, 0, 76.824, 0, 50, 0), "near", "Near the elbow singularity"),
         ((0, 0, 0, 0, 50, 0), "clear", "No singularity is near."),

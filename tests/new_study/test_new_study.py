@@ -19,7 +19,6 @@ from er3a.errors import Er3aError, InputError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.kept_files import ROOT
 from er3a.files.robot_library import load_robot, robot_of
-from er3a.files.scene_file import load_scene
 from er3a.formats.urdf import export_urdf
 from er3a.kinematics.singularity import scaled_jacobian
 from er3a.pipeline.check import check_file, check_study
@@ -109,7 +108,7 @@ def check_promise(study: Study, name: str) -> set[str]:
     assert (q > robot.lower).all()
     assert (q < robot.upper).all()
     assert np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[:, -1].min() > REGULAR
-    assert (clearance(robot, q, load_scene(study.scene(name, "inverse"))).distance > 0).all()
+    assert (clearance(robot, q, study.scene(name, "inverse")).distance > 0).all()
     found = compute_trajectory(study, name)
     assert {path.name: path.verdict for path in found.summary.paths if path.verdict != "safe"} == {}
     assert found.checks.within_limits.all()

@@ -10,7 +10,7 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.forward import forward
-from er3a.pipeline.stages.trajectory import judgement
+from er3a.planning import motion_faults
 from testing.motion_cases import (
     JOINT_KINDS,
     TOOL_KINDS,
@@ -63,7 +63,7 @@ def test_what_is_open_beside_an_event_is_undecided_where_nobody_finds_the_event(
     motion, seen = judged(robot, written, 50, limits)
     assert seen.verdict == "singular"
     assert motion.proof.beside
-    monkeypatch.setattr(judgement, "singular_events", lambda *_: [])
+    monkeypatch.setattr(motion_faults, "singular_events", lambda *_: [])
     blind = judged(robot, written, 50, limits)[1]
     assert blind.verdict != "safe"
     assert blind.undecided

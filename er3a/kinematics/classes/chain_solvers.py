@@ -15,22 +15,8 @@ from functools import partial
 import numpy as np
 
 from er3a.kinematics.chain import axes_of, inverse_rigid, poses_of, size_of
+from er3a.kinematics.classes import class_solvers
 from er3a.kinematics.classes.arm_angle import about_x, about_z, arm_angle_arm, frame_along
-from er3a.kinematics.classes.class_solvers import (
-    ARM_CLASSES,
-    ArmAngle,
-    ArmClassCode,
-    ChainSolver,
-    Completed,
-    General,
-    ParallelAxes,
-    PlanarFour,
-    Redundancy,
-    SlotName,
-    SphericalWristSolver,
-    ThreeSliding,
-    WithoutParameters,
-)
 from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.scara import gantry, scara
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, prepared, solve_six_revolute
@@ -40,7 +26,7 @@ from er3a.kinematics.wrist_partitioned import WristPartitionedArm, constants_of,
 from er3a.numerics.arrays import Flags, Integers, Reals
 
 FULL_RANK = 1e-7
-PREFERENCE = tuple(ARM_CLASSES)
+PREFERENCE = tuple(class_solvers.ARM_CLASSES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +36,10 @@ class LockedJoint:
     links: Reals
     sliding: Flags
     joint: int
-    rest: ChainSolver | None
-    code: ArmClassCode
+    rest: class_solvers.ChainSolver | None
+    code: class_solvers.ArmClassCode
     slots: int
-    parameters: tuple[Redundancy, ...]
+    parameters: tuple[class_solvers.Redundancy, ...]
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         own = values[:, 0]
@@ -88,16 +74,16 @@ class LockedJoint:
     def seeds(self, T: Reals, values: Reals) -> Reals:
         return np.empty((0, len(self.sliding)))
 
-    def names(self, x: Reals) -> tuple[SlotName, ...]:
+    def names(self, x: Reals) -> tuple[class_solvers.SlotName, ...]:
         return self.rest.names(np.delete(x, self.joint)) if self.rest is not None else ()
 
 
 @dataclass(frozen=True, eq=False)
-class Unsolved(WithoutParameters):
+class Unsolved(class_solvers.WithoutParameters):
     """A chain for which nothing here knows all solutions."""
 
     joints: int
-    code: ArmClassCode = "unsolved"
+    code: class_solvers.ArmClassCode = "unsolved"
     slots: int = 16
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
@@ -107,7 +93,7 @@ class Unsolved(WithoutParameters):
         return np.empty((0, self.joints))
 
 
-def chain_solver(links: Reals, sliding: Flags) -> ChainSolver:
+def chain_solver(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
     """The solver of a chain with constant links (n + 1, 4, 4), m, whose joints are prismatic where ``sliding`` (n,)
     says so."""
     links, sliding = np.ascontiguousarray(links, dtype=float), np.asarray(sliding, dtype=bool)
@@ -120,38 +106,42 @@ def chain_solver(links: Reals, sliding: Flags) -> ChainSolver:
     return _locked(links, sliding) if n > 6 else _completed(links, sliding)
 
 
-def _with_spherical_wrist(links: Reals, sliding: Flags) -> ChainSolver | None:
+def _with_spherical_wrist(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
     if len(sliding) != 6 or sliding.any():
         return None
     wrist = recognised(*axes_of(links), poses_of(links, np.zeros(6)))
-    return SphericalWristSolver(links, constants_of(wrist)) if isinstance(wrist, WristPartitionedArm) else None
+    return (
+        class_solvers.SphericalWristSolver(links, constants_of(wrist))
+        if isinstance(wrist, WristPartitionedArm)
+        else None
+    )
 
 
-def _with_parallel_axes(links: Reals, sliding: Flags) -> ChainSolver | None:
+def _with_parallel_axes(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
     parallel = three_parallel(links) if len(sliding) == 6 and not sliding.any() else None
-    return None if parallel is None else ParallelAxes(parallel)
+    return None if parallel is None else class_solvers.ParallelAxes(parallel)
 
 
-def _with_three_slides(links: Reals, sliding: Flags) -> ChainSolver | None:
+def _with_three_slides(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
     if len(sliding) != 6 or sliding.sum() != 3 or not full_rank(links, sliding):
         return None
     three = gantry(links, sliding)
-    return None if three is None else ThreeSliding(three)
+    return None if three is None else class_solvers.ThreeSliding(three)
 
 
-def _with_arm_angle(links: Reals, sliding: Flags) -> ChainSolver | None:
+def _with_arm_angle(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
     if len(sliding) != 7 or sliding.any():
         return None
     arm, spare = arm_angle_arm(links), arm_angle_arm(links, frame_along(axes_of(links)[0][0])[0])
-    return None if arm is None or spare is None else ArmAngle(arm, spare)
+    return None if arm is None or spare is None else class_solvers.ArmAngle(arm, spare)
 
 
-def _as_scara(links: Reals, sliding: Flags) -> ChainSolver | None:
+def _as_scara(links: Reals, sliding: Flags) -> class_solvers.ChainSolver | None:
     planar = scara(links, sliding) if len(sliding) == 4 else None
-    return None if planar is None else PlanarFour(planar)
+    return None if planar is None else class_solvers.PlanarFour(planar)
 
 
-CLOSED_FORMS: tuple[Callable[[Reals, Flags], ChainSolver | None], ...] = (
+CLOSED_FORMS: tuple[Callable[[Reals, Flags], class_solvers.ChainSolver | None], ...] = (
     _with_spherical_wrist,
     _with_parallel_axes,
     _with_three_slides,
@@ -162,19 +152,21 @@ CLOSED_FORMS: tuple[Callable[[Reals, Flags], ChainSolver | None], ...] = (
 that does is taken; what none recognises is solved by elimination, with joints held, or with joints added."""
 
 
-def _by_elimination(links: Reals, sliding: Flags) -> ChainSolver:
+def _by_elimination(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
     if not full_rank(links, sliding):
         return Unsolved(6, "dependent")
     if sliding.sum() == 2:
         two = two_slides(links, sliding)
-        return Unsolved(6) if two is None else General(partial(solve_two_slides, two), "six_two_prismatic")
+        return (
+            Unsolved(6) if two is None else class_solvers.General(partial(solve_two_slides, two), "six_two_prismatic")
+        )
     arm = prepared(links, sliding)
     if not arm.readings:
         return Unsolved(6)
     by_elimination = partial(solve_six_revolute, arm)
     if not arm.clear and (with_wrist := slide_and_wrist(links, sliding)) is not None:
-        return General(partial(solve_slide_and_wrist, with_wrist, by_elimination), "six_one_prismatic")
-    return General(by_elimination, "six_one_prismatic" if sliding.any() else "general_six")
+        return class_solvers.General(partial(solve_slide_and_wrist, with_wrist, by_elimination), "six_one_prismatic")
+    return class_solvers.General(by_elimination, "six_one_prismatic" if sliding.any() else "general_six")
 
 
 def full_rank(links: Reals, sliding: Flags, at_rest: tuple[int, ...] = ()) -> bool:
@@ -208,11 +200,11 @@ def held(links: Reals, sliding: Flags, joint: int, value: float) -> tuple[Reals,
     return np.concatenate([links[:joint], step[None], links[joint + 2 :]]), np.delete(sliding, joint)
 
 
-def _locked(links: Reals, sliding: Flags) -> ChainSolver:
+def _locked(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
     """Of the joints that can be held, one at an end if there is any (then the rest is one chain for all values), and
     that which leaves the class easiest to solve; a sliding one before others."""
     n = len(sliding)
-    best: tuple[tuple[int, int, int], int, ChainSolver] | None = None
+    best: tuple[tuple[int, int, int], int, class_solvers.ChainSolver] | None = None
     for joint in (*(j for j in (0, n - 1) if sliding[j]), n - 1, 0, *range(1, n - 1)):
         if best is not None and 0 < joint < n - 1:
             break
@@ -231,18 +223,20 @@ def _locked(links: Reals, sliding: Flags) -> ChainSolver:
     if best is None or isinstance(best[2], Unsolved):
         return Unsolved(n, "unsolved" if full_rank(links, sliding) else "dependent")
     _, joint, rest = best
-    inner = tuple(Redundancy(p.joint + (p.joint >= joint), p.code) if p.joint >= 0 else p for p in rest.parameters)
-    parameters = (Redundancy(joint, "locked_joint"), *inner)
+    inner = tuple(
+        class_solvers.Redundancy(p.joint + (p.joint >= joint), p.code) if p.joint >= 0 else p for p in rest.parameters
+    )
+    parameters = (class_solvers.Redundancy(joint, "locked_joint"), *inner)
     at_end = joint in (0, n - 1)
     return LockedJoint(links, sliding, joint, rest if at_end else None, "redundant", rest.slots, parameters)
 
 
-def _completed(links: Reals, sliding: Flags) -> ChainSolver:
+def _completed(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
     """The chain with joints at the tool, or before its last joint, that make it a chain of six."""
     n = len(sliding)
     if not full_rank(links, sliding):
         return Unsolved(n, "dependent")
-    best: tuple[int, ChainSolver] | None = None
+    best: tuple[int, class_solvers.ChainSolver] | None = None
     for code, places, candidate in _completions(links, n):
         more = np.zeros(6, dtype=bool)
         more[[j for j in range(6) if j not in places]] = sliding
@@ -256,15 +250,15 @@ def _completed(links: Reals, sliding: Flags) -> ChainSolver:
         if best is not None and code == "planar_wrist" and places == tuple(range(n, 6)):
             break  # made for any chain, and needed by those alone that nothing else completes
         if best is None or (code == best[1].code and place < best[0]):
-            best = (place, Completed(rest, places, code))
+            best = (place, class_solvers.Completed(rest, places, code))
     return Unsolved(n) if best is None else best[1]
 
 
-def _completions(links: Reals, n: int) -> list[tuple[ArmClassCode, tuple[int, ...], Reals]]:
+def _completions(links: Reals, n: int) -> list[tuple[class_solvers.ArmClassCode, tuple[int, ...], Reals]]:
     """Code, places of the added joints, and links (7, 4, 4) with them; the last is made for any chain."""
     eye = np.eye(4)
     axes, _ = axes_of(links)
-    found: list[tuple[ArmClassCode, tuple[int, ...], Reals]] = []
+    found: list[tuple[class_solvers.ArmClassCode, tuple[int, ...], Reals]] = []
     if n == 5:
         found.append(("free_roll", (5,), np.concatenate([links, eye[None]])))
         across = np.cross(axes[3], axes[4])
@@ -340,7 +334,7 @@ class AxisPair:
 class ArmClass:
     """An arm's class, its number of slots, and neighbouring axes that are parallel or meet nearly, but not quite."""
 
-    code: ArmClassCode
+    code: class_solvers.ArmClassCode
     slots: int
     nearly_parallel: tuple[AxisPair, ...]
     nearly_meeting: tuple[AxisPair, ...]

@@ -16,17 +16,7 @@ import typer
 from er3a.errors import Er3aError
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.formats.mesh_file import Unit
-from er3a.pipeline.commands.options import (
-    ROBOT_FILES,
-    AnyRobot,
-    AsJson,
-    Split,
-    Xacro,
-    app,
-    given_files,
-    print_json,
-    print_note,
-)
+from er3a.pipeline.commands import options
 from er3a.pipeline.messages.language import LANGUAGES, using
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
@@ -44,7 +34,7 @@ class FixedPlacement(StrEnum):
     TOOL = "tool"
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def import_urdf(
     file: Annotated[Path, typer.Argument(help="a URDF of a serial arm, or xacro")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
@@ -55,9 +45,9 @@ def import_urdf(
         Path | None, typer.Option(help="also write what the URDF says as a reference set: a new folder")
     ] = None,
     snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
-    split: Split = False,
-    xacro: Xacro = None,
-    as_json: AsJson = False,
+    split: options.Split = False,
+    xacro: options.Xacro = None,
+    as_json: options.AsJson = False,
 ):
     """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
     from er3a.files.arm_file import write_urdf_references
@@ -75,9 +65,9 @@ def import_urdf(
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(imported.robot.replace(name=output.stem), output)
     for note in imported.notes:
-        print_note(note)
+        options.print_note(note)
     if as_json:
-        print_json(
+        options.print_json(
             {"output": str(output), "misfit_mm": imported.misfit_m * 1000, "notes": imported.notes}
             | ({"references": str(references)} if references else {})
         )
@@ -89,9 +79,9 @@ def import_urdf(
         )
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def export_urdf(
-    robot: AnyRobot,
+    robot: options.AnyRobot,
     output: Annotated[Path, typer.Option(help="the URDF to write")],
     srdf: Annotated[Path | None, typer.Option(help="also write what MoveIt needs: pairs of links not to check")] = None,
 ):
@@ -106,13 +96,13 @@ def export_urdf(
     if srdf is not None:
         texts[srdf] = export_srdf(arm)
         for pair in pairs_not_checked(arm):
-            print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
+            options.print_note(f"{srdf}: {pair} overlap where no arm can; their shapes are in error, not checked")
     for file, text in texts.items():
         write_atomically(file, partial(Path.write_text, data=text, encoding="utf-8"))
         print(f"{file}: written")
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def import_calibration(
     file: Annotated[Path, typer.Argument(help="a Universal Robots calibration.conf, or extract_calibration's YAML")],
     robot: Annotated[str, typer.Option(help="the arm's nominal table: a robot's name or file")],
@@ -128,14 +118,14 @@ def import_calibration(
     print(f"{output}: written")
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def mesh(
     file: Annotated[Path, typer.Argument(help="a closed mesh: STL, OBJ, DAE or GLB")],
     unit: Annotated[Unit, typer.Option(help="of the mesh's lengths: m or mm")],
     output: Annotated[Path, typer.Option(help="the file of convex pieces to write, .json")],
     threshold: Annotated[float, typer.Option(min=0.01, max=1, help="concavity that may be left in a piece")] = 0.05,
     seed: Annotated[int, typer.Option(min=0, help="of the search for cuts")] = 0,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ):
     """Split a mesh of a link, a tool or an obstacle into convex pieces, for robot and scene files."""
     from er3a.files.mesh_import import import_mesh
@@ -145,7 +135,9 @@ def mesh(
     with shown_work(f"{file}: split into convex pieces"):
         found = import_mesh(file, output, unit, threshold, seed)
     if as_json:
-        print_json(found.model_dump(exclude={"pieces_mm"}) | {"output": str(output), "pieces": len(found.pieces_mm)})
+        options.print_json(
+            found.model_dump(exclude={"pieces_mm"}) | {"output": str(output), "pieces": len(found.pieces_mm)}
+        )
         return
     print(f"{output}: written; convex pieces: {len(found.pieces_mm)}, of {found.triangles} triangles")
     print(f"the mesh stands out of them by at most {found.uncovered_mm:.3g} mm, which is added to them as a margin")
@@ -159,10 +151,10 @@ def _print_plan(
     from er3a.pipeline.messages.calibration import plan_lines, plan_record
 
     proposed = plan(arm, rows, count, fixed)
-    print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
+    options.print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
@@ -174,7 +166,7 @@ def calibrate(
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     rrd: Annotated[Path | None, typer.Option(help="also write a recording for the Rerun viewer")] = None,
     words: Annotated[str, typer.Option("--language", help=f"of the page: {' | '.join(LANGUAGES)}")] = "en",
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ):
     """Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot file.
 
@@ -228,7 +220,7 @@ def calibrate(
     if rrd:
         record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
-        print_json({"output": str(output) if output else None, **calibration_record(found, others)})
+        options.print_json({"output": str(output) if output else None, **calibration_record(found, others)})
         return
     print(lines_of(found))
     if others:
@@ -240,11 +232,13 @@ def calibrate(
         print(f"{output}: {without}")
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def hand_eye(
-    file: Annotated[Path, typer.Argument(callback=given_files, help="a calibration set (YAML, kind: hand_eye)")],
+    file: Annotated[
+        Path, typer.Argument(callback=options.given_files, help="a calibration set (YAML, kind: hand_eye)")
+    ],
     robot: Annotated[str | None, typer.Option(help="whose table turns joint angles into poses: a name or file")] = None,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ):
     """Estimate where a camera is, with 95 % intervals, and name the samples and conventions that can't be right.
 
@@ -272,7 +266,7 @@ def hand_eye(
         at(f"{file}: the table's corrections are estimated")
         table = correct_table(found, arm, asked) if arm and asked else None
     if as_json:
-        print_json(hand_eye_record(found, offset, table))
+        options.print_json(hand_eye_record(found, offset, table))
     else:
         left_out = images.boardless if images else ()
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *left_out)]
@@ -281,7 +275,7 @@ def hand_eye(
         raise typer.Exit(1)
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def schema(
     folder: Annotated[Path, typer.Option(help="where the schemas of input files go")] = Path("config"),
     docs: Annotated[Path, typer.Option(help="where the documents about results go")] = Path("docs/results"),

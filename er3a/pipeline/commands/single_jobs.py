@@ -10,31 +10,18 @@ from typing import Annotated
 import typer
 
 from er3a.errors import Er3aError
-from er3a.pipeline.commands.options import (
-    DEFAULT_REPORTS,
-    DEFAULT_RESULTS,
-    DEFAULT_STUDY,
-    JOBS,
-    ROBOT_FILES,
-    Reports,
-    Results,
-    RobotName,
-    StageName,
-    StudyFile,
-    app,
-    print_note,
-)
+from er3a.pipeline.commands import options
 from er3a.pipeline.messages import language
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 
 
-@app.command(rich_help_panel=JOBS)
+@options.app.command(rich_help_panel=options.JOBS)
 def sample(
-    robot: RobotName,
+    robot: options.RobotName,
     part: Annotated[str, typer.Option(help="which part of the blocks, e.g. 2-of-4")],
     output: Annotated[Path, typer.Option(help="the part's file")],
-    study: StudyFile = DEFAULT_STUDY,
+    study: options.StudyFile = options.DEFAULT_STUDY,
 ):
     """Draw one part of the workspace's seeded sample blocks."""
     number, _, count = part.partition("-of-")
@@ -45,15 +32,15 @@ def sample(
     draw(load_study(study), robot, int(number), int(count), output)
 
 
-@app.command(rich_help_panel=JOBS)
+@options.app.command(rich_help_panel=options.JOBS)
 def compute(
-    stage: StageName,
-    robot: RobotName,
+    stage: options.StageName,
+    robot: options.RobotName,
     parts: Annotated[
         list[Path] | None, typer.Argument(help="workspace only: sampled parts; drawn here if absent")
     ] = None,
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    results: options.Results = options.DEFAULT_RESULTS,
 ):
     """Compute a stage's numbers: tables and summary.json."""
     from er3a.pipeline.stages import run
@@ -62,16 +49,16 @@ def compute(
     if parts and not STAGES[stage].sampled:
         raise Er3aError(f"the stage {stage} takes no sampled parts")
     if absent := run.compute(stage, loaded, robot, folder, parts):
-        print_note(f"{robot}, {stage}: {absent}")
+        options.print_note(f"{robot}, {stage}: {absent}")
 
 
-@app.command(rich_help_panel=JOBS)
+@options.app.command(rich_help_panel=options.JOBS)
 def record(
-    stage: StageName,
-    robot: RobotName,
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
-    reports: Reports = DEFAULT_REPORTS,
+    stage: options.StageName,
+    robot: options.RobotName,
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    results: options.Results = options.DEFAULT_RESULTS,
+    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Write a stage's Rerun recording from its results, in English: the viewer has no other letters.
 
@@ -89,17 +76,17 @@ def record(
     if robot in loaded.variants:
         write_empty(picture)
     elif problem := draw_preview(recording, picture):
-        print_note(f"previews of recordings were skipped: {problem}")
+        options.print_note(f"previews of recordings were skipped: {problem}")
     write_checksum(picture)
 
 
-@app.command(rich_help_panel=JOBS)
+@options.app.command(rich_help_panel=options.JOBS)
 def report(
-    stage: StageName,
-    robot: RobotName,
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
-    reports: Reports = DEFAULT_REPORTS,
+    stage: options.StageName,
+    robot: options.RobotName,
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    results: options.Results = options.DEFAULT_RESULTS,
+    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Write a stage's page from its results."""
     from er3a.pipeline.results import write_checksum
@@ -114,12 +101,12 @@ def report(
     write_checksum(page)
 
 
-@app.command(rich_help_panel=ROBOT_FILES)
+@options.app.command(rich_help_panel=options.ROBOT_FILES)
 def teach(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study, or a table or URDF")],
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
-    reports: Reports = DEFAULT_REPORTS,
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    results: options.Results = options.DEFAULT_RESULTS,
+    reports: options.Reports = options.DEFAULT_REPORTS,
     output: Annotated[Path | None, typer.Option(help="the page, for a file; else NAME.html")] = None,
 ):
     """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all IK solutions of it, in one page.
@@ -150,15 +137,19 @@ def _teach_file(source: str, page: Path) -> None:
 
     arm = read_arm(source)
     for note in arm.notes:
-        print_note(note)
+        options.print_note(note)
     provenance = Provenance((Input(source, sha256(Path(source)), {}),), code_digest(__name__))
     command = shlex.join(["er3a", "teach", source, "--output", str(page)])
     write_panel(arm.robot, page, command=command, provenance=provenance)
     print(f"{page}: written")
 
 
-@app.command(rich_help_panel=JOBS)
-def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, reports: Reports = DEFAULT_REPORTS):
+@options.app.command(rich_help_panel=options.JOBS)
+def index(
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    results: options.Results = options.DEFAULT_RESULTS,
+    reports: options.Reports = options.DEFAULT_REPORTS,
+):
     """Write the pages over all robots and stages: the index and the comparison of two robots."""
     from er3a.pipeline.results import OVERALL, write_checksum
     from er3a.pipeline.viewing.figures import house_style
@@ -173,11 +164,11 @@ def index(study: StudyFile = DEFAULT_STUDY, results: Results = DEFAULT_RESULTS, 
             write_checksum(reports / page)
 
 
-@app.command(rich_help_panel=JOBS)
+@options.app.command(rich_help_panel=options.JOBS)
 def article(
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
-    reports: Reports = DEFAULT_REPORTS,
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    results: options.Results = options.DEFAULT_RESULTS,
+    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Write the page on the article from results; `er3a run --study config/article.yaml` computes these too."""
     from er3a.pipeline.article.article_page import write_article

@@ -13,25 +13,7 @@ import typer
 
 from er3a.errors import Er3aError
 from er3a.files.dh_table import AngleUnit, LengthUnit
-from er3a.pipeline.commands.options import (
-    DEFAULT_REPORTS,
-    DEFAULT_RESULTS,
-    DEFAULT_STUDY,
-    FIRST,
-    AsJson,
-    FailOn,
-    Reports,
-    Results,
-    SomeRobot,
-    Split,
-    StudyFile,
-    Xacro,
-    app,
-    given_files,
-    print_error,
-    print_json,
-    print_note,
-)
+from er3a.pipeline.commands import options
 from er3a.pipeline.messages import language
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.study import load_study
@@ -41,15 +23,15 @@ if TYPE_CHECKING:
     from er3a.pipeline.verdicts import StageVerdict
 
 
-@app.command(rich_help_panel=FIRST)
+@options.app.command(rich_help_panel=options.FIRST)
 def new(
     folder: Annotated[Path, typer.Argument(help="where the study is written; no file that is there is touched")],
     *,
     urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF or xacro")] = None,
-    xacro: Xacro = None,
+    xacro: options.Xacro = None,
     base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
     tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
-    split: Split = False,
+    split: options.Split = False,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, by the name or the file of a robot of er3a")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
@@ -70,7 +52,7 @@ def new(
         at(f"{folder}: targets and paths that the arm can do are looked for")
         written = write_study(arm, folder)
     for note in (*arm.notes, *written.missing):
-        print_note(note)
+        options.print_note(note)
     for file in written.files:
         print(f"{file}: written")
     print(f"Next: cd {shlex.quote(str(folder))} && er3a run")
@@ -78,13 +60,13 @@ def new(
         typer.secho(f"WARNING: {shortcoming}", fg="red", bold=True, err=True)
 
 
-@app.command(rich_help_panel=FIRST)
+@options.app.command(rich_help_panel=options.FIRST)
 def check(
     files: Annotated[
         list[Path],
-        typer.Argument(callback=given_files, help="robot, study, target, path, scene or reference files"),
+        typer.Argument(callback=options.given_files, help="robot, study, target, path, scene or reference files"),
     ],
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ):
     """Check input files and say of each what it is, or what is wrong with it."""
     from er3a.files.robot_library import load_robot
@@ -95,7 +77,7 @@ def check(
         try:
             kind = check_file(file)
         except Er3aError as error:
-            print_error(error)
+            options.print_error(error)
             parts = {key: getattr(error, key, None) for key in ("field", "problem", "remedy")}
             found.append({"file": str(file), "in_order": False, **parts})
             continue
@@ -106,35 +88,35 @@ def check(
             for stage, form in forms.items():
                 print(f"  {stage}: {form}")
     if as_json:
-        print_json(found)
+        options.print_json(found)
     if not all(each["in_order"] for each in found):
         raise typer.Exit(2)
 
 
-@app.command(rich_help_panel=FIRST, context_settings={"ignore_unknown_options": True})
+@options.app.command(rich_help_panel=options.FIRST, context_settings={"ignore_unknown_options": True})
 def run(
     words: Annotated[
         list[str] | None, typer.Argument(metavar="[SNAKEMAKE]...", help="files to make, and options of Snakemake")
     ] = None,
-    study: StudyFile = DEFAULT_STUDY,
-    fail_on: Annotated[FailOn | None, typer.Option(help="exit code 1 for verdicts from this one on")] = None,
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for verdicts from this one on")] = None,
 ):
     """Carry out the study of this folder; what is done already is not done again."""
     from er3a.pipeline.run_study import run_study
     from er3a.pipeline.verdicts import read_verdicts
 
-    if not run_study(study, DEFAULT_RESULTS, DEFAULT_REPORTS, words or []):
+    if not run_study(study, options.DEFAULT_RESULTS, options.DEFAULT_REPORTS, words or []):
         raise typer.Exit(2)
     if fail_on:
-        _end_with_findings(read_verdicts(load_study(study), DEFAULT_RESULTS), fail_on)
+        _end_with_findings(read_verdicts(load_study(study), options.DEFAULT_RESULTS), fail_on)
 
 
-@app.command(rich_help_panel=FIRST)
+@options.app.command(rich_help_panel=options.FIRST)
 def verdicts(
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
-    fail_on: Annotated[FailOn | None, typer.Option(help="exit code 1 for verdicts from this one on")] = None,
-    as_json: AsJson = False,
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    results: options.Results = options.DEFAULT_RESULTS,
+    fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for verdicts from this one on")] = None,
+    as_json: options.AsJson = False,
 ):
     """Say what a finished study came to: the verdict of each stage of each robot."""
     from rich import box
@@ -146,7 +128,7 @@ def verdicts(
 
     found = read_verdicts(load_study(study), results)
     if as_json:
-        print_json([asdict(verdict) for verdict in found])
+        options.print_json([asdict(verdict) for verdict in found])
     else:
         columns = ("robot", "stage", "verdict", Column("finding", overflow="fold"))
         table = Table(*columns, box=box.SIMPLE, padding=0)
@@ -158,27 +140,27 @@ def verdicts(
         _end_with_findings(found, fail_on)
 
 
-def _end_with_findings(found: Sequence[StageVerdict], level: FailOn) -> None:
+def _end_with_findings(found: Sequence[StageVerdict], level: options.FailOn) -> None:
     """Name the findings at a level, and end with 1 if there are any."""
     from er3a.pipeline.verdicts import NOT_EXAMINED
 
     counted = [verdict for verdict in found if verdict.counts(level.value)]
     if unknown := sum(verdict.status == NOT_EXAMINED for verdict in found):
-        print_note(f"not examined, and neither passed nor failed: {unknown} of {len(found)} stages")
+        options.print_note(f"not examined, and neither passed nor failed: {unknown} of {len(found)} stages")
     if shown := [f"{verdict.robot}, {verdict.stage}" for verdict in found if verdict.is_demonstration]:
-        print_note(f"as expected, and counted apart: {'; '.join(shown)}")
+        options.print_note(f"as expected, and counted apart: {'; '.join(shown)}")
     for verdict in counted:
         status = verdict.status.replace("_", " ")
         expected = f"; expected: {verdict.expected}" if verdict.is_otherwise else ""
-        print_note(f"{verdict.robot}, {verdict.stage} ({status}{expected}): {verdict.text}")
+        options.print_note(f"{verdict.robot}, {verdict.stage} ({status}{expected}): {verdict.text}")
     if counted:
         raise typer.Exit(1)
 
 
-@app.command(rich_help_panel=FIRST)
+@options.app.command(rich_help_panel=options.FIRST)
 def view(
-    robot: SomeRobot = None,
-    reports: Reports = DEFAULT_REPORTS,
+    robot: options.SomeRobot = None,
+    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Open the recordings in the Rerun viewer; where there is no desktop, serve them to a browser."""
     from er3a.pipeline.results import check_checksum
@@ -197,13 +179,13 @@ def view(
     raise typer.Exit(done.returncode)
 
 
-@app.command(rich_help_panel=FIRST)
+@options.app.command(rich_help_panel=options.FIRST)
 def diff(
     old: Annotated[Path, typer.Argument(help="a results folder")],
     new: Annotated[Path, typer.Argument(help="another results folder")],
     output: Annotated[Path | None, typer.Option(help="also write them as a page")] = None,
     words: Annotated[str, typer.Option("--language", help=" | ".join(language.LANGUAGES))] = "en",
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ):
     """Compare two results folders: verdicts, key figures and tables that moved. Exit code 1 if anything differs."""
     from rich import box
@@ -217,7 +199,7 @@ def diff(
     language.use(words)
     found = changes(old, new)
     if as_json:
-        print_json([asdict(change) for change in found])
+        options.print_json([asdict(change) for change in found])
     else:
         table = Table(*(Column(language.tr(column), overflow="fold") for column in COLUMNS), box=box.SIMPLE, padding=0)
         for change in found:
@@ -229,12 +211,12 @@ def diff(
         raise typer.Exit(1)
 
 
-@app.command(rich_help_panel=FIRST)
+@options.app.command(rich_help_panel=options.FIRST)
 def archive(
     output: Annotated[Path, typer.Option(help="the zip to write")] = Path("er3a-study.zip"),
-    study: StudyFile = DEFAULT_STUDY,
-    results: Results = DEFAULT_RESULTS,
-    reports: Reports = DEFAULT_REPORTS,
+    study: options.StudyFile = options.DEFAULT_STUDY,
+    results: options.Results = options.DEFAULT_RESULTS,
+    reports: options.Reports = options.DEFAULT_REPORTS,
 ):
     """Pack a finished study into one zip with RO-Crate metadata."""
     from er3a.pipeline.archive import archive as pack

@@ -262,22 +262,8 @@ def _mm(length: float) -> str:
 
 
 @say.register
-def _(found: MovesLess) -> str:
-    return say_as(found, other=_next_best(found))
-
-
-@say.register
-def _(found: MovesLessTogether) -> str:
-    return say_as(found, other=_next_best(found))
-
-
-@say.register
-def _(found: LowerBranchNumber) -> str:
-    return say_as(found, other=_next_best(found))
-
-
-def _next_best(found: MovesLess | MovesLessTogether | LowerBranchNumber) -> str:
-    return sentence("next_best", branch=say(found.next_best))
+def _(found: MovesLess | MovesLessTogether | LowerBranchNumber) -> str:
+    return say_as(found, other=sentence("next_best", branch=say(found.next_best)))
 
 
 @say.register

@@ -83,12 +83,7 @@ def unit_of(slides: bool) -> str:
 
 
 @say.register
-def _(found: TooFast) -> str:
-    return say_as(found, unit=unit_of(found.slides))
-
-
-@say.register
-def _(found: TooFastIfAssumed) -> str:
+def _(found: TooFast | TooFastIfAssumed) -> str:
     return say_as(found, unit=unit_of(found.slides))
 
 

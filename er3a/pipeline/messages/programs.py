@@ -11,7 +11,7 @@ import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
 from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
-from er3a.pipeline.messages.kinematics import SINGULARITIES, branch_word
+from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.planning import unit_of
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
@@ -366,10 +366,6 @@ def level_word(level: Level) -> str:
     return word("program_level", LEVELS, level)
 
 
-def _type(kind: EventType) -> str:
-    return word("singularity", SINGULARITIES, kind)
-
-
 @say.register
 def _(found: found_in.TargetNotGiven) -> str:
     reason = word("target_reason", REASONS, found.reason)
@@ -392,13 +388,19 @@ def _(found: found_in.StretchOutOfReach) -> str:
 
 
 @say.register
-def _(found: found_in.ConfigurationEnds) -> str:
+def _(
+    found: found_in.ConfigurationEnds
+    | found_in.FasterThanAssumed
+    | found_in.AcceleratesMoreThanAssumed
+    | found_in.ArrivesOtherwise
+    | found_in.LoopComesBackOtherwise,
+) -> str:
     return say_as(found, unit=unit_of(found.slides))
 
 
 @say.register
 def _(found: found_in.MeetsSingularity) -> str:
-    parts = {"type": _type(found.type), "at": found.at_mm}
+    parts = {"type": singularity_word(found.type), "at": found.at_mm}
     if found.bounded:
         return sentence("meets_singularity.bounded", **parts)
     return say_as(found, **parts)
@@ -406,30 +408,15 @@ def _(found: found_in.MeetsSingularity) -> str:
 
 @say.register
 def _(found: found_in.PassesSingularity) -> str:
-    parts = {"type": _type(found.type), "at": found.at_mm, "distance": found.distance}
+    parts = {"type": singularity_word(found.type), "at": found.at_mm, "distance": found.distance}
     if found.type == "shoulder":
         return sentence("passes_singularity.mm", **parts)
     return say_as(found, **parts)
 
 
 @say.register
-def _(found: found_in.FasterThanAssumed) -> str:
-    return say_as(found, unit=unit_of(found.slides))
-
-
-@say.register
-def _(found: found_in.AcceleratesMoreThanAssumed) -> str:
-    return say_as(found, unit=unit_of(found.slides))
-
-
-@say.register
 def _(found: found_in.ConfigurationChanges) -> str:
     return say_as(found, before=branch_word(found.before), after=branch_word(found.after))
-
-
-@say.register
-def _(found: found_in.ArrivesOtherwise) -> str:
-    return say_as(found, unit=unit_of(found.slides))
 
 
 @say.register
@@ -473,11 +460,6 @@ def _(found: found_in.RestNotChecked) -> str:
     if not found.targets:
         return say_as(found)
     return sentence("rest_not_checked.targets", checked=found.checked, targets=found.targets)
-
-
-@say.register
-def _(found: found_in.LoopComesBackOtherwise) -> str:
-    return say_as(found, unit=unit_of(found.slides))
 
 
 @say.register

@@ -6,9 +6,8 @@ import math
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
-from er3a.kinematics.singularity import EventType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
-from er3a.pipeline.messages.kinematics import SINGULARITIES
+from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.messages.language import N_, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
@@ -161,15 +160,10 @@ def kind_word(kind: PathKind) -> str:
     return word("trajectory.kind", KINDS, kind)
 
 
-def type_word(kind: EventType) -> str:
-    """A type of singularity."""
-    return word("singularity", SINGULARITIES, kind)
-
-
 def event_word(event: Singularity) -> str:
     """A singularity's type, or the axes that become dependent where the field has no name for it."""
     if event.type != "dependent_axes":
-        return type_word(event.type)
+        return singularity_word(event.type)
     return sentence("dependent_axes", axes=", ".join(map(str, event.axes)))
 
 

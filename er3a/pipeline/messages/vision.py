@@ -277,12 +277,7 @@ def _(found: GraspCollides) -> str:
 
 
 @say.register
-def _(found: LineLeaves) -> str:
-    return say_as(found, part=word("vision.part", PARTS, found.part))
-
-
-@say.register
-def _(found: LineUnproven) -> str:
+def _(found: LineLeaves | LineUnproven) -> str:
     return say_as(found, part=word("vision.part", PARTS, found.part))
 
 
@@ -299,22 +294,7 @@ def _(found: RotationMismatch) -> str:
 
 
 @say.register
-def _(found: QuaternionOrder) -> str:
-    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
-
-
-@say.register
-def _(found: AngleOrder) -> str:
-    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
-
-
-@say.register
-def _(found: TransposedRotations) -> str:
-    return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
-
-
-@say.register
-def _(found: PositionAxes) -> str:
+def _(found: QuaternionOrder | AngleOrder | TransposedRotations | PositionAxes) -> str:
     return say_as(found, stream=word("vision.stream", STREAMS, found.stream))
 
 

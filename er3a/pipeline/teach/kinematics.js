@@ -90,17 +90,17 @@ export const scaledJacobian = (table, T, length) =>
   jacobian(table, T).map((entries, j) => entries.map((value, r) => value * (table.slides[j] ? length : 1) / (r < 3 ? length : 1)));
 
 /**
- * Signed distances from the three singular sets of a wrist-partitioned arm [2]: `wrist` (rad, axes 4 and 6 in line),
- * `elbow` (rad, arm stretched or folded), `shoulder` (m, wrist centre in the plane of axes 1 and 2).
+ * Signed distances from the three singular sets [2], given an arm's `singular_sets`: `wrist` (rad, axes 4 and 6
+ * parallel), `elbow` (rad, arm stretched or folded), `shoulder` (m, wrist centre in the plane of axes 1 and 2).
  */
-export function determinantFactors(T, wristInTool) {
+export function determinantFactors(T, { wrist_in_tool: wristInTool, to_axis_4: toAxis4 }) {
   const axis = (k) => column(T[k - 1], 2);
   const point = (k) => column(T[k - 1], 3);
   const wrist = add(column(T[6], 3), turned(T[6], wristInTool));
   const sideways = unit(cross(axis(1), axis(2)));
   return {
     wrist: angleShortOfLine(axis(4), axis(6), axis(5)),
-    elbow: angleShortOfLine(subtract(point(3), point(2)), subtract(wrist, point(3)), axis(2)),
+    elbow: angleShortOfLine(subtract(point(3), point(2)), subtract(toAxis4 ? point(4) : wrist, point(3)), axis(2)),
     shoulder: dot(sideways, subtract(wrist, point(1))),
   };
 }

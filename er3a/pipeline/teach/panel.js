@@ -200,7 +200,7 @@ function frame(now) {
   const T = frames(table, links, q);
   view.show(q, ghost, showRow(), clearance.show(T), byId("looks")?.value);
   showPose(T.at(-1));
-  showMeasures(data, arm, T);
+  showMeasures(data, T);
   if (!listed) findSolutions(T.at(-1), now);
 }
 

@@ -13,10 +13,9 @@ from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
-from er3a.files.scene_file import load_scene
-from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length
+from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length, wrist_and_forearm
 from er3a.kinematics.solutions import branch_labels
-from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing
+from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing, has_branches
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import body_word
 from er3a.pipeline.messages.kinematics import branch_word
@@ -172,16 +171,16 @@ WORDS: dict[str, Any] = {
     "states": {"clear": N_("clear"), "near": N_("near"), "at": N_("singular")},
     "clear": N_("No singularity is near."),
     "near": {
-        "wrist": N_("Near the wrist singularity: axes 4 and 6 are {distance} from collinear."),
+        "wrist": N_("Near the wrist singularity: axes 4 and 6 are {distance} from parallel."),
         "elbow": N_("Near the elbow singularity: the arm is {distance} from straight or folded."),
         "shoulder": N_("Near the shoulder singularity: the wrist centre is {distance} from the plane of axes 1 and 2."),
     },
     "at": {
         "wrist": N_(
-            "At the wrist singularity: axes 4 and 6 are collinear, so J4 and J6 turn the tool about the same line."
+            "At the wrist singularity: axes 4 and 6 are parallel, so J6 adds nothing to what the other joints do."
         ),
         "elbow": N_(
-            "At the elbow singularity: the arm is straight or folded, so the wrist centre can't move along the arm."
+            "At the elbow singularity: the arm is straight or folded, so the forearm's end can't move along the arm."
         ),
         "shoulder": N_(
             "At the shoulder singularity: the wrist centre is in the plane of axes 1 and 2, where no joint moves it "
@@ -265,13 +264,12 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
     validated = results / name / "validation"
     first_caveat = caveat(read_status(validated) if (validated / SUMMARY).exists() else "not_computed")
     near = near_singular(study.section(TrajectorySettings))
-    scene_file = study.scene(name, "trajectory")
     inputs = input_records(study.inputs(name, "teach"))
     write_panel(
         study.robot(name),
         output,
         near=near,
-        scene=load_scene(scene_file) if scene_file else None,
+        scene=study.scene(name, "trajectory"),
         robot_pages=study.pages(name),
         first_caveat=first_caveat,
         command=run_command(study, f"{name}/teach.html"),
@@ -337,6 +335,8 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
         "size": drawn_size(robot),
         **drawn_shapes(robot),
         "characteristic_length": characteristic_length(robot),
+        "length_is": "links" if closed_form_missing(robot) else "wrist",
+        "singular_sets": singular_sets(robot),
         "no_closed_form": say(missing) if missing else None,
         "branch_labels": labels,
         "near": {**thresholds, "value": near.smallest, "limit": NEAR_LIMIT, "slide": NEAR_END},
@@ -345,6 +345,14 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
         "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
         "words": _translated(WORDS),
     }
+
+
+def singular_sets(robot: Robot) -> dict[str, Any] | None:
+    """What the distances from the three singular sets take of an arm, SI; None for one without these sets."""
+    if not has_branches(robot):
+        return None
+    wrist, to_axis_4 = wrist_and_forearm(robot)
+    return {"wrist_in_tool": wrist.tolist(), "to_axis_4": to_axis_4}
 
 
 def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:

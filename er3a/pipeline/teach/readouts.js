@@ -30,21 +30,21 @@ export function showPose(T) {
 }
 
 /** Writes the measures at frames `T`, and the warning that names what is near. */
-export function showMeasures(data, arm, T) {
+export function showMeasures(data, T) {
   const { words, near } = data;
   const measures = conditioning(data.table, T, data.characteristic_length);
   const singular = measures.conditionNumber === Infinity; // what is left of the values then is rounding
   write(byId("manipulability"), significant(singular ? 0 : measures.manipulability));
   write(byId("smallest"), significant(singular ? 0 : measures.smallestSingularValue));
   write(byId("condition"), significant(measures.conditionNumber));
-  if (!arm) {
+  if (!data.singular_sets) {
     const value = measures.smallestSingularValue;
     if (value < near.value) warn("near", fill(words.near_unnamed, { value: significant(value) }));
     else warn("clear", words.clear);
     return;
   }
-  const factors = determinantFactors(T, arm.wristInTool);
-  const full = { wrist: Math.PI / 2, elbow: Math.PI / 2, shoulder: arm.reach };
+  const factors = determinantFactors(T, data.singular_sets);
+  const full = { wrist: Math.PI / 2, elbow: Math.PI / 2, shoulder: data.characteristic_length };
   const texts = { at: [], near: [] };
   for (const kind of Object.keys(factors)) {
     const distance = Math.abs(factors[kind]);

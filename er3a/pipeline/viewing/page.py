@@ -314,6 +314,32 @@ def render(
     write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
 
 
+def render_stage(
+    study: Study,
+    stored: Stored[Any],
+    output: Path,
+    *,
+    head: Head | None = None,
+    head_links: Mapping[str, str] | None = None,
+    **context: Any,
+) -> None:
+    """Render the page of a stage of a robot, from the template beside its ``report.py``.
+
+    Parameters
+    ----------
+    head : if it is another than the stage's results give; ``head_links`` : its links, if they give it
+    """
+    name, stage = stored.robot, stored.stage
+    shared = {
+        "head": head or head_of(stored, import_module(STAGES[stage].messages).FIGURES, head_links),
+        "command": run_command(study, f"{name}/{stage}.html"),
+        "robot": study.robot(name),
+        "robot_pages": study.pages(name),
+    }
+    template = _HERE.parent / "stages" / stage / "report.html.j2"
+    render(template, output, stored.results.summary, **shared | context)
+
+
 BRACKETS = re.compile(r"(?<=>)(?<!<code>)([^<>()]{1,40}) \(([^<>()]{1,20})\)(?=</t[hd]>)")
 STOPS = re.compile(r"(</(?:a|code|em|strong)>)\.(?=[\s<])")
 BLANKS = re.compile(

@@ -40,28 +40,6 @@ from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.planning.avoidance import avoidance
-from er3a.planning.avoidance.avoidance import (
-    AT_REST,
-    AccelerationExceeded,
-    Avoidance,
-    BeginsInRegion,
-    BeginsOutOfReach,
-    BranchEnds,
-    EndsOffPath,
-    EndsOutOfReach,
-    NoDampingSuffices,
-    NoOtherBranch,
-    NoSingularRegion,
-    NothingToAvoid,
-    NotPossible,
-    PartlyOutOfReach,
-    PathNotFinished,
-    SingularSegment,
-    SpeedExceeded,
-    Strategy,
-    coarse,
-    singular_segment,
-)
 from er3a.planning.follow import Followed, follow
 from er3a.planning.moves import ToolPath
 from er3a.planning.names import StrategyName
@@ -140,17 +118,17 @@ class BentPath:
         return T
 
 
-def shifted_via(segment: SingularSegment) -> Avoidance | NotPossible:
+def shifted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
     """Bend the path by the smallest shift of the tool point, its orientation kept."""
     return _via(segment, "shift")
 
 
-def tilted_via(segment: SingularSegment) -> Avoidance | NotPossible:
+def tilted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
     """Bend the path by the least tilt of the tool, the tool point kept on its way."""
     return _via(segment, "tilt")
 
 
-def _via(segment: SingularSegment, kind: Kind) -> Avoidance | NotPossible:
+def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance | avoidance.NotPossible:
     if not segment.regions:
         return avoidance.NoSingularRegion()
     if segment.regions[0][0] == 0:
@@ -167,29 +145,29 @@ def _via(segment: SingularSegment, kind: Kind) -> Avoidance | NotPossible:
             if other.regions:
                 continue
             if within(segment.robot, other.q).all():
-                return Avoidance(_carried_out(segment, other))
+                return avoidance.Avoidance(_carried_out(segment, other))
             fallback = fallback or other
     if fallback is None:
         return avoidance.BentPathSingular()
-    return Avoidance(_carried_out(segment, fallback))
+    return avoidance.Avoidance(_carried_out(segment, fallback))
 
 
-def _followed(segment: SingularSegment, path: BentPath) -> Iterator[SingularSegment]:
+def _followed(segment: avoidance.SingularSegment, path: BentPath) -> Iterator[avoidance.SingularSegment]:
     """The bent path from the path's own first joints, then from the start pose with other turns of the joints."""
-    t = coarse(segment.t)
+    t = avoidance.coarse(segment.t)
     starts: tuple[dict[str, Any], ...] = ({"q_start": segment.q[0]}, {"start_slot": int(segment.followed.slot[0])})
     for start in starts:
         followed = follow(segment.robot, cast(ToolPath, path), t, **start)  # only its joints are asked for
-        yield singular_segment(followed, segment.near, segment.limits)
+        yield avoidance.singular_segment(followed, segment.near, segment.limits)
 
 
-def _carried_out(segment: SingularSegment, other: SingularSegment) -> Timed:
+def _carried_out(segment: avoidance.SingularSegment, other: avoidance.SingularSegment) -> Timed:
     leave = segment.first_joints if segment.fixed_start else other.q[0]
-    turn = [straight(leave, other.q[0], segment.limits)] if np.abs(other.q[0] - leave).max() > AT_REST else []
+    turn = [straight(leave, other.q[0], segment.limits)] if np.abs(other.q[0] - leave).max() > avoidance.AT_REST else []
     return joined([*turn, other.along(0, len(other.t) - 1)])
 
 
-def _bends(segment: SingularSegment, first: int, last: int, kind: Kind) -> list[Bend]:
+def _bends(segment: avoidance.SingularSegment, first: int, last: int, kind: Kind) -> list[Bend]:
     """The smallest bend to either side that clears a region."""
     path, t = segment.followed.line, segment.t
     worst = first + int(np.argmin(segment.near.margin(segment.robot, segment.q[first:last])))
@@ -202,13 +180,15 @@ def _bends(segment: SingularSegment, first: int, last: int, kind: Kind) -> list[
     return [bend for bend in bends if bend is not None]
 
 
-def _nearest_type(segment: SingularSegment, first: int, worst: int) -> SingularityType:
+def _nearest_type(segment: avoidance.SingularSegment, first: int, worst: int) -> SingularityType:
     q = segment.q[worst] if np.isfinite(segment.q[worst, 0]) else segment.q[first - 1]
     factors = determinant_factors(segment.robot, q)
     return TYPES[int(np.argmin(segment.near.ratios(factors)))]
 
 
-def _directions(segment: SingularSegment, slot: int, singular: SingularityType, top: float, kind: Kind) -> list[Reals]:
+def _directions(
+    segment: avoidance.SingularSegment, slot: int, singular: SingularityType, top: float, kind: Kind
+) -> list[Reals]:
     """Unit shifts or tilts (6,) across the path in the plane beside the singularity, to either side."""
     path, length = segment.followed.line, characteristic_length(segment.robot)
     part = slice(0, 3) if kind == "shift" else slice(3, 6)
@@ -240,7 +220,7 @@ def _directions(segment: SingularSegment, slot: int, singular: SingularityType, 
     return directions
 
 
-def _beside(segment: SingularSegment, T: Reals, slot: int, singular: SingularityType) -> Reals:
+def _beside(segment: avoidance.SingularSegment, T: Reals, slot: int, singular: SingularityType) -> Reals:
     """How poses (n, 4, 4) lie beside the singularity: (n, 2) or, for the elbow, (n, 1)."""
     robot = segment.robot
     arm = wrist_partitioned_arm(robot)
@@ -275,7 +255,11 @@ def _moved(pose: Reals, moves: Reals) -> Reals:
 
 
 def _least(
-    segment: SingularSegment, slot: int, singular: SingularityType, span: tuple[float, float, float], direction: Reals
+    segment: avoidance.SingularSegment,
+    slot: int,
+    singular: SingularityType,
+    span: tuple[float, float, float],
+    direction: Reals,
 ) -> Bend | None:
     """The least bend in a direction (6,) that keeps the distance; None if none up to FARTHEST does."""
     path = segment.followed.line
@@ -303,7 +287,7 @@ def _least(
     return bend(high)
 
 
-def _none_far_enough(segment: SingularSegment, kind: Kind) -> NotPossible:
+def _none_far_enough(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.NotPossible:
     if kind == "shift":
         return avoidance.NoShiftKeepsDistance(FARTHEST["shift"] * characteristic_length(segment.robot) * 1000)
     return avoidance.NoTiltKeepsDistance(float(np.degrees(FARTHEST["tilt"])))
@@ -317,13 +301,13 @@ DAMPINGS = np.geomspace(2e-3, 0.5, 9)
 Row = tuple[float, float, float, float]
 
 
-def damped(segment: SingularSegment) -> Avoidance | NotPossible:
+def damped(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
     """Follow the path on its own time law, with the least damping that keeps the joints within what they can do.
 
     Where no damping bounds the accelerations too, it is the least that bounds the speeds.
     """
     if np.isnan(segment.q[0, 0]):
-        return BeginsOutOfReach()
+        return avoidance.BeginsOutOfReach()
     line = segment.followed.line
     t = np.linspace(0.0, line.duration, STEPS + 1)
     T = line.poses(line.progress(t)[0])
@@ -333,12 +317,12 @@ def damped(segment: SingularSegment) -> Avoidance | NotPossible:
     if not held.size:
         held = np.flatnonzero(ratios[:, 0] <= 1.0)
     if not held.size:
-        return NoDampingSuffices()
+        return avoidance.NoDampingSuffices()
     best = runs[int(held[0])]
-    return Avoidance(joined([*segment.begin(), best]))
+    return avoidance.Avoidance(joined([*segment.begin(), best]))
 
 
-def _run(segment: SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
+def _run(segment: avoidance.SingularSegment, t: Reals, T: Reals, damping: float) -> Timed:
     robot = segment.robot
     q = np.empty((len(t), 6))
     q[0] = segment.q[0]
@@ -408,21 +392,21 @@ def _scaled_jacobian(
     return x, y, z
 
 
-def detour(segment: SingularSegment) -> Avoidance | NotPossible:
+def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
     """Follow the path up to the last good pose, move the joints to the next good one, and go on, at every region.
 
     Where the path begins or ends inside a region, its first or last joints take the place of the good pose.
     """
     if not segment.regions:
-        return NoSingularRegion()
+        return avoidance.NoSingularRegion()
     count, at = len(segment.t), 0
     parts: list[Timed] = []
     for first, last in segment.regions:
         before, after = max(first - 1, 0), min(last, count - 1)
         if np.isnan(segment.q[before, 0]):
-            return BeginsOutOfReach()
+            return avoidance.BeginsOutOfReach()
         if np.isnan(segment.q[after, 0]):
-            return EndsOutOfReach()
+            return avoidance.EndsOutOfReach()
         if before > at:
             parts += [*(segment.begin() if at == 0 else []), segment.along(at, before)]
         leave = segment.q[before] if before > 0 else segment.first_joints
@@ -430,13 +414,13 @@ def detour(segment: SingularSegment) -> Avoidance | NotPossible:
         at = after
     if at < count - 1:
         parts.append(segment.along(at, count - 1))
-    return Avoidance(joined(parts), crosses_by_joints=True)
+    return avoidance.Avoidance(joined(parts), crosses_by_joints=True)
 
 
 COARSE = 201
 
 
-def branch(segment: SingularSegment) -> Avoidance | NotPossible:
+def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
     """Change to another branch by a joint move at rest, and follow the rest of the path on it.
 
     A change before the path begins is preferred: where only the tool's pose is given there, the arm may as well begin
@@ -445,7 +429,7 @@ def branch(segment: SingularSegment) -> Avoidance | NotPossible:
     """
     bad = ~(segment.good & within(segment.robot, segment.q))
     if not bad.any():
-        return NothingToAvoid()
+        return avoidance.NothingToAvoid()
     few = np.linspace(0.0, segment.followed.line.duration, COARSE)
     others = [_follow(segment, slot, few) for slot in range(SLOTS) if slot != segment.followed.slot[0]]
     begin = max(int(np.argmax(bad)) - 1, 0)
@@ -457,56 +441,56 @@ def branch(segment: SingularSegment) -> Avoidance | NotPossible:
                 step = other.joints(segment.t[index : index + 1])[0] - leave
                 found.append((float(np.abs(step / segment.limits.speed).max()), int(other.slot[0])))
         for _, slot in sorted(found):
-            times = np.union1d(coarse(segment.t), segment.t[index])
+            times = np.union1d(avoidance.coarse(segment.t), segment.t[index])
             other = _follow(segment, slot, times)
             if other is not None and _keeps_clear(segment, other, segment.t[index]):
                 return _changed(segment, other, index, leave)
-    return NoOtherBranch()
+    return avoidance.NoOtherBranch()
 
 
-def _follow(segment: SingularSegment, slot: int, t: Reals) -> Followed | None:
+def _follow(segment: avoidance.SingularSegment, slot: int, t: Reals) -> Followed | None:
     try:
         return follow(segment.robot, segment.followed.line, t, start_slot=slot)
     except PoseError:
         return None
 
 
-def _keeps_clear(segment: SingularSegment, other: Followed, start: float) -> bool:
+def _keeps_clear(segment: avoidance.SingularSegment, other: Followed, start: float) -> bool:
     rest = other.q[np.searchsorted(other.t, start) :]
     if other.jumps or np.isnan(rest[:, 0]).any() or not within(segment.robot, rest).all():
         return False
     return bool(segment.near.margin(segment.robot, rest).min() >= 1.0)
 
 
-def _changed(segment: SingularSegment, followed: Followed, index: int, leave: Reals) -> Avoidance:
-    other = singular_segment(followed, segment.near, segment.limits)
+def _changed(segment: avoidance.SingularSegment, followed: Followed, index: int, leave: Reals) -> avoidance.Avoidance:
+    other = avoidance.singular_segment(followed, segment.near, segment.limits)
     at = int(np.searchsorted(other.t, segment.t[index]))
     before = [*segment.begin(), segment.along(0, index)] if index > 0 else []
     waits = index == 0 and not segment.fixed_start
     change = [] if waits else [straight(leave, other.q[at], segment.limits)]
-    return Avoidance(joined([*before, *change, other.along(at, len(other.t) - 1)]), crosses_by_joints=True)
+    return avoidance.Avoidance(joined([*before, *change, other.along(at, len(other.t) - 1)]), crosses_by_joints=True)
 
 
-def slow(segment: SingularSegment) -> Avoidance | NotPossible:
+def slow(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
     """Follow the path exactly, as programmed wherever the joints can, slower where they can't."""
     if np.isnan(segment.q[:, 0]).any():
-        return PartlyOutOfReach()
+        return avoidance.PartlyOutOfReach()
     if segment.followed.jumps:
         jump = segment.followed.jumps[0]
-        return BranchEnds(jump.t, jump.joint)
-    return Avoidance(joined([*segment.begin(), segment.along(0, len(segment.t) - 1)]))
+        return avoidance.BranchEnds(jump.t, jump.joint)
+    return avoidance.Avoidance(joined([*segment.begin(), segment.along(0, len(segment.t) - 1)]))
 
 
-def stop(segment: SingularSegment) -> Avoidance | NotPossible:
+def stop(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
     """Follow the path exactly, and come to rest at the last pose that keeps its distance."""
     if not segment.regions:
-        return NoSingularRegion()
+        return avoidance.NoSingularRegion()
     last = segment.regions[0][0] - 1
     if last < 1:
-        return BeginsInRegion()
+        return avoidance.BeginsInRegion()
     motion = joined([*segment.begin(), segment.along(0, last)])
     done = float(segment.followed.line.progress(segment.t[last])[0])
-    return Avoidance(motion, done, crosses_by_joints=True)
+    return avoidance.Avoidance(motion, done, crosses_by_joints=True)
 
 
 POINTS = 2001
@@ -549,7 +533,7 @@ def _points(T: Reals) -> Reals:
     return np.concatenate([T[:, :3, 3] / LENGTH, T[:, :3, :3].reshape(-1, 9) / np.sqrt(2.0)], axis=1)
 
 
-STRATEGIES: dict[StrategyName, Strategy] = {
+STRATEGIES: dict[StrategyName, avoidance.Strategy] = {
     "slow": slow,
     "branch": branch,
     "via_shift": shifted_via,
@@ -563,7 +547,13 @@ ON_PATH = 1e-6, np.radians(1e-4)
 OVER = 1e-6  # relative, by which rounding may exceed a limit
 
 NotUsable = (
-    NotPossible | PathNotFinished | EndsOffPath | LimitsExceeded | SpeedExceeded | AccelerationExceeded | NoWayAround
+    avoidance.NotPossible
+    | avoidance.PathNotFinished
+    | avoidance.EndsOffPath
+    | LimitsExceeded
+    | avoidance.SpeedExceeded
+    | avoidance.AccelerationExceeded
+    | NoWayAround
 )
 
 
@@ -605,7 +595,7 @@ class StrategyResult:
     reasons: tuple[NotUsable, ...] = ()
 
 
-def compare(segment: SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
+def compare(segment: avoidance.SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
     """Try all strategies, or the chosen one."""
     return [_tried(segment, name) for name in STRATEGIES if chosen in (None, name)]
 
@@ -628,12 +618,12 @@ def best(results: Iterable[StrategyResult], meets: bool) -> StrategyResult | Non
     return min(usable)[2] if usable else None
 
 
-def _tried(segment: SingularSegment, name: StrategyName) -> StrategyResult:
+def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyResult:
     try:
         found = STRATEGIES[name](segment)
     except TimingError as error:
         return StrategyResult(name, None, (error.finding,))
-    if not isinstance(found, Avoidance):
+    if not isinstance(found, avoidance.Avoidance):
         return StrategyResult(name, None, (found,))
     robot, motion, line = segment.robot, found.motion, segment.followed.line
     T = forward(robot, motion.q)
@@ -644,16 +634,16 @@ def _tried(segment: SingularSegment, name: StrategyName) -> StrategyResult:
     left = float(np.linalg.norm(T[-1, :3, 3] - last[:3, 3]))
     twisted = 2 * np.arcsin(min(1.0, float(np.linalg.norm(T[-1, :3, :3] - last[:3, :3])) / np.sqrt(8.0)))
     if found.done < 1.0:
-        reasons.append(PathNotFinished(found.done))
+        reasons.append(avoidance.PathNotFinished(found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
-        reasons.append(EndsOffPath(left * 1000, float(np.degrees(twisted))))
+        reasons.append(avoidance.EndsOffPath(left * 1000, float(np.degrees(twisted))))
     worst = np.argmax(np.maximum(motion.q - robot.upper, robot.lower - motion.q).max(axis=1))
     if exceeded := limits_exceeded(robot, motion.q[worst]):
         reasons.append(exceeded)
     if speed > 1 + OVER:
-        reasons.append(SpeedExceeded(speed))
+        reasons.append(avoidance.SpeedExceeded(speed))
     if acceleration > 1 + OVER:
-        reasons.append(AccelerationExceeded(acceleration))
+        reasons.append(avoidance.AccelerationExceeded(acceleration))
     keeps = found.crosses_by_joints or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
     cost = StrategyCost(motion, found.done, distance, angle, speed, acceleration, keeps)
     return StrategyResult(name, cost, tuple(reasons))

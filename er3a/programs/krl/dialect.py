@@ -9,40 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.numerics.arrays import Reals
+from er3a.programs import instructions, syntax
 from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
-from er3a.programs.instructions import (
-    FINE,
-    ArmMotion,
-    Aside,
-    Instruction,
-    JointTarget,
-    MeantSolution,
-    MotionKind,
-    NamedFrame,
-    Output,
-    PoseTarget,
-    Rate,
-    Target,
-    Unknown,
-    UnresolvedTarget,
-    Zone,
-    numbers_of,
-    pose_of,
-)
-from er3a.programs.syntax import (
-    Doing,
-    Expression,
-    Invocation,
-    Move,
-    Record,
-    Unclear,
-    Value,
-    Variable,
-    finite,
-    number,
-    numbers,
-    shown,
-)
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -51,164 +19,174 @@ AXIS_KINDS = ("AXIS", "E6AXIS")
 EXTERNAL_KEYS = ("E1", "E2", "E3", "E4", "E5", "E6")
 SIGN_ZERO = 1e-7  # rad; nearer to 0 a joint's sign says nothing
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
-Frames = tuple[NamedFrame, NamedFrame]
-UNREAD = Unclear("")
+Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
+UNREAD = syntax.Unclear("")
 """The value of a motion's arguments that are more or fewer than it has."""
 
 
-def _has_axes(value: Record) -> bool:
+def _has_axes(value: syntax.Record) -> bool:
     return value.kind in AXIS_KINDS or any(key in AXIS_KEYS for key, _ in value.items)
 
 
-def is_frame(value: Value | None) -> bool:
+def is_frame(value: syntax.Value | None) -> bool:
     """Whether a value has a coordinate of a frame."""
-    return isinstance(value, Record) and any(value.get(key) is not None for key in FRAME_KEYS)
+    return isinstance(value, syntax.Record) and any(value.get(key) is not None for key in FRAME_KEYS)
 
 
-def record_pose(value: Value | None) -> Reals | None:
+def record_pose(value: syntax.Value | None) -> Reals | None:
     """The transform (4, 4) in m of a frame, with 0 for what it leaves out; None for anything else."""
-    if not isinstance(value, Record):
+    if not isinstance(value, syntax.Record):
         return None
-    given = [0.0 if value.get(key) is None else number(value.get(key)) for key in FRAME_KEYS]
+    given = [0.0 if value.get(key) is None else syntax.number(value.get(key)) for key in FRAME_KEYS]
     plain = tuple(each for each in given if each is not None)
-    return pose_of(plain, "kuka") if len(plain) == 6 and finite(plain) else None
+    return instructions.pose_of(plain, "kuka") if len(plain) == 6 and syntax.finite(plain) else None
 
 
-def frame_record(pose: Reals, kind: str = "FRAME") -> Record:
+def frame_record(pose: Reals, kind: str = "FRAME") -> syntax.Record:
     """A transform (4, 4) in m as a frame."""
-    return Record(kind, tuple(zip(FRAME_KEYS, numbers_of(pose, "kuka"))))
+    return syntax.Record(kind, tuple(zip(FRAME_KEYS, instructions.numbers_of(pose, "kuka"))))
 
 
-def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
+def target(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tuple[str, bool]) -> instructions.Target:
     """What a position in a motion means; ``said`` is the line, and whether a relative position is meant by the tool."""
     text = said[0]
-    if isinstance(value, Unclear) and value is not UNREAD:
+    if isinstance(value, syntax.Unclear) and value is not UNREAD:
         return _unresolved(value)
-    if not isinstance(value, Record):
-        return UnresolvedTarget(text, "not_understood")
+    if not isinstance(value, syntax.Record):
+        return instructions.UnresolvedTarget(text, "not_understood")
     if memory.read("$IPO_MODE") == "#TCP":
-        return UnresolvedTarget(text, "external_tool")
+        return instructions.UnresolvedTarget(text, "external_tool")
     if _has_axes(value):
-        return UnresolvedTarget(text, "not_understood") if is_frame(value) else _joints(memory, value, text)
+        return (
+            instructions.UnresolvedTarget(text, "not_understood") if is_frame(value) else _joints(memory, value, text)
+        )
     return _pose(memory, value, frames, text)
 
 
-def relative(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
+def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: tuple[str, bool]) -> instructions.Target:
     """A target given by its difference from where the arm stands."""
     text, in_tool = said
-    if not isinstance(value, Record):
-        if isinstance(value, Unclear) and value is not UNREAD:
+    if not isinstance(value, syntax.Record):
+        if isinstance(value, syntax.Unclear) and value is not UNREAD:
             return _unresolved(value)
-        return UnresolvedTarget(text, "not_understood")
+        return instructions.UnresolvedTarget(text, "not_understood")
     if _has_axes(value):
         change = _joints(memory, value, text, missing=0.0)
-        if memory.here.joints is None or not isinstance(change, JointTarget):
-            return UnresolvedTarget(text, "position_unknown")
-        return JointTarget(memory.here.joints + change.joints)
+        if memory.here.joints is None or not isinstance(change, instructions.JointTarget):
+            return instructions.UnresolvedTarget(text, "position_unknown")
+        return instructions.JointTarget(memory.here.joints + change.joints)
     offset, seen = record_pose(value), memory.here.seen(*frames, memory.cell.flange)
     if offset is None or seen is None:
-        return UnresolvedTarget(text, "position_unknown")
+        return instructions.UnresolvedTarget(text, "position_unknown")
     if in_tool:
-        return PoseTarget(seen @ offset)
+        return instructions.PoseTarget(seen @ offset)
     found = seen.copy()
     found[:3, 3] += offset[:3, 3]
     found[:3, :3] = offset[:3, :3] @ seen[:3, :3]
-    return PoseTarget(found)
+    return instructions.PoseTarget(found)
 
 
-def _unresolved(value: Unclear) -> UnresolvedTarget:
+def _unresolved(value: syntax.Unclear) -> instructions.UnresolvedTarget:
     reason = value.text.upper().lstrip("+-") in NOT_NUMBERS
-    return UnresolvedTarget(value.text, "not_finite" if reason else "undefined")
+    return instructions.UnresolvedTarget(value.text, "not_finite" if reason else "undefined")
 
 
-def _components(value: Record, keys: tuple[str, ...], text: str) -> list[float | None] | UnresolvedTarget:
+def _components(
+    value: syntax.Record, keys: tuple[str, ...], text: str
+) -> list[float | None] | instructions.UnresolvedTarget:
     """Numbers of a record, None for what it leaves out."""
     found: list[float | None] = []
     given = dict(value.items)
     for key in keys:
         part = given.get(key)
-        if isinstance(part, Unclear):
+        if isinstance(part, syntax.Unclear):
             return _unresolved(part)
-        plain = number(part)
+        plain = syntax.number(part)
         if part is not None and plain is None:
-            return UnresolvedTarget(text, "not_understood")
+            return instructions.UnresolvedTarget(text, "not_understood")
         if plain is not None and not math.isfinite(plain):
-            return UnresolvedTarget(text, "not_finite")
+            return instructions.UnresolvedTarget(text, "not_finite")
         found.append(plain)
     return found
 
 
-def _external(value: Record) -> tuple[tuple[str, float], ...]:
+def _external(value: syntax.Record) -> tuple[tuple[str, float], ...]:
     parts = dict(value.items)
-    given = ((key, number(parts[key])) for key in EXTERNAL_KEYS if key in parts)
+    given = ((key, syntax.number(parts[key])) for key in EXTERNAL_KEYS if key in parts)
     return tuple((key, part) for key, part in given if part)
 
 
-def _joints(memory: ProgramMemory, value: Record, text: str, missing: float | None = None) -> Target:
+def _joints(
+    memory: ProgramMemory, value: syntax.Record, text: str, missing: float | None = None
+) -> instructions.Target:
     degrees = _components(value, AXIS_KEYS, text)
-    if isinstance(degrees, UnresolvedTarget):
+    if isinstance(degrees, instructions.UnresolvedTarget):
         return degrees
     count = memory.cell.joints
     if any(degrees[count:]):
-        return UnresolvedTarget(text, "too_many_joints")
+        return instructions.UnresolvedTarget(text, "too_many_joints")
     here = memory.here.joints
     kept = np.full(count, np.nan) if here is None else here
     if missing is not None:
         kept = np.full(count, missing)
     joints = [kept[i] if each is None else math.radians(each) for i, each in enumerate(degrees[:count])]
-    return JointTarget(np.array(joints), _external(value))
+    return instructions.JointTarget(np.array(joints), _external(value))
 
 
-def _pose(memory: ProgramMemory, value: Record, frames: Frames, text: str) -> Target:
+def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str) -> instructions.Target:
     given = _components(value, FRAME_KEYS, text)
-    if isinstance(given, UnresolvedTarget):
+    if isinstance(given, instructions.UnresolvedTarget):
         return given
     if None in given:
         seen = memory.here.seen(*frames, memory.cell.flange)
         if seen is None:
-            return UnresolvedTarget(text, "position_unknown")
-        given = [old if each is None else each for each, old in zip(given, numbers_of(seen, "kuka"))]
+            return instructions.UnresolvedTarget(text, "position_unknown")
+        given = [old if each is None else each for each, old in zip(given, instructions.numbers_of(seen, "kuka"))]
     plain = tuple(each for each in given if each is not None)
-    configuration = tuple((key, part) for key in ("S", "T") if (part := number(value.get(key))) is not None)
+    configuration = tuple((key, part) for key in ("S", "T") if (part := syntax.number(value.get(key))) is not None)
     branch = _branch(dict(configuration).get("T"), memory.cell.joints)
-    return PoseTarget(pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch)
+    return instructions.PoseTarget(
+        instructions.pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch
+    )
 
 
-def _branch(turn: float | None, joints: int) -> MeantSolution | None:
+def _branch(turn: float | None, joints: int) -> instructions.MeantSolution | None:
     """What Turn says of a solution: bit i - 1 is set where axis i is below 0."""
     if turn is None:
         return None
     below = [(int(turn) >> i) & 1 for i in range(joints)]
-    return MeantSolution(np.array([(-np.inf, SIGN_ZERO) if each else (-SIGN_ZERO, np.inf) for each in below]))
+    return instructions.MeantSolution(
+        np.array([(-np.inf, SIGN_ZERO) if each else (-SIGN_ZERO, np.inf) for each in below])
+    )
 
 
-def tool_of(memory: ProgramMemory) -> NamedFrame:
+def tool_of(memory: ProgramMemory) -> instructions.NamedFrame:
     """The tool that is set."""
     return _frame(memory, "$TOOL")
 
 
-def base_of(memory: ProgramMemory) -> NamedFrame:
+def base_of(memory: ProgramMemory) -> instructions.NamedFrame:
     """The base that is set."""
     return _frame(memory, "$BASE")
 
 
-def _frame(memory: ProgramMemory, variable: str) -> NamedFrame:
+def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
     value = memory.read(variable)
     if value is None:
-        return NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base)
+        return instructions.NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
     pose = record_pose(value) if is_frame(value) else None
-    if isinstance(value, Unclear):
+    if isinstance(value, syntax.Unclear):
         name = name or value.text
-    return NamedFrame(name, memory.cell.frames.get(name) if pose is None else pose)
+    return instructions.NamedFrame(name, memory.cell.frames.get(name) if pose is None else pose)
 
 
-def set_by_bas(memory: ProgramMemory, call: Invocation) -> bool:
+def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
     """Carry ``BAS(#COMMAND, value)`` out; False if the command is none that sets anything."""
     values = [memory.value(each) for each in call.arguments if each is not None]
     command = values[0] if values else ""
-    given: Value = values[1] if len(values) > 1 else Unclear("BAS")
+    given: syntax.Value = values[1] if len(values) > 1 else syntax.Unclear("BAS")
     match command:
         case "#INITMOV":
             _initial(memory)
@@ -225,7 +203,7 @@ def set_by_bas(memory: ProgramMemory, call: Invocation) -> bool:
         case "#BASE":
             _number(memory, "$BASE", "BASE_DATA", given)
         case "#EX_BASE":
-            memory.write("$BASE", Unclear("BASE_DATA on an external axis"))
+            memory.write("$BASE", syntax.Unclear("BASE_DATA on an external axis"))
             memory.shared.pop("$BASE%name", None)
         case "#FRAMES":
             _frames(memory)
@@ -253,43 +231,43 @@ def _initial(memory: ProgramMemory) -> None:
     _all_axes(memory, "$ACC_AXIS", 100)
     _all_axes(memory, "$VEL_AXIS", 100)
     _line_acceleration(memory, 100)
-    memory.write("$VEL.CP", memory.read("DEF_VEL_CP") or Unclear("DEF_VEL_CP"))
+    memory.write("$VEL.CP", memory.read("DEF_VEL_CP") or syntax.Unclear("DEF_VEL_CP"))
     for part in ("CPTP", "CDIS", "CVEL", "CORI"):
-        memory.write(f"$APO.{part}", memory.read(f"DEF_APO_{part}") or Unclear(f"DEF_APO_{part}"))
+        memory.write(f"$APO.{part}", memory.read(f"DEF_APO_{part}") or syntax.Unclear(f"DEF_APO_{part}"))
     memory.write("$ORI_TYPE", "#VAR")
     memory.write("$IPO_MODE", "#BASE")
     _number(memory, "$BASE", "BASE_DATA", 0)
     _tool_number(memory, 1)
 
 
-def _field(data: Value | None, name: str, kept_as: str) -> Value:
+def _field(data: syntax.Value | None, name: str, kept_as: str) -> syntax.Value:
     """A field of motion data; unclear where they don't have it."""
-    found = data.get(name) if isinstance(data, Record) else None
-    return Unclear(f"{kept_as}.{name}") if found is None else found
+    found = data.get(name) if isinstance(data, syntax.Record) else None
+    return syntax.Unclear(f"{kept_as}.{name}") if found is None else found
 
 
-def _joint_speed(memory: ProgramMemory, percent: Value) -> None:
-    plain = number(percent)
+def _joint_speed(memory: ProgramMemory, percent: syntax.Value) -> None:
+    plain = syntax.number(percent)
     _all_axes(memory, "$VEL_AXIS", percent if plain is None else min(plain, 100.0))
 
 
-def _line_speed(memory: ProgramMemory, speed: Value) -> None:
-    plain, most = number(speed), number(memory.read("DEF_VEL_CP"))
+def _line_speed(memory: ProgramMemory, speed: syntax.Value) -> None:
+    plain, most = syntax.number(speed), syntax.number(memory.read("DEF_VEL_CP"))
     memory.write("$VEL.CP", speed if plain is None or most is None else min(plain, most))
 
 
-def _line_acceleration(memory: ProgramMemory, percent: Value) -> None:
-    plain, full = number(percent), number(memory.read("DEF_ACC_CP"))
+def _line_acceleration(memory: ProgramMemory, percent: syntax.Value) -> None:
+    plain, full = syntax.number(percent), syntax.number(memory.read("DEF_ACC_CP"))
     if plain is None:
         memory.write("$ACC.CP", percent)
         return
     share = min(plain / 100, 1.0)
-    memory.write("$ACC.CP", Record("", (("share", share),)) if full is None else share * full)
+    memory.write("$ACC.CP", syntax.Record("", (("share", share),)) if full is None else share * full)
 
 
-def keep_setting(memory: ProgramMemory, name: str, expression: Expression) -> None:
+def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression) -> None:
     """One item of a WITH."""
-    if not isinstance(expression, Invocation):
+    if not isinstance(expression, syntax.Invocation):
         value = memory.value(expression)
         if name in ("$VEL_AXIS[1]", "$ACC_AXIS[1]"):
             _all_axes(memory, name[:-3], value)
@@ -298,21 +276,21 @@ def keep_setting(memory: ProgramMemory, name: str, expression: Expression) -> No
             memory.shared.pop(name + "%name", None)
         return
     first = expression.arguments[0] if expression.arguments else None
-    given = Unclear(name) if first is None else memory.value(first)
+    given = syntax.Unclear(name) if first is None else memory.value(first)
     match expression.function:
         case "SVEL_CP":
             memory.write("$VEL.CP", given)
         case "SVEL_JOINT":
             _all_axes(memory, "$VEL_AXIS", given)
-        case "SACC_JOINT" if isinstance(given, Record):
-            _all_axes(memory, "$ACC_AXIS", given.get("ACC") or Unclear(name))
+        case "SACC_JOINT" if isinstance(given, syntax.Record):
+            _all_axes(memory, "$ACC_AXIS", given.get("ACC") or syntax.Unclear(name))
         case "SACC_CP":
             _line_acceleration(memory, _field(given, "ACC", name))
         case "SAPO":
             _zone_data(memory, given, "#CDIS")
         case "SAPO_PTP":
             _zone_data(memory, given, "#CPTP")
-        case "STOOL2" if isinstance(given, Record):
+        case "STOOL2" if isinstance(given, syntax.Record):
             _tool_data(memory, given)
         case "SBASE":
             _number(memory, "$BASE", "BASE_DATA", given)
@@ -320,45 +298,45 @@ def keep_setting(memory: ProgramMemory, name: str, expression: Expression) -> No
             memory.write("$IPO_MODE", given)
         case _:
             if name in ("$TOOL", "$BASE"):
-                memory.write(name, Unclear(f"{expression.function}(...)"))
+                memory.write(name, syntax.Unclear(f"{expression.function}(...)"))
                 memory.shared.pop(name + "%name", None)
 
 
-def _all_axes(memory: ProgramMemory, name: str, value: Value) -> None:
+def _all_axes(memory: ProgramMemory, name: str, value: syntax.Value) -> None:
     for axis in range(1, 7):
         memory.write(f"{name}[{axis}]", value)
 
 
-def _number(memory: ProgramMemory, variable: str, array: str, given: Value) -> None:
+def _number(memory: ProgramMemory, variable: str, array: str, given: syntax.Value) -> None:
     """Set tool or base by its number; 0, and -1 of what was never taught, is the null frame."""
-    plain = number(given)
+    plain = syntax.number(given)
     memory.shared.pop(variable + "%name", None)
     if plain is None:
-        memory.write(variable, Unclear(f"{array}[?]"))
+        memory.write(variable, syntax.Unclear(f"{array}[?]"))
         return
     name = f"{array}[{plain:g}]" if plain > 0 else "$NULLFRAME"
-    memory.write(variable, memory.read(name) or Unclear(name))
+    memory.write(variable, memory.read(name) or syntax.Unclear(name))
     memory.write(variable + "%name", name)
 
 
-def _tool_number(memory: ProgramMemory, given: Value) -> None:
+def _tool_number(memory: ProgramMemory, given: syntax.Value) -> None:
     """Tool and load by their number, as controllers' own bas.src sets both."""
     _number(memory, "$TOOL", "TOOL_DATA", given)
-    memory.write("$LOAD", memory.read(f"LOAD_DATA[{number(given) or 0:g}]") or 0)
+    memory.write("$LOAD", memory.read(f"LOAD_DATA[{syntax.number(given) or 0:g}]") or 0)
 
 
-def load_of(value: Value | None) -> MassBody | str | None:
+def load_of(value: syntax.Value | None) -> MassBody | str | None:
     """What a LOAD says hangs on the flange; None of a mass below 0, which stands for one that is not known.
 
     ``{M kg, CM {X mm, Y, Z, A deg, B, C}, J {X kg m^2, Y, Z}}``: J about the axes of CM, through the centre of mass.
     """
-    if not isinstance(value, Record):
-        return value.text if isinstance(value, Unclear) else None
-    mass, moments = number(value.get("M")), value.get("J")
+    if not isinstance(value, syntax.Record):
+        return value.text if isinstance(value, syntax.Unclear) else None
+    mass, moments = syntax.number(value.get("M")), value.get("J")
     if mass is not None and mass <= 0:
         return None
     centre = record_pose(value.get("CM"))
-    parts = [number(moments.get(key)) for key in "XYZ"] if isinstance(moments, Record) else [0.0] * 3
+    parts = [syntax.number(moments.get(key)) for key in "XYZ"] if isinstance(moments, syntax.Record) else [0.0] * 3
     given = [each for each in parts if each is not None]
     if mass is None or not math.isfinite(mass) or centre is None or len(given) < 3:
         return "LOAD"
@@ -366,39 +344,39 @@ def load_of(value: Value | None) -> MassBody | str | None:
     return moved(MassBody(mass, inertia=(x, y, z, 0.0, 0.0, 0.0)), centre)
 
 
-def _tool_data(memory: ProgramMemory, data: Record) -> None:
+def _tool_data(memory: ProgramMemory, data: syntax.Record) -> None:
     _tool_number(memory, data.get("TOOL_NO") or 0)
     memory.write("$IPO_MODE", data.get("IPO_FRAME") or "#BASE")
 
 
 def _frames(memory: ProgramMemory) -> None:
     data = memory.read("FDAT_ACT")
-    if isinstance(data, Record):
+    if isinstance(data, syntax.Record):
         _tool_data(memory, data)
         _number(memory, "$BASE", "BASE_DATA", data.get("BASE_NO") or 0)
-    elif isinstance(data, Unclear):
+    elif isinstance(data, syntax.Unclear):
         for variable in ("$TOOL", "$BASE"):
-            memory.write(variable, Unclear(f"{variable[1:]} of {data.text}"))
+            memory.write(variable, syntax.Unclear(f"{variable[1:]} of {data.text}"))
             memory.shared.pop(variable + "%name", None)
 
 
-def _joint_data(memory: ProgramMemory, data: Value | None) -> None:
-    if isinstance(data, Record):
-        _all_axes(memory, "$ACC_AXIS", data.get("ACC") or Unclear("ACC"))
+def _joint_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
+    if isinstance(data, syntax.Record):
+        _all_axes(memory, "$ACC_AXIS", data.get("ACC") or syntax.Unclear("ACC"))
         _zone_data(memory, data, "#CPTP")
 
 
-def _line_data(memory: ProgramMemory, data: Value | None) -> None:
-    if isinstance(data, Record):
+def _line_data(memory: ProgramMemory, data: syntax.Value | None) -> None:
+    if isinstance(data, syntax.Record):
         _line_acceleration(memory, _field(data, "ACC", "LDAT_ACT"))
         _zone_data(memory, data, "#CDIS")
         memory.write("$ORI_TYPE", data.get("ORI_TYP") or "#VAR")
 
 
-def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
+def _zone_data(memory: ProgramMemory, data: syntax.Value, usual: str) -> None:
     """``APO_DIST`` of motion data: mm, or percent of a joint motion."""
-    distance = number(data.get("APO_DIST")) if isinstance(data, Record) else None
-    if not isinstance(data, Record) or distance is None:
+    distance = syntax.number(data.get("APO_DIST")) if isinstance(data, syntax.Record) else None
+    if not isinstance(data, syntax.Record) or distance is None:
         return
     mode = data.get("APO_MODE") or usual
     if mode == "#CPTP":
@@ -408,7 +386,7 @@ def _zone_data(memory: ProgramMemory, data: Value, usual: str) -> None:
         memory.shared.pop("$APO.CPTP", None)
 
 
-KINDS: dict[str, MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
+KINDS: dict[str, instructions.MotionKind] = {"PTP": "joint", "LIN": "line", "CIRC": "arc", "SPL": "spline"}
 MODAL = ("$TOOL", "$BASE", "$LOAD", "$VEL", "$ACC", "$APO", "$VEL_AXIS", "$ACC_AXIS", "$IPO_MODE")
 MODAL_DATA = ("PDAT_ACT", "LDAT_ACT", "FDAT_ACT", "%spline")
 HARMLESS_TEXT = """
@@ -441,7 +419,7 @@ HARMLESS_VARIABLES = frozenset((*MODAL, *HARMLESS_VARIABLES_TEXT.split()))
 axes soft, shift paths (``$CORR_T``, ``$TECH``) or choose other postures (``$SINGUL_POS``)."""
 ORIENTATION_TYPES = {"$ORI_TYPE": ("#VAR", "#CONSTANT"), "$CIRC_TYPE": ("#BASE",)}
 """How the tool may turn on lines and arcs so that they are followed as they are meant."""
-CONTROLLER: dict[str, Value] = {
+CONTROLLER: dict[str, syntax.Value] = {
     "$KINCLASS": "#STANDARD",
     "$EX_AX_NUM": 0,
     "$ERR.NUMBER": 0,
@@ -457,11 +435,11 @@ HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_INT", "$AXIS_ACT_MEAS")
 class Settings(NamedTuple):
     """What is set when a motion begins."""
 
-    tool: NamedFrame
-    base: NamedFrame
-    speed: Rate | None
-    acceleration: Rate | None
-    zone: Zone
+    tool: instructions.NamedFrame
+    base: instructions.NamedFrame
+    speed: instructions.Rate | None
+    acceleration: instructions.Rate | None
+    zone: instructions.Zone
     load: MassBody | str | None
 
 
@@ -476,7 +454,7 @@ class KrlDialect(Dialect):
         """Outputs."""
         return name.startswith(("$OUT[", "$ANOUT["))
 
-    def is_followed(self, name: str, value: Value) -> bool:
+    def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
         if name in ORIENTATION_TYPES:
             return value in ORIENTATION_TYPES[name]
@@ -488,10 +466,10 @@ class KrlDialect(Dialect):
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
 
-    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Frames of the controller, and where the arm stands."""
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
-            return frame_record(pose_of((0.0,) * 6, "kuka"))
+            return frame_record(instructions.pose_of((0.0,) * 6, "kuka"))
         if name == "$NUM_AX":
             return memory.cell.joints
         if name in CONTROLLER:
@@ -501,10 +479,10 @@ class KrlDialect(Dialect):
             return None if seen is None else frame_record(seen, "E6POS")
         if name in HERE_JOINTS and memory.here.joints is not None:
             degrees = [math.degrees(each) for each in memory.here.joints]
-            return Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees)))
+            return syntax.Record("E6AXIS", tuple((f"A{i + 1}", each) for i, each in enumerate(degrees)))
         return None
 
-    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Mathematics in degrees, and inverse frames."""
         values = tuple(None if each is None else memory.value(each) for each in given.arguments)
         if name == "INV_POS" and len(values) == 1 and is_frame(values[0]):
@@ -514,7 +492,7 @@ class KrlDialect(Dialect):
                 inverse[:3, :3] = pose[:3, :3].T
                 inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
                 return frame_record(inverse)
-        plain = numbers(values)
+        plain = syntax.numbers(values)
         try:
             if name == "ATAN2" and plain is not None and len(plain) == 2:
                 return math.degrees(math.atan2(*plain))
@@ -522,27 +500,27 @@ class KrlDialect(Dialect):
                 return float(IN_DEGREES[name](plain[0]))
         except (ValueError, OverflowError):
             pass
-        return Unclear(f"{name}(...)")
+        return syntax.Unclear(f"{name}(...)")
 
-    def product(self, left: Value, right: Value) -> Value:
+    def product(self, left: syntax.Value, right: syntax.Value) -> syntax.Value:
         """The geometric operator: ``right`` in the frame ``left``."""
         for each in (left, right):
-            if isinstance(each, Unclear):
+            if isinstance(each, syntax.Unclear):
                 return each
         a, b = record_pose(left), record_pose(right)
-        if a is None or b is None or not isinstance(right, Record):
-            return Unclear(f"{shown(left)}:{shown(right)}")
-        found = Record(right.kind, frame_record(a @ b).items)
+        if a is None or b is None or not isinstance(right, syntax.Record):
+            return syntax.Unclear(f"{syntax.shown(left)}:{syntax.shown(right)}")
+        found = syntax.Record(right.kind, frame_record(a @ b).items)
         rest = [(key, value) for key, value in right.items if key not in FRAME_KEYS]
-        return Record(found.kind, (*found.items, *rest))
+        return syntax.Record(found.kind, (*found.items, *rest))
 
-    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
         """PTP, LIN, CIRC and their relatives and splines."""
         kept = {name: memory.shared.get(name) for name in memory.shared if name in _SET} if move.settings else {}
         angle = None
         for name, expression in move.settings:
             if name == "CA":
-                degrees = number(memory.value(expression))
+                degrees = syntax.number(memory.value(expression))
                 angle = math.radians(degrees) if degrees is not None else math.nan
             else:
                 keep_setting(memory, name, expression)
@@ -554,7 +532,7 @@ class KrlDialect(Dialect):
             memory.kept.clear()
         return found
 
-    def _motion(self, memory: ProgramMemory, move: Move, angle: float | None) -> ArmMotion:
+    def _motion(self, memory: ProgramMemory, move: syntax.Move, angle: float | None) -> instructions.ArmMotion:
         plain = move.form.removesuffix("_REL")
         kind = KINDS[plain.removeprefix("S") if plain != "SPL" else plain]
         tool, base, speed, acceleration, zone, load = _settings(memory, kind, move)
@@ -567,10 +545,10 @@ class KrlDialect(Dialect):
         if kind in ("line", "arc", "spline") and memory.read("$ORI_TYPE") == "#CONSTANT":
             made = [self._unturned(memory, each, (tool, base)) for each in made]
         if kind != "joint":  # which ignores S and T
-            made = [replace(each, branch=None) if isinstance(each, PoseTarget) else each for each in made]
+            made = [replace(each, branch=None) if isinstance(each, instructions.PoseTarget) else each for each in made]
         via = made[0] if kind == "arc" else None
         block = memory.shared.get("%spline")
-        return ArmMotion(
+        return instructions.ArmMotion(
             kind,
             made[-1],
             move.form,
@@ -585,44 +563,48 @@ class KrlDialect(Dialect):
             load=load,
         )
 
-    def _unturned(self, memory: ProgramMemory, goal: Target, frames: Frames) -> Target:
+    def _unturned(self, memory: ProgramMemory, goal: instructions.Target, frames: Frames) -> instructions.Target:
         """The target with the orientation that the tool has before: ``$ORI_TYPE=#CONSTANT``."""
-        if not isinstance(goal, PoseTarget):
+        if not isinstance(goal, instructions.PoseTarget):
             return goal
         seen = memory.here.seen(*frames, memory.cell.flange)
         if seen is None:
-            return UnresolvedTarget("$ORI_TYPE=#CONSTANT", "position_unknown")
+            return instructions.UnresolvedTarget("$ORI_TYPE=#CONSTANT", "position_unknown")
         pose = goal.pose.copy()
         pose[:3, :3] = seen[:3, :3]
         return replace(goal, pose=pose)
 
-    def _argument(self, memory: ProgramMemory, argument: Expression | None) -> Value:
+    def _argument(self, memory: ProgramMemory, argument: syntax.Expression | None) -> syntax.Value:
         """A motion's argument; to go to where the arm stands, wherever that is, no joint moves."""
         if argument is None:
-            return Unclear("")
-        here = isinstance(argument, Variable) and argument.name in HERE + HERE_JOINTS
-        if here and isinstance(memory.value(argument), Unclear):
-            return Record("E6AXIS", ())
+            return syntax.Unclear("")
+        here = isinstance(argument, syntax.Variable) and argument.name in HERE + HERE_JOINTS
+        if here and isinstance(memory.value(argument), syntax.Unclear):
+            return syntax.Record("E6AXIS", ())
         return memory.value(argument)
 
-    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
         """Settings by BAS, ends of splines, signals by PULSE; the rest is unknown."""
         call = doing.what
-        assert isinstance(call, Invocation)
+        assert isinstance(call, syntax.Invocation)
         if call.function in ("%SPLINE", "%ENDSPLINE"):
             memory.write("%spline", doing.place.line if call.function == "%SPLINE" else 0)
             return None
         if call.function == "BAS":
             if not set_by_bas(memory, call):
-                return Unknown(doing.text)
+                return instructions.Unknown(doing.text)
             turns = memory.read("$ORI_TYPE")
-            return None if turns in (None, *ORIENTATION_TYPES["$ORI_TYPE"]) else Unknown(doing.text, may_move=False)
+            return (
+                None
+                if turns in (None, *ORIENTATION_TYPES["$ORI_TYPE"])
+                else instructions.Unknown(doing.text, may_move=False)
+            )
         if call.function == "PULSE" and call.arguments and call.arguments[0] is not None:
             name = memory.key(call.arguments[0]) or "$OUT"
-            return Output(name, doing.text)
-        return Aside(doing.text) if self.harmless(call) else Unknown(doing.text)
+            return instructions.Output(name, doing.text)
+        return instructions.Aside(doing.text) if self.harmless(call) else instructions.Unknown(doing.text)
 
-    def harmless(self, call: Invocation) -> bool:
+    def harmless(self, call: syntax.Invocation) -> bool:
         """Messages, files, signals."""
         return call.function in HARMLESS or call.function in EVALUATED or call.function in OF_SETTINGS
 
@@ -635,7 +617,7 @@ _SET = frozenset(
 )
 
 
-def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> Settings:
+def _settings(memory: ProgramMemory, kind: instructions.MotionKind, move: syntax.Move) -> Settings:
     """What is set for a motion; it is kept, because most motions follow one whose settings are the same."""
     key = (kind, move.words)
     found = memory.kept.get(key)
@@ -652,43 +634,43 @@ def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> Settings:
     return found
 
 
-def _speed(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
+def _speed(memory: ProgramMemory, kind: instructions.MotionKind) -> instructions.Rate | None:
     if kind == "joint":
         return _axis_share(memory, "$VEL_AXIS")
-    speed = number(memory.read("$VEL.CP"))
-    return None if speed is None else Rate(speed, "m/s")
+    speed = syntax.number(memory.read("$VEL.CP"))
+    return None if speed is None else instructions.Rate(speed, "m/s")
 
 
-def _acceleration(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
+def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instructions.Rate | None:
     if kind == "joint":
         return _axis_share(memory, "$ACC_AXIS")
     value = memory.read("$ACC.CP")
-    if isinstance(value, Record):
-        share = number(value.get("share"))
-        return None if share is None else Rate(share, "share")
-    found = number(value)
-    return None if found is None else Rate(found, "m/s2")
+    if isinstance(value, syntax.Record):
+        share = syntax.number(value.get("share"))
+        return None if share is None else instructions.Rate(share, "share")
+    found = syntax.number(value)
+    return None if found is None else instructions.Rate(found, "m/s2")
 
 
-def _axis_share(memory: ProgramMemory, name: str) -> Rate | None:
-    given = [number(memory.read(f"{name}[{axis}]")) for axis in range(1, 7)]
+def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
+    given = [syntax.number(memory.read(f"{name}[{axis}]")) for axis in range(1, 7)]
     least = min((each for each in given if each is not None), default=None)
-    return None if least is None else Rate(least / 100, "share")
+    return None if least is None else instructions.Rate(least / 100, "share")
 
 
-def _zone(memory: ProgramMemory, kind: MotionKind, words: tuple[str, ...]) -> Zone:
+def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str, ...]) -> instructions.Zone:
     word = next((word for word in words if word.startswith("C_")), None)
     if word is None:
-        return FINE
-    distance = number(memory.read("$APO.CDIS"))
-    share = number(memory.read("$APO.CPTP"))
+        return instructions.FINE
+    distance = syntax.number(memory.read("$APO.CDIS"))
+    share = syntax.number(memory.read("$APO.CPTP"))
     if (word == "C_PTP" or (word == "C_SPL" and kind == "joint")) and share is not None:
-        return Zone("share", share / 100, word)
+        return instructions.Zone("share", share / 100, word)
     if word in ("C_DIS", "C_SPL", "C_PTP") and distance is not None:
-        return Zone("distance", distance / 1000, word)
-    angle, slow = number(memory.read("$APO.CORI")), number(memory.read("$APO.CVEL"))
+        return instructions.Zone("distance", distance / 1000, word)
+    angle, slow = syntax.number(memory.read("$APO.CORI")), syntax.number(memory.read("$APO.CVEL"))
     if word == "C_ORI" and angle is not None:
-        return Zone("angle", math.radians(angle), word)
+        return instructions.Zone("angle", math.radians(angle), word)
     if word == "C_VEL" and slow is not None:
-        return Zone("velocity", slow / 100, word)
-    return Zone("named", 0.0, word)
+        return instructions.Zone("velocity", slow / 100, word)
+    return instructions.Zone("named", 0.0, word)

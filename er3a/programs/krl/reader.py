@@ -12,31 +12,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from er3a.errors import InputError
+from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked, mapped, not_understood, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, ProgramFinding
-from er3a.programs.syntax import (
-    Aggregate,
-    Assign,
-    Beside,
-    Constant,
-    Doing,
-    Element,
-    Expression,
-    Invocation,
-    Member,
-    Move,
-    Opaque,
-    Operation,
-    Program,
-    Record,
-    Return,
-    Routine,
-    RoutineParameter,
-    Variable,
-    Waiting,
-)
 
 KRL = Lexicon(
     re.compile(
@@ -71,28 +51,28 @@ class KrlWords(Words):
     def __init__(self, text: str):
         super().__init__(KRL, text)
 
-    def special(self) -> Expression | None:
+    def special(self) -> syntax.Expression | None:
         """Aggregates, enumerations, numbers in other bases, the point that is to be taught."""
         if self.kind == "enum":
-            return Constant("#" + self.take()[1:].strip().upper())
+            return syntax.Constant("#" + self.take()[1:].strip().upper())
         if self.kind == "whole":
             word = self.take()
             try:
-                return Constant(int(word[2:-1], 16 if word[1] in "Hh" else 2))
+                return syntax.Constant(int(word[2:-1], 16 if word[1] in "Hh" else 2))
             except ValueError:
                 raise MisreadError(f"{word} is no number") from None
         if self.accept("{"):
             return self._aggregate()
-        return Opaque(self.take()) if self.next in ("?", "!") else None
+        return syntax.Opaque(self.take()) if self.next in ("?", "!") else None
 
-    def _aggregate(self) -> Expression:
+    def _aggregate(self) -> syntax.Expression:
         kind = ""
         if self.kind == "name" and self.texts[self.at + 1] == ":":
             kind = self.take()
             self.take()
-        items: list[tuple[str, Expression]] = []
+        items: list[tuple[str, syntax.Expression]] = []
         if self.accept("}"):
-            return Aggregate(kind, ())
+            return syntax.Aggregate(kind, ())
         while True:
             name = self.name()
             if any(name == other for other, _ in items):
@@ -102,10 +82,10 @@ class KrlWords(Words):
             items.append((name, self.expression()))
             if not self.accept(","):
                 self.expect("}")
-                return Aggregate(kind, tuple(items))
+                return syntax.Aggregate(kind, tuple(items))
 
 
-def plain_record(kind: str | None, items: str) -> Constant | None:
+def plain_record(kind: str | None, items: str) -> syntax.Constant | None:
     """A record of numbers and enumerations alone, without a look at its words."""
     words = items.replace(",", " ").split()
     names, texts = words[::2], words[1::2]
@@ -117,55 +97,30 @@ def plain_record(kind: str | None, items: str) -> Constant | None:
         return None
     if len(dict(found)) < len(found) or not all(isinstance(value, str) or math.isfinite(value) for _, value in found):
         return None
-    return Constant(Record((kind or "").upper(), tuple(found)))
+    return syntax.Constant(syntax.Record((kind or "").upper(), tuple(found)))
 
 
-MOTIONS = frozenset(
-    [
-        "PTP",
-        "LIN",
-        "CIRC",
-        "PTP_REL",
-        "LIN_REL",
-        "CIRC_REL",
-        "SPTP",
-        "SLIN",
-        "SCIRC",
-        "SPL",
-        "SPTP_REL",
-        "SLIN_REL",
-        "SCIRC_REL",
-        "SPL_REL",
-    ]
-)
-ASIDES = frozenset(
-    [
-        "EXT",
-        "EXTFCT",
-        "IMPORT",
-        "ENUM",
-        "STRUC",
-        "CONTINUE",
-        "ANIN",
-        "ANOUT",
-        "BRAKE",
-        "TIME_BLOCK",
-        "CONST_VEL",
-        "ON_ERROR_PROCEED",
-        "STOP",
-    ]
-)
+WORDS_OF_MOTIONS = """
+PTP LIN CIRC PTP_REL LIN_REL CIRC_REL SPTP SLIN SCIRC SPL SPTP_REL SLIN_REL SCIRC_REL SPL_REL
+"""
+MOTIONS = frozenset(WORDS_OF_MOTIONS.split())
+WORDS_ASIDE = """
+EXT EXTFCT IMPORT ENUM STRUC CONTINUE ANIN ANOUT BRAKE TIME_BLOCK CONST_VEL ON_ERROR_PROCEED STOP
+"""
+ASIDES = frozenset(WORDS_ASIDE.split())
 OUTER_AXES = frozenset(["ASYPTP", "ASYCONT", "ASYSTOP", "ASYCANCEL"])  # which run beside the arm's own
 Handler = Callable[["_Statement"], None]
 
 
-def statement(builder: CodeBuilder, place: Place, text: str, signals: dict[str, Expression], inside_data: bool) -> None:
+def statement(
+    builder: CodeBuilder, place: Place, text: str, signals: dict[str, syntax.Expression], inside_data: bool
+) -> None:
     """Add a line to the code of its routine; one that is not understood is kept as such."""
     if (plain := PLAIN.match(text)) is not None and (target := plain_record(plain[2], plain[3])) is not None:
-        builder.add(Move(place, plain[1].upper(), (target,), text, tuple(plain[4].upper().split())))
+        builder.add(syntax.Move(place, plain[1].upper(), (target,), text, tuple(plain[4].upper().split())))
         return
     if inside_data and (plain := PLAIN_DATA.match(text)) is not None and (found := plain_record("", plain[3])):
-        builder.add(Assign(place, Variable(plain[2].upper()), found, text, plain[1].upper()))
+        builder.add(syntax.Assign(place, syntax.Variable(plain[2].upper()), found, text, plain[1].upper()))
         return
     reading = _Statement(builder, place, text, signals, inside_data)
     try:
@@ -183,7 +138,7 @@ class _Statement:
     """One line."""
 
     def __init__(
-        self, builder: CodeBuilder, place: Place, text: str, signals: dict[str, Expression], inside_data: bool
+        self, builder: CodeBuilder, place: Place, text: str, signals: dict[str, syntax.Expression], inside_data: bool
     ):
         self.builder, self.place, self.text, self.signals = builder, place, text, signals
         self.inside_data = inside_data
@@ -210,7 +165,7 @@ class _Statement:
         else:
             self._assignment()
 
-    def condition(self, end: str = "") -> Expression:
+    def condition(self, end: str = "") -> syntax.Expression:
         """A condition up to a word or the end; one that is not understood is kept."""
         start = self.words.at
         try:
@@ -220,7 +175,7 @@ class _Statement:
             self.words.finish()
         except MisreadError:
             texts = self.words.texts[start:-1]
-            return Opaque(" ".join(text for text in texts if text.upper() != end))
+            return syntax.Opaque(" ".join(text for text in texts if text.upper() != end))
         return found
 
     def _declares(self) -> bool:
@@ -246,12 +201,12 @@ class _Statement:
         if words.accept("["):
             words.arguments("]")
         while True:
-            target: Expression = Variable(words.name())
+            target: syntax.Expression = syntax.Variable(words.name())
             if words.accept("["):
                 words.arguments("]")
             value = words.expression() if words.accept("=") else None
             local = not self.inside_data
-            self.builder.add(Assign(self.place, target, value, self.text, kind, local))
+            self.builder.add(syntax.Assign(self.place, target, value, self.text, kind, local))
             if not words.accept(","):
                 break
         words.finish()
@@ -262,23 +217,23 @@ class _Statement:
         if words.accept("="):
             value = words.expression()
             words.finish()
-            self.builder.add(Assign(self.place, left, value, self.text))
+            self.builder.add(syntax.Assign(self.place, left, value, self.text))
             return
         words.finish()
-        if not isinstance(left, Invocation):
+        if not isinstance(left, syntax.Invocation):
             raise MisreadError("neither an assignment nor a call")
-        self.builder.add(Doing(self.place, left, self.text))
+        self.builder.add(syntax.Doing(self.place, left, self.text))
 
-    def _known(self, expression: Expression) -> Expression:
+    def _known(self, expression: syntax.Expression) -> syntax.Expression:
         """The signal that a name stands for."""
-        if isinstance(expression, Variable):
+        if isinstance(expression, syntax.Variable):
             return self.signals.get(expression.name, expression)
         return expression
 
     def _motion(self, form: str) -> None:
         words = self.words
-        arguments: list[Expression | None] = [words.expression()]
-        settings: list[tuple[str, Expression]] = []
+        arguments: list[syntax.Expression | None] = [words.expression()]
+        settings: list[tuple[str, syntax.Expression]] = []
         flags: list[str] = []
         while words.kind != "end":
             if words.accept(","):
@@ -296,9 +251,9 @@ class _Statement:
                 flags.append(words.take())
             else:
                 raise MisreadError(f"'{words.next}' not expected")
-        self.builder.add(Move(self.place, form, tuple(arguments), self.text, tuple(flags), tuple(settings)))
+        self.builder.add(syntax.Move(self.place, form, tuple(arguments), self.text, tuple(flags), tuple(settings)))
 
-    def _with(self) -> list[tuple[str, Expression]]:
+    def _with(self) -> list[tuple[str, syntax.Expression]]:
         settings = []
         while True:
             name = _text_of(self.words.reference())
@@ -308,13 +263,13 @@ class _Statement:
                 return settings
 
 
-def _text_of(expression: Expression) -> str:
+def _text_of(expression: syntax.Expression) -> str:
     match expression:
-        case Variable(name=name):
+        case syntax.Variable(name=name):
             return name
-        case Member(of=of, name=name):
+        case syntax.Member(of=of, name=name):
             return f"{_text_of(of)}.{name}"
-        case Element(of=of):
+        case syntax.Element(of=of):
             return f"{_text_of(of)}[1]"
         case _:
             return ""
@@ -348,17 +303,17 @@ def _wait(reading: _Statement) -> None:
     if words.accept("SEC"):
         seconds = words.expression()
         words.finish()
-        reading.builder.add(Waiting(reading.place, "seconds", seconds, reading.text))
+        reading.builder.add(syntax.Waiting(reading.place, "seconds", seconds, reading.text))
         return
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
-    reading.builder.add(Waiting(reading.place, "condition", reading.condition(), text))
+    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.condition(), text))
 
 
 def _return(reading: _Statement) -> None:
     value = None if reading.words.kind == "end" else reading.words.expression()
     reading.words.finish()
-    reading.builder.add(Return(reading.place, value))
+    reading.builder.add(syntax.Return(reading.place, value))
 
 
 def _interrupt(reading: _Statement) -> None:
@@ -376,7 +331,7 @@ def _do(reading: _Statement) -> None:
         raise MisreadError("no DO")
     words = KrlWords(asked[1])
     what = words.expression()
-    if isinstance(what, Invocation):
+    if isinstance(what, syntax.Invocation):
         words.finish()
         reading.builder.beside(reading.place, what, reading.text, "interrupt")
     elif words.accept("="):
@@ -412,7 +367,7 @@ HANDLERS: dict[str, Handler] = {
     "EXIT": _simple(lambda builder, place: builder.leave_loop(place)),
     "GOTO": _goto,
     "RETURN": _return,
-    "HALT": lambda reading: reading.builder.add(Waiting(reading.place, "operator", None, "HALT")),
+    "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
     "INTERRUPT": _interrupt,
     "TRIGGER": _do,
@@ -426,8 +381,8 @@ HANDLERS: dict[str, Handler] = {
 def _spline(reading: _Statement) -> None:
     """Begin and end of a spline are moves without target: the run numbers its blocks by them."""
     form = "ENDSPLINE" if reading.text.upper().startswith("ENDSPLINE") else "SPLINE"
-    call = Invocation(f"%{form}", ())
-    reading.builder.add(Doing(reading.place, call, reading.text))
+    call = syntax.Invocation(f"%{form}", ())
+    reading.builder.add(syntax.Doing(reading.place, call, reading.text))
 
 
 GLOBAL_ROUTINE = re.compile(r"(?im)^\s*GLOBAL\s+DEF(?:FCT\s+\w+(?:\s*\[[^\]]*\])?)?\s+(\w+)")
@@ -435,8 +390,8 @@ GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
 
 
 def apart(
-    source: ProgramText, routines: Iterable[Routine], data: Iterable[Assign]
-) -> tuple[list[Routine], list[Assign]]:
+    source: ProgramText, routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
+) -> tuple[list[syntax.Routine], list[syntax.Assign]]:
     """A module's routines and data under names that no other module has, its global ones apart.
 
     In KRL a routine is seen by other modules if it is named as its file or declared ``GLOBAL``, a name of a .dat file
@@ -444,31 +399,35 @@ def apart(
     """
     routines, data, module = list(routines), list(data), source.path.stem.upper()
     seen = {module, *(name.upper() for name in GLOBAL_ROUTINE.findall(source.text))}
-    own = {each.target.name for each in data if isinstance(each.target, Variable) and not GLOBAL_NAME.search(each.text)}
+    own = {
+        each.target.name
+        for each in data
+        if isinstance(each.target, syntax.Variable) and not GLOBAL_NAME.search(each.text)
+    }
     own |= {routine.name for routine in routines} - seen
     names = {name: f"{module}/{name}" for name in own if not name.startswith("$")}
 
-    def code(operations: Iterable[Operation]) -> tuple[Operation, ...]:
+    def code(operations: Iterable[syntax.Operation]) -> tuple[syntax.Operation, ...]:
         return tuple(_renamed(operation, names) for operation in operations)
 
     placed = [replace(each, name=names.get(each.name, each.name), code=code(each.code)) for each in routines]
-    return placed, [each for each in code(data) if isinstance(each, Assign)]
+    return placed, [each for each in code(data) if isinstance(each, syntax.Assign)]
 
 
-def _renamed(operation: Operation, names: Mapping[str, str]) -> Operation:
-    def each(expression: Expression) -> Expression:
+def _renamed(operation: syntax.Operation, names: Mapping[str, str]) -> syntax.Operation:
+    def each(expression: syntax.Expression) -> syntax.Expression:
         expression = within(expression, each)
-        if isinstance(expression, Variable):
+        if isinstance(expression, syntax.Variable):
             return replace(expression, name=names.get(expression.name, expression.name))
-        if isinstance(expression, Invocation):
+        if isinstance(expression, syntax.Invocation):
             return replace(expression, function=names.get(expression.function, expression.function))
         return expression
 
     operation = mapped(operation, each)
-    if isinstance(operation, Beside):
+    if isinstance(operation, syntax.Beside):
         function = operation.what.function
         return replace(operation, what=replace(operation.what, function=names.get(function, function)))
-    return replace(operation, target=each(operation.target)) if isinstance(operation, Assign) else operation
+    return replace(operation, target=each(operation.target)) if isinstance(operation, syntax.Assign) else operation
 
 
 CONFIG_NAMES_TEXT = """
@@ -481,7 +440,7 @@ CONFIG_NAMES = frozenset(CONFIG_NAMES_TEXT.split())
 HEAD = re.compile(r"(?i)\s*(?:GLOBAL\s+)?(DEF|DEFFCT)\s+(.*)")
 
 
-def read_krl(source: ProgramText) -> Program:
+def read_krl(source: ProgramText) -> syntax.Program:
     """The program of a .src file; its first routine is the one that is started.
 
     Raises
@@ -500,7 +459,7 @@ def read_krl(source: ProgramText) -> Program:
         reader.read_data(read_program_text(shared))
         reader.data += own
     routines = reader.read_routines()
-    called: list[Routine] = []
+    called: list[syntax.Routine] = []
     for file in modules_of(source.path):
         if all(routine.name != file.stem.upper() for routine in routines):
             more_routines, more_data, more = _module(read_program_text(file))
@@ -510,7 +469,7 @@ def read_krl(source: ProgramText) -> Program:
     if data_file is None and lacks_data(routines, reader.data, CONFIG_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".dat").name))
     by_name, unlinked = linked([*called, *routines])
-    return Program(
+    return syntax.Program(
         "krl",
         source.path.stem,
         source.path,
@@ -522,7 +481,7 @@ def read_krl(source: ProgramText) -> Program:
     )
 
 
-def _module(source: ProgramText) -> tuple[list[Routine], list[Assign], list[ProgramFinding]]:
+def _module(source: ProgramText) -> tuple[list[syntax.Routine], list[syntax.Assign], list[ProgramFinding]]:
     """Routines, data and findings of another module."""
     reader = _KrlReader(source)
     findings: list[ProgramFinding] = [*source.findings]
@@ -535,8 +494,8 @@ def _module(source: ProgramText) -> tuple[list[Routine], list[Assign], list[Prog
 class _KrlReader:
     def __init__(self, source: ProgramText):
         self.source = source
-        self.data: list[Assign] = []
-        self.signals: dict[str, Expression] = {}
+        self.data: list[syntax.Assign] = []
+        self.signals: dict[str, syntax.Expression] = {}
 
     def read_data(self, source: ProgramText) -> list[ProgramFinding]:
         """Declarations of a .dat file."""
@@ -545,17 +504,17 @@ class _KrlReader:
         found: list[ProgramFinding] = [*source.findings, *not_understood(builder.code)]
         seen: dict[str, bool] = {}
         for each in builder.code:
-            if isinstance(each, Assign):
-                if isinstance(each.target, Variable) and each.type_name:
+            if isinstance(each, syntax.Assign):
+                if isinstance(each.target, syntax.Variable) and each.type_name:
                     if seen.get(each.target.name):
                         found.append(NameTwice(each.target.name, each.place))
                     seen[each.target.name] = True
                 self.data.append(each)
         return found
 
-    def read_routines(self) -> list[Routine]:
+    def read_routines(self) -> list[syntax.Routine]:
         """All routines of the .src file."""
-        routines: list[Routine] = []
+        routines: list[syntax.Routine] = []
         builder: CodeBuilder | None = None
         source, end = self.source, "END"
         for number, line in enumerate(source.lines, 1):
@@ -604,14 +563,14 @@ class _KrlReader:
                 if words.accept("["):
                     words.arguments("]")
             name = words.name()
-            parameters: list[RoutineParameter] = []
+            parameters: list[syntax.RoutineParameter] = []
             words.expect("(")
             while not words.accept(")"):
                 parameter = words.name()
                 if words.accept("["):
                     words.arguments("]")
                 out = not (words.accept(":") and words.name() == "IN")
-                parameters.append(RoutineParameter(parameter, out))
+                parameters.append(syntax.RoutineParameter(parameter, out))
                 if not words.accept(","):
                     words.expect(")")
                     break

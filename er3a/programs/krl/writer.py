@@ -11,92 +11,50 @@ import math
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.instructions import (
-    ArmMotion,
-    JointTarget,
-    Listing,
-    NamedFrame,
-    Output,
-    Pause,
-    PoseTarget,
-    Zone,
-    numbers_of,
-)
+from er3a.programs import instructions, writing
 from er3a.programs.krl.dialect import AXIS_KEYS, FRAME_KEYS
-from er3a.programs.writing import (
-    LOAD_DIGITS,
-    ReadyMotion,
-    WriteOptions,
-    Writer,
-    ascii_text,
-    fixed,
-    principal_axes,
-    share_of_max,
-    short,
-    tool_speed,
-)
 from er3a.robots.masses import MassBody
 
 DIGITS = 6
 KNOWN_FRAMES = ("TOOL_DATA[", "BASE_DATA[", "$NULLFRAME", "$WORLD", "$ROBROOT")
 
 
-class KrlWriter(Writer):
+class KrlWriter(writing.Writer):
     """Writes KRL."""
 
     languages = ("krl",)
+    remark = ";"
+    loop = ("LOOP", "ENDLOOP")
+    wait = ("WAIT SEC {}", "HALT", "WAIT FOR {}")
 
-    def __init__(self, listing: Listing, options: WriteOptions):
+    def __init__(self, listing: instructions.Listing, options: writing.WriteOptions):
         super().__init__(listing, options)
-        self.settings: dict[str, str] = {}
         given = (motion.acceleration for motion in listing.motions if motion.kind == "joint")
         self.accelerates_fully = all(each is None or (each.unit, each.value) == ("share", 1.0) for each in given)
 
     def files(self, head: list[str]) -> dict[str, str]:
         """The .src and the .dat file."""
-        body = [f"; {ascii_text(line)}" for line in head]
+        body = [f"; {writing.ascii_text(line)}" for line in head]
         body += ["BAS(#INITMOV,0)", *self.lines]
         lines = ["&ACCESS RVP", "&REL 1", f"DEF {self.name}( )", *body, "END", ""]
         data = [f"DEFDAT {self.name} PUBLIC", "EXT BAS (BAS_COMMAND :IN,REAL :IN)", "ENDDAT", ""]
         return {".src": "\n".join(lines), ".dat": "\n".join(data)}
 
-    def begin_loop(self) -> None:
-        """``LOOP``; what was set before does not count within."""
-        self.lines.append("LOOP")
-        self.settings.clear()
-
-    def end_loop(self) -> None:
-        """``ENDLOOP``."""
-        self.lines.append("ENDLOOP")
-
-    def comment(self, text: str) -> None:
-        """``; text``."""
-        self.lines.append(f"; {ascii_text(text)}")
-
-    def pause(self, pause: Pause) -> None:
-        """WAIT SEC, WAIT FOR, HALT."""
-        if pause.seconds is not None:
-            self.lines.append(f"WAIT SEC {short(pause.seconds)}")
-        else:
-            self.lines.append("HALT" if pause.condition is None else f"WAIT FOR {pause.condition}")
-
-    def output(self, output: Output) -> None:
+    def output(self, output: instructions.Output) -> None:
         """``$OUT[8]=TRUE``."""
         called = "(" in output.value
         self.lines.append(output.value if called else f"{output.name}={output.value}")
 
-    def verbatim(self, text: str) -> None:
-        """A line as it was read."""
-        self.lines.append(text)
-
     def set_load(self, load: MassBody | None) -> None:
         """``$LOAD``, with the axes of its inertia; a mass below 0 for what is not known."""
-        pose, moments = (np.eye(4), np.zeros(3)) if load is None else principal_axes(load)
-        about = ",".join(f"{axis} {short(float(each), LOAD_DIGITS)}" for axis, each in zip("XYZ", moments))
-        mass = "-1.0" if load is None else short(load.mass)
-        self._set("$LOAD", f"$LOAD={{M {mass},CM {_frame_text(pose)},J {{{about}}}}}")
+        pose, moments = (np.eye(4), np.zeros(3)) if load is None else writing.principal_axes(load)
+        about = ",".join(
+            f"{axis} {writing.short(float(each), writing.LOAD_DIGITS)}" for axis, each in zip("XYZ", moments)
+        )
+        mass = "-1.0" if load is None else writing.short(load.mass)
+        self.set_once("$LOAD", f"$LOAD={{M {mass},CM {_frame_text(pose)},J {{{about}}}}}")
 
-    def motion(self, ready: ReadyMotion) -> None:
+    def motion(self, ready: writing.ReadyMotion) -> None:
         """PTP, LIN, CIRC with what has to be set before."""
         motion = ready.motion
         target = self._target(ready)
@@ -111,26 +69,26 @@ class KrlWriter(Writer):
         if motion.kind == "spline":
             self.count["splines"] += 1
         if motion.kind == "arc":
-            angle = "" if motion.angle is None else f", CA {fixed(math.degrees(motion.angle), DIGITS)}"
+            angle = "" if motion.angle is None else f", CA {writing.fixed(math.degrees(motion.angle), DIGITS)}"
             self.lines.append(f"CIRC {via}, {target}{angle}{zone}")
         else:
             self.lines.append(f"{'PTP' if motion.kind == 'joint' else 'LIN'} {target}{zone}")
 
-    def _target(self, ready: ReadyMotion) -> str | None:
+    def _target(self, ready: writing.ReadyMotion) -> str | None:
         target = ready.motion.target
         if ready.motion.kind == "joint":
-            turns = dict(target.configuration) if isinstance(target, PoseTarget) else {}
-            if isinstance(target, PoseTarget) and {"S", "T"} <= turns.keys() and self.own:
+            turns = dict(target.configuration) if isinstance(target, instructions.PoseTarget) else {}
+            if isinstance(target, instructions.PoseTarget) and {"S", "T"} <= turns.keys() and self.own:
                 return _frame_text(target.pose, turns)
             if ready.joints is not None:
                 return _axes_text(ready.joints)
-            return _axes_text(target.joints) if isinstance(target, JointTarget) else None
+            return _axes_text(target.joints) if isinstance(target, instructions.JointTarget) else None
         if ready.pose is None:
             return None
-        turns = dict(target.configuration) if isinstance(target, PoseTarget) and self.own else {}
+        turns = dict(target.configuration) if isinstance(target, instructions.PoseTarget) and self.own else {}
         return _frame_text(ready.pose, turns)
 
-    def _frame(self, variable: str, frame: NamedFrame) -> None:
+    def _frame(self, variable: str, frame: instructions.NamedFrame) -> None:
         if frame.name.startswith(KNOWN_FRAMES):
             text = frame.name
         elif frame.pose is not None:
@@ -140,27 +98,27 @@ class KrlWriter(Writer):
             if frame.name:
                 self.name_tool(frame.name)
             return
-        self._set(variable, f"{variable}={text}")
+        self.set_once(variable, f"{variable}={text}")
 
-    def _speeds(self, ready: ReadyMotion) -> None:
+    def _speeds(self, ready: writing.ReadyMotion) -> None:
         motion = ready.motion
         if motion.kind == "joint":
             self._joint_speed(ready)
             acceleration = motion.acceleration
             if acceleration is not None and acceleration.unit == "share" and not self.accelerates_fully:  # by INITMOV
-                self._set("acc", f"BAS(#ACC_PTP,{short(acceleration.value * 100, 3)})")
+                self.set_once("acc", f"BAS(#ACC_PTP,{writing.short(acceleration.value * 100, 3)})")
             return
-        speed = tool_speed(ready)
+        speed = writing.tool_speed(ready)
         if speed is not None and speed > 0:
-            self._set("$VEL.CP", f"$VEL.CP={short(speed)}")
+            self.set_once("$VEL.CP", f"$VEL.CP={writing.short(speed)}")
         if motion.speed is not None and motion.speed.unit != "m/s":
             self.count["estimated"] += 1
         if motion.acceleration is not None and motion.acceleration.unit == "m/s2":
-            self._set("$ACC.CP", f"$ACC.CP={short(motion.acceleration.value)}")
+            self.set_once("$ACC.CP", f"$ACC.CP={writing.short(motion.acceleration.value)}")
 
-    def _joint_speed(self, ready: ReadyMotion) -> None:
+    def _joint_speed(self, ready: writing.ReadyMotion) -> None:
         speed = ready.motion.speed
-        share = share_of_max(ready, self.robot)
+        share = writing.share_of_max(ready, self.robot)
         if speed is None or (share is None and speed.unit == "share"):
             return
         if speed.unit != "share":
@@ -169,9 +127,9 @@ class KrlWriter(Writer):
             return
         if share > 1 + 1e-9:
             self.count["cut"] += 1
-        self._set("vel", f"BAS(#VEL_PTP,{short(min(max(share, 0.001), 1) * 100, 3)})")
+        self.set_once("vel", f"BAS(#VEL_PTP,{writing.short(min(max(share, 0.001), 1) * 100, 3)})")
 
-    def _zone(self, motion: ArmMotion) -> str:
+    def _zone(self, motion: instructions.ArmMotion) -> str:
         zone = motion.zone
         found = _joint_zone(zone) if motion.kind == "joint" else _line_zone(zone)
         if found is None:
@@ -179,23 +137,17 @@ class KrlWriter(Writer):
             return ""
         word, variable, value = found
         if variable:
-            self._set(variable, f"{variable}={short(value, 3)}")
+            self.set_once(variable, f"{variable}={writing.short(value, 3)}")
         return f" {word}"
 
-    def _set(self, key: str, line: str) -> None:
-        """A line that sets something, unless it is set so already."""
-        if self.settings.get(key) != line:
-            self.settings[key] = line
-            self.lines.append(line)
 
-
-def _joint_zone(zone: Zone) -> tuple[str, str, float] | None:
+def _joint_zone(zone: instructions.Zone) -> tuple[str, str, float] | None:
     if zone.kind == "share":
         return "C_PTP", "$APO.CPTP", zone.value * 100
     return ("C_PTP", "", 0.0) if zone.text == "C_PTP" and zone.kind == "named" else None
 
 
-def _line_zone(zone: Zone) -> tuple[str, str, float] | None:
+def _line_zone(zone: instructions.Zone) -> tuple[str, str, float] | None:
     match zone.kind:
         case "distance":
             return "C_DIS", "$APO.CDIS", zone.value * 1000
@@ -210,12 +162,16 @@ def _line_zone(zone: Zone) -> tuple[str, str, float] | None:
 
 def _axes_text(joints: Reals) -> str:
     parts = [
-        f"{key} {fixed(math.degrees(value), DIGITS)}" for key, value in zip(AXIS_KEYS, joints) if not np.isnan(value)
+        f"{key} {writing.fixed(math.degrees(value), DIGITS)}"
+        for key, value in zip(AXIS_KEYS, joints)
+        if not np.isnan(value)
     ]
     return "{" + ",".join(parts) + "}"
 
 
 def _frame_text(pose: Reals, turns: dict[str, float | str] | None = None) -> str:
-    parts = [f"{key} {fixed(value, DIGITS)}" for key, value in zip(FRAME_KEYS, numbers_of(pose, "kuka"))]
+    parts = [
+        f"{key} {writing.fixed(value, DIGITS)}" for key, value in zip(FRAME_KEYS, instructions.numbers_of(pose, "kuka"))
+    ]
     parts += [f"{key} {int(float(value))}" for key, value in (turns or {}).items() if key in ("S", "T")]
     return "{" + ",".join(parts) + "}"

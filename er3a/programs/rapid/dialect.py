@@ -14,77 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
+from er3a.programs import instructions, syntax
 from er3a.programs.evaluation import Dialect, Position, ProgramMemory
-from er3a.programs.instructions import (
-    FINE,
-    ArmMotion,
-    Aside,
-    Instruction,
-    JointTarget,
-    MotionKind,
-    NamedFrame,
-    Output,
-    PoseTarget,
-    Rate,
-    Target,
-    Unknown,
-    UnresolvedTarget,
-    Zone,
-)
-from er3a.programs.rapid.data_types import (
-    JOINTTARGET,
-    LEAST_LOAD,
-    LOADDATA,
-    NO_AXIS,
-    ROBTARGET,
-    SPEEDDATA,
-    TOOLDATA,
-    TURN_SPEED,
-    WOBJDATA,
-    ZONEDATA,
-    Shape,
-    branch_of,
-    external_axes,
-    load_of,
-    moved_target,
-    orient_record,
-    part,
-    plain,
-    pos_record,
-    pose_matrix,
-    pose_record,
-    predefined,
-    quarters_of,
-    rotation_of,
-    typed,
-)
-from er3a.programs.rapid.reader import (
-    ABSENT,
-    ARITHMETIC,
-    LATE,
-    NOT_SIMULATED,
-    PASSING,
-    SEARCHES,
-    STEP,
-    TYPED,
-    UPPER,
-    WAITS,
-)
-from er3a.programs.syntax import (
-    Doing,
-    Invocation,
-    Move,
-    Record,
-    Unclear,
-    Value,
-    Variable,
-    number,
-    numbers,
-    shown,
-)
+from er3a.programs.rapid import data_types, reader
 from er3a.robots.masses import MassBody, moved, together
 
-ROBOT_BASE = NamedFrame("wobj0", np.eye(4))
+ROBOT_BASE = instructions.NamedFrame("wobj0", np.eye(4))
 JOINT_FORMS = ("MOVEJ", "TRIGGJ")
 ARC_FORMS = ("MOVEC", "TRIGGC", "SEARCHC")
 SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
@@ -122,7 +57,7 @@ WRITE WRITEANYBIN WRITEBIN WRITEBLOCK WRITECFGDATA WRITERAWBYTES WRITESTRBIN STO
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Instructions that move nothing and set nothing that motions depend on (1, by their names)."""
-ASIDE_NAMED = NOT_SIMULATED - {"CORRWRITE", "SYNCTOSENSOR"} | {"EOFFSOFF"}
+ASIDE_NAMED = reader.NOT_SIMULATED - {"CORRWRITE", "SYNCTOSENSOR"} | {"EOFFSOFF"}
 """Instructions that are named as not simulated: the arm itself goes where its targets say."""
 PARAMETERS: Mapping[str, int] = {
     **{"OFFS": 4, "RELTOOL": 4, "POSEMULT": 2, "POSEINV": 1, "POSEVECT": 2, "ORIENTZYX": 3, "EULERZYX": 1},
@@ -170,7 +105,7 @@ IN_DEGREES: Mapping[str, Callable[..., float]] = {
 }
 JOINTS_OF = "%JOINTS_OF"
 """Kind of the joints of a target, which only the arm's table gives."""
-UNCLEAR = Unclear("")
+UNCLEAR = syntax.Unclear("")
 
 
 class RapidDialect(Dialect):
@@ -179,25 +114,25 @@ class RapidDialect(Dialect):
     modal = frozenset(MODAL)
     setters = frozenset((*SETTINGS, *OUTPUTS, "EOFFSOFF", "GRIPLOAD"))
 
-    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Speeds, zones, tool and work object that every controller has."""
-        return predefined(name)
+        return data_types.predefined(name)
 
-    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Mathematics, positions, where the arm stands; what is not known, or called otherwise, is unclear."""
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)
         named = {key: memory.value(each) for key, each in given.keywords}
-        unclear = Unclear(f"{given.function.lower()}({', '.join(map(shown, values))})")
-        if name == TYPED:
+        unclear = syntax.Unclear(f"{given.function.lower()}({', '.join(map(syntax.shown, values))})")
+        if name == reader.TYPED:
             assert isinstance(values[1], tuple)
-            return typed(values[0], _as_shape(values[1]))
-        if name == ARITHMETIC:
+            return data_types.typed(values[0], _as_shape(values[1]))
+        if name == reader.ARITHMETIC:
             return arithmetic(str(values[0]), values[1], values[2])
-        if name == UPPER:
+        if name == reader.UPPER:
             return values[0].upper() if isinstance(values[0], str) else values[0]
-        if name == STEP:
-            first, last = number(values[0]), number(values[1])
-            return Unclear("a step") if first is None or last is None else 1 if first <= last else -1
+        if name == reader.STEP:
+            first, last = syntax.number(values[0]), syntax.number(values[1])
+            return syntax.Unclear("a step") if first is None or last is None else 1 if first <= last else -1
         if PARAMETERS.get(name) != len(values) or named.keys() - SWITCHES.get(name, frozenset()):
             return unclear
         if name in ("CROBT", "CJOINTT", "CPOS", "CTOOL", "CWOBJ", "CALCROBT", "CALCJOINTT"):
@@ -207,24 +142,24 @@ class RapidDialect(Dialect):
         else:
             found = _of_data(name, values, named)
         if found is None:
-            first_unclear = next((each for each in values if isinstance(each, Unclear)), None)
+            first_unclear = next((each for each in values if isinstance(each, syntax.Unclear)), None)
             return first_unclear or unclear
         return found
 
-    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
         """MoveJ, MoveL, MoveC, MoveAbsJ, and those that do something besides."""
         form = move.form
         arc = form in ARC_FORMS or form.startswith("MOVEC")
         joint = "ABSJ" in form or form.startswith(JOINT_FORMS)
-        kind: MotionKind = "arc" if arc else "joint" if joint else "line"
+        kind: instructions.MotionKind = "arc" if arc else "joint" if joint else "line"
         placed = list(move.arguments)
         options = {name: memory.value(each) for name, each in move.settings}
-        if form in SEARCHES:  # signal, the point sought, targets, speed and tool; no zone
+        if form in reader.SEARCHES:  # signal, the point sought, targets, speed and tool; no zone
             placed = [*placed[2:-1], None, placed[-1]] if len(placed) == 5 + arc else []
         targets = 2 if arc else 1
         if len(placed) < targets + 3:
-            unknown = UnresolvedTarget(move.text, "not_understood")
-            return ArmMotion(kind, unknown, form, unknown if arc else None)
+            unknown = instructions.UnresolvedTarget(move.text, "not_understood")
+            return instructions.ArmMotion(kind, unknown, form, unknown if arc else None)
         behind = form.startswith("TRIGG")
         zone_at, tool_at = (-2, -1) if behind else (targets + 1, targets + 2)
         values = [UNCLEAR if each is None else memory.value(each) for each in placed]
@@ -232,19 +167,19 @@ class RapidDialect(Dialect):
         wobj = dict(move.settings).get("WOBJ")
         base, held = _base(memory, wobj, options.get("WOBJ"))
         frames = (tool, _displaced(memory, base))
-        fixed = UnresolvedTarget(move.text, "external_tool") if stationary or held else None
+        fixed = instructions.UnresolvedTarget(move.text, "external_tool") if stationary or held else None
         checked = memory.read("%CONFJ" if kind == "joint" else "%CONFL") is not False
         made = [
             fixed or self._target(memory, value, frames, (move.text, kind, "ABSJ" in form), checked)
             for value in values[:targets]
         ]
         speed, turn = _speed(memory, values[targets], options, kind)
-        zone = FINE if form in SEARCHES else _zone(values[zone_at], options, placed[zone_at])
-        memory.write(PASSING, zone.kind != "fine" or "CONC" in options)
+        zone = instructions.FINE if form in reader.SEARCHES else _zone(values[zone_at], options, placed[zone_at])
+        memory.write(reader.PASSING, zone.kind != "fine" or "CONC" in options)
         via = made[0] if arc else None
-        if isinstance(via, PoseTarget):
+        if isinstance(via, instructions.PoseTarget):
             via = replace(via, branch=None)
-        return ArmMotion(
+        return instructions.ArmMotion(
             kind,
             made[-1],
             SPELLED.get(form, form),
@@ -261,57 +196,67 @@ class RapidDialect(Dialect):
     def _target(
         self,
         memory: ProgramMemory,
-        value: Value,
-        frames: tuple[NamedFrame, NamedFrame],
-        said: tuple[str, MotionKind, bool],
+        value: syntax.Value,
+        frames: tuple[instructions.NamedFrame, instructions.NamedFrame],
+        said: tuple[str, instructions.MotionKind, bool],
         checked: bool,
-    ) -> Target:
+    ) -> instructions.Target:
         """What a target means; ``said`` is the line, the motion's kind, and whether it wants joint angles."""
         text, kind, absolute = said
-        if isinstance(value, Unclear):
-            return UnresolvedTarget(value.text or text, "undefined")
-        if isinstance(value, Record) and value.kind == JOINTS_OF and absolute:
+        if isinstance(value, syntax.Unclear):
+            return instructions.UnresolvedTarget(value.text or text, "undefined")
+        if isinstance(value, syntax.Record) and value.kind == JOINTS_OF and absolute:
             return _joints_of(value, frames, text)
-        value = typed(value, JOINTTARGET if absolute else ROBTARGET)
-        external = external_axes(part(value, "EXTAX"))
+        value = data_types.typed(value, data_types.JOINTTARGET if absolute else data_types.ROBTARGET)
+        external = data_types.external_axes(data_types.part(value, "EXTAX"))
         if absolute:
             return _joint_target(memory, value, text, external)
-        unclear = next((each for each in _leaves(value) if isinstance(each, Unclear)), None)
+        unclear = next((each for each in _leaves(value) if isinstance(each, syntax.Unclear)), None)
         if unclear is not None:
-            return UnresolvedTarget(unclear.text, "undefined")
-        pose = pose_matrix(value)
+            return instructions.UnresolvedTarget(unclear.text, "undefined")
+        pose = data_types.pose_matrix(value)
         if pose is None:
-            return UnresolvedTarget(text, "not_understood")
-        conf = plain(part(value, "ROBCONF"), 4)
+            return instructions.UnresolvedTarget(text, "not_understood")
+        conf = data_types.plain(data_types.part(value, "ROBCONF"), 4)
         said_of = tuple(zip(("cf1", "cf4", "cf6", "cfx"), conf)) if conf is not None else ()
-        branch = branch_of(conf, memory.cell.joints) if checked else None
+        branch = data_types.branch_of(conf, memory.cell.joints) if checked else None
         kept = said_of if checked or kind != "joint" else ()
-        return PoseTarget(pose, kept, external=external, branch=branch)
+        return instructions.PoseTarget(pose, kept, external=external, branch=branch)
 
-    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
         """Settings, outputs, what is harmless; the rest is unknown."""
         call = doing.what
-        assert isinstance(call, Invocation)
+        assert isinstance(call, syntax.Invocation)
         if call.function == "GRIPLOAD":
             given = call.arguments[0] if len(call.arguments) == 1 else None
             gripped = UNCLEAR if given is None else memory.value(given)
             memory.write("%GRIPLOAD", gripped)
-            return None if load_of(typed(gripped, LOADDATA)) else Aside(doing.text)
+            return (
+                None
+                if data_types.load_of(data_types.typed(gripped, data_types.LOADDATA))
+                else instructions.Aside(doing.text)
+            )
         if call.function in SETTINGS:
-            return None if _set(memory, call) else Unknown(doing.text, may_move=False)
+            return None if _set(memory, call) else instructions.Unknown(doing.text, may_move=False)
         if call.function in OUTPUTS and call.arguments:
             first = call.arguments[0]
-            return Output(first.name if isinstance(first, Variable) else call.function, doing.text)
+            return instructions.Output(first.name if isinstance(first, syntax.Variable) else call.function, doing.text)
         if call.function == "EOFFSOFF" or self.harmless(call):
-            return Aside(doing.text)
-        return Unknown(doing.text)
+            return instructions.Aside(doing.text)
+        return instructions.Unknown(doing.text)
 
-    def harmless(self, call: Invocation) -> bool:
+    def harmless(self, call: syntax.Invocation) -> bool:
         """Functions and instructions whose exact name is known, and that set nothing."""
         name = call.function
-        if name in SETTINGS or name in (LATE, "GRIPLOAD"):
+        if name in SETTINGS or name in (reader.LATE, "GRIPLOAD"):
             return False
-        return name[:1] == "%" or name in PARAMETERS or name in HARMLESS or name in ASKED or name in ASIDE_NAMED | WAITS
+        return (
+            name[:1] == "%"
+            or name in PARAMETERS
+            or name in HARMLESS
+            or name in ASKED
+            or name in ASIDE_NAMED | reader.WAITS
+        )
 
 
 SPELLED = {
@@ -327,67 +272,74 @@ SPELLED = {
 }
 
 
-def _as_shape(value: tuple[Value, ...]) -> Shape:
+def _as_shape(value: tuple[syntax.Value, ...]) -> data_types.Shape:
     return tuple(_as_shape(each) if isinstance(each, tuple) else str(each) for each in value)
 
 
-def _leaves(value: Value) -> list[Value]:
-    parts = value.values()[:2] if isinstance(value, Record) and value.kind == "ROBTARGET" else (value,)
-    inside = [each.values() if isinstance(each, Record) else (each,) for each in parts]
+def _leaves(value: syntax.Value) -> list[syntax.Value]:
+    parts = value.values()[:2] if isinstance(value, syntax.Record) and value.kind == "ROBTARGET" else (value,)
+    inside = [each.values() if isinstance(each, syntax.Record) else (each,) for each in parts]
     return [each for values in inside for each in values]
 
 
-def _joint_target(memory: ProgramMemory, value: Value, text: str, external: tuple[tuple[str, float], ...]) -> Target:
-    axes = part(value, "ROBAX")
-    values = axes.values() if isinstance(axes, Record) else ()
-    unclear = next((each for each in values if isinstance(each, Unclear)), None)
+def _joint_target(
+    memory: ProgramMemory, value: syntax.Value, text: str, external: tuple[tuple[str, float], ...]
+) -> instructions.Target:
+    axes = data_types.part(value, "ROBAX")
+    values = axes.values() if isinstance(axes, syntax.Record) else ()
+    unclear = next((each for each in values if isinstance(each, syntax.Unclear)), None)
     if unclear is not None:
-        return UnresolvedTarget(unclear.text, "undefined")
-    degrees = plain(axes, 6)
+        return instructions.UnresolvedTarget(unclear.text, "undefined")
+    degrees = data_types.plain(axes, 6)
     if degrees is None:
-        return UnresolvedTarget(text, "not_understood")
+        return instructions.UnresolvedTarget(text, "not_understood")
     count = memory.cell.joints
-    if any(each and abs(each) < NO_AXIS / 10 for each in degrees[count:]):
-        return UnresolvedTarget(text, "too_many_joints")
-    return JointTarget(np.radians(degrees[:count]), external)
+    if any(each and abs(each) < data_types.NO_AXIS / 10 for each in degrees[count:]):
+        return instructions.UnresolvedTarget(text, "too_many_joints")
+    return instructions.JointTarget(np.radians(degrees[:count]), external)
 
 
-def _joints_of(value: Record, frames: tuple[NamedFrame, NamedFrame], text: str) -> Target:
+def _joints_of(
+    value: syntax.Record, frames: tuple[instructions.NamedFrame, instructions.NamedFrame], text: str
+) -> instructions.Target:
     """The joints of a target for a tool and a work object, as a pose of those of the motion."""
-    target = part(value, "TARGET")
-    pose = pose_matrix(target)
-    tool, _ = frame_of_tool(part(value, "TOOL"))
-    base, _ = frame_of_object(part(value, "WOBJ") or predefined("WOBJ0"))
+    target = data_types.part(value, "TARGET")
+    pose = data_types.pose_matrix(target)
+    tool, _ = frame_of_tool(data_types.part(value, "TOOL"))
+    base, _ = frame_of_object(data_types.part(value, "WOBJ") or data_types.predefined("WOBJ0"))
     now, here = frames[0].pose, frames[1].pose
     if pose is None or tool is None or base is None or now is None or here is None:
-        return UnresolvedTarget(text, "not_understood")
-    conf = plain(part(target, "ROBCONF"), 4)
+        return instructions.UnresolvedTarget(text, "not_understood")
+    conf = data_types.plain(data_types.part(target, "ROBCONF"), 4)
     found = np.linalg.inv(here) @ base @ pose @ np.linalg.inv(tool) @ now
     said = tuple(zip(("cf1", "cf4", "cf6", "cfx"), conf)) if conf is not None else ()
-    return PoseTarget(found, said, branch=branch_of(conf, 6))
+    return instructions.PoseTarget(found, said, branch=data_types.branch_of(conf, 6))
 
 
-def frame_of_tool(value: Value | None) -> tuple[Reals | None, bool]:
+def frame_of_tool(value: syntax.Value | None) -> tuple[Reals | None, bool]:
     """T_flange_tool (4, 4) in m of tooldata, and whether the tool stands beside the arm (3 tooldata: robhold)."""
-    data = typed(value, TOOLDATA) if value is not None else None
-    return pose_matrix(part(data, "TFRAME")), part(data, "ROBHOLD") is False
+    data = data_types.typed(value, data_types.TOOLDATA) if value is not None else None
+    return data_types.pose_matrix(data_types.part(data, "TFRAME")), data_types.part(data, "ROBHOLD") is False
 
 
-def frame_of_object(value: Value | None) -> tuple[Reals | None, bool]:
+def frame_of_object(value: syntax.Value | None) -> tuple[Reals | None, bool]:
     """T_robot_object (4, 4) in m of wobjdata, and whether the arm holds the object (3 wobjdata: robhold).
 
     The object's frame stands in the user's frame, and that in the world, which is the robot's base unless a controller
     is set up otherwise. None where an external unit moves the user's frame (ufprog FALSE, ufmec).
     """
-    data = typed(value, WOBJDATA) if value is not None else None
-    user, own = pose_matrix(part(data, "UFRAME")), pose_matrix(part(data, "OFRAME"))
-    still = part(data, "UFPROG") is True
+    data = data_types.typed(value, data_types.WOBJDATA) if value is not None else None
+    user, own = (
+        data_types.pose_matrix(data_types.part(data, "UFRAME")),
+        data_types.pose_matrix(data_types.part(data, "OFRAME")),
+    )
+    still = data_types.part(data, "UFPROG") is True
     pose = user @ own if user is not None and own is not None and still else None
-    return pose, part(data, "ROBHOLD") is True
+    return pose, data_types.part(data, "ROBHOLD") is True
 
 
 def _name_of(expression: object) -> str:
-    return expression.name.lower() if isinstance(expression, Variable) else ""
+    return expression.name.lower() if isinstance(expression, syntax.Variable) else ""
 
 
 def _mapped(memory: ProgramMemory, name: str) -> Reals | None:
@@ -395,113 +347,121 @@ def _mapped(memory: ProgramMemory, name: str) -> Reals | None:
     return next((pose for key, pose in memory.cell.frames.items() if key.lower() == name), None)
 
 
-def _tool(memory: ProgramMemory, expression: object, value: Value) -> tuple[NamedFrame, bool]:
+def _tool(memory: ProgramMemory, expression: object, value: syntax.Value) -> tuple[instructions.NamedFrame, bool]:
     pose, stationary = frame_of_tool(value)
     name = _name_of(expression)
     if pose is None:
-        name = value.text.lower() if isinstance(value, Unclear) else name or "tooldata"
+        name = value.text.lower() if isinstance(value, syntax.Unclear) else name or "tooldata"
         pose = _mapped(memory, name)
-    load = load_of(part(typed(value, TOOLDATA), "TLOAD"))
-    return NamedFrame(name, pose, load if load is not None and load.mass > LEAST_LOAD else None), stationary
+    load = data_types.load_of(data_types.part(data_types.typed(value, data_types.TOOLDATA), "TLOAD"))
+    return instructions.NamedFrame(
+        name, pose, load if load is not None and load.mass > data_types.LEAST_LOAD else None
+    ), stationary
 
 
-def _load(memory: ProgramMemory, tool: NamedFrame, total: Value | None) -> MassBody | str | None:
+def _load(memory: ProgramMemory, tool: instructions.NamedFrame, total: syntax.Value | None) -> MassBody | str | None:
     """What the program says hangs on the flange: the tool, and what GripLoad says is in it (in the tool's frame).
 
     ``\\TLoad`` says all of it; load0 there is as if it were not given (1 MoveL).
     """
-    whole = load_of(typed(total, LOADDATA)) if total is not None else None
+    whole = data_types.load_of(data_types.typed(total, data_types.LOADDATA)) if total is not None else None
     if total is not None and whole is None:
-        return f"\\TLoad {total.text if isinstance(total, Unclear) else ''}".strip()
-    if whole is not None and whole.mass > LEAST_LOAD:
+        return f"\\TLoad {total.text if isinstance(total, syntax.Unclear) else ''}".strip()
+    if whole is not None and whole.mass > data_types.LEAST_LOAD:
         return whole
     value = memory.read("%GRIPLOAD")
     if value is None:
         return tool.load
-    gripped = load_of(typed(value, LOADDATA))
+    gripped = data_types.load_of(data_types.typed(value, data_types.LOADDATA))
     if gripped is None:
-        return f"GripLoad {value.text if isinstance(value, Unclear) else ''}".strip()
-    if gripped.mass <= LEAST_LOAD:
+        return f"GripLoad {value.text if isinstance(value, syntax.Unclear) else ''}".strip()
+    if gripped.mass <= data_types.LEAST_LOAD:
         return tool.load
     if tool.pose is None:
         return f"GripLoad ({tool.name})"
     return together([*([tool.load] if tool.load else []), moved(gripped, tool.pose)])
 
 
-def _base(memory: ProgramMemory, expression: object, value: Value | None) -> tuple[NamedFrame, bool]:
-    if value is None or value == ABSENT:
+def _base(
+    memory: ProgramMemory, expression: object, value: syntax.Value | None
+) -> tuple[instructions.NamedFrame, bool]:
+    if value is None or value == reader.ABSENT:
         return ROBOT_BASE, False
     pose, held = frame_of_object(value)
     name = _name_of(expression)
     if pose is None:
-        name = value.text.lower() if isinstance(value, Unclear) else name or "wobjdata"
+        name = value.text.lower() if isinstance(value, syntax.Unclear) else name or "wobjdata"
         pose = _mapped(memory, name)
-    return NamedFrame(name, pose), held
+    return instructions.NamedFrame(name, pose), held
 
 
-def _displaced(memory: ProgramMemory, base: NamedFrame) -> NamedFrame:
+def _displaced(memory: ProgramMemory, base: instructions.NamedFrame) -> instructions.NamedFrame:
     """A work object with the program's displacement."""
     moved = memory.read("%PDISP")
     if moved is None or base.pose is None:
         return base
-    pose = pose_matrix(moved)
+    pose = data_types.pose_matrix(moved)
     if pose is None or not np.array_equal(pose, np.eye(4)):
-        base = NamedFrame("PDispOn" if pose is None else "", None if pose is None else base.pose @ pose)
+        base = instructions.NamedFrame("PDispOn" if pose is None else "", None if pose is None else base.pose @ pose)
     return base
 
 
 def _speed(
-    memory: ProgramMemory, value: Value, options: Mapping[str, Value], kind: MotionKind
-) -> tuple[Rate | None, float | None]:
+    memory: ProgramMemory, value: syntax.Value, options: Mapping[str, syntax.Value], kind: instructions.MotionKind
+) -> tuple[instructions.Rate | None, float | None]:
     """Speed of the tool and of its turn (rad/s); 1 VelSet scales and bounds it."""
-    seconds = number(options.get("T"))
+    seconds = syntax.number(options.get("T"))
     if seconds is not None and seconds > 0:
-        return Rate(seconds, "s"), None
+        return instructions.Rate(seconds, "s"), None
     share, most = _velocity(memory)
-    if isinstance(value, Record) and value.get("FASTEST") is True:
+    if isinstance(value, syntax.Record) and value.get("FASTEST") is True:
         if kind == "joint":
-            return Rate(share, "share", "vmax"), None
-        return Rate(most / 1000 * share, "m/s", "vmax"), math.radians(TURN_SPEED) * share
-    data = typed(value, SPEEDDATA)
-    along, turn = number(part(data, "V_TCP")), number(part(data, "V_ORI"))
-    own = number(options.get("V"))
+            return instructions.Rate(share, "share", "vmax"), None
+        return instructions.Rate(most / 1000 * share, "m/s", "vmax"), math.radians(data_types.TURN_SPEED) * share
+    data = data_types.typed(value, data_types.SPEEDDATA)
+    along, turn = syntax.number(data_types.part(data, "V_TCP")), syntax.number(data_types.part(data, "V_ORI"))
+    own = syntax.number(options.get("V"))
     along = along if own is None else own
     if along is None or along <= 0:
         return None, None
     limited = min(along * share, most)
-    return Rate(limited / 1000, "m/s"), math.radians(turn) * share if turn and kind != "joint" else None
+    return instructions.Rate(limited / 1000, "m/s"), math.radians(turn) * share if turn and kind != "joint" else None
 
 
 def _velocity(memory: ProgramMemory) -> tuple[float, float]:
     """The share of programmed speeds, and the largest in mm/s."""
-    found = plain(memory.read("%SPEED"), 2)
+    found = data_types.plain(memory.read("%SPEED"), 2)
     return (1.0, FULL_SPEED) if found is None else (found[0] / 100, found[1])
 
 
-def _acceleration(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
-    limits = [number(memory.read(name)) for name in ("%PATHACCLIM", "%WORLDACCLIM")]
+def _acceleration(memory: ProgramMemory, kind: instructions.MotionKind) -> instructions.Rate | None:
+    limits = [syntax.number(memory.read(name)) for name in ("%PATHACCLIM", "%WORLDACCLIM")]
     given = [each for each in limits if each is not None]
     if given and kind != "joint":
-        return Rate(min(given), "m/s2")
-    percent = number(memory.read("%ACC"))
-    return None if percent is None else Rate(percent / 100, "share")
+        return instructions.Rate(min(given), "m/s2")
+    percent = syntax.number(memory.read("%ACC"))
+    return None if percent is None else instructions.Rate(percent / 100, "share")
 
 
-def _zone(value: Value, options: Mapping[str, Value], expression: object) -> Zone:
+def _zone(value: syntax.Value, options: Mapping[str, syntax.Value], expression: object) -> instructions.Zone:
     """3 zonedata; ``\\Z`` replaces the size of the path's zone; ``\\Inpos`` asks for a stop."""
     if "INPOS" in options:
-        return FINE
-    own = number(options.get("Z"))
-    data = typed(value, ZONEDATA)
-    if own is None and part(data, "FINEP") is True:
-        return FINE
-    size = number(part(data, "PZONE_TCP")) if own is None else own
+        return instructions.FINE
+    own = syntax.number(options.get("Z"))
+    data = data_types.typed(value, data_types.ZONEDATA)
+    if own is None and data_types.part(data, "FINEP") is True:
+        return instructions.FINE
+    size = syntax.number(data_types.part(data, "PZONE_TCP")) if own is None else own
     if size is None:
-        return Zone("named", 0.0, _name_of(expression) or "zonedata")
-    return Zone("distance", size / 1000, _name_of(expression) if own is None else "") if size > 0 else FINE
+        return instructions.Zone("named", 0.0, _name_of(expression) or "zonedata")
+    return (
+        instructions.Zone("distance", size / 1000, _name_of(expression) if own is None else "")
+        if size > 0
+        else instructions.FINE
+    )
 
 
-def _set(memory: ProgramMemory, call: Invocation) -> bool:
+def _set(memory: ProgramMemory, call: syntax.Invocation) -> bool:
     """Carry a setting out; False for one that is not understood."""
     values = [UNCLEAR if each is None else memory.value(each) for each in call.arguments]
     options = {key: memory.value(each) for key, each in call.keywords}
@@ -510,40 +470,42 @@ def _set(memory: ProgramMemory, call: Invocation) -> bool:
             memory.write(f"%{call.function}", "OFF" not in options)
             return True
         case "ACCSET":
-            percent = number(values[0]) if values else None
-            memory.write("%ACC", Unclear("AccSet") if percent is None else max(percent, SLOWEST_RAMP))
+            percent = syntax.number(values[0]) if values else None
+            memory.write("%ACC", syntax.Unclear("AccSet") if percent is None else max(percent, SLOWEST_RAMP))
             return percent is not None
         case "VELSET":
-            found = numbers(tuple(values)) if len(values) == 2 else None
-            memory.write("%SPEED", Unclear("VelSet") if found is None else found)
+            found = syntax.numbers(tuple(values)) if len(values) == 2 else None
+            memory.write("%SPEED", syntax.Unclear("VelSet") if found is None else found)
             return found is not None
         case "PATHACCLIM" | "WORLDACCLIM":
-            limits = [number(options.get(key)) for key in ("ACCMAX", "DECELMAX", "ON")]
+            limits = [syntax.number(options.get(key)) for key in ("ACCMAX", "DECELMAX", "ON")]
             given = [each for each in limits if each is not None]
-            memory.write(f"%{call.function}", min(given) if given else Unclear("off"))
+            memory.write(f"%{call.function}", min(given) if given else syntax.Unclear("off"))
             return True
         case "PDISPOFF":
-            memory.write("%PDISP", pose_record(np.eye(4)))
+            memory.write("%PDISP", data_types.pose_record(np.eye(4)))
             return True
         case "PDISPSET":
-            pose = pose_matrix(values[0]) if values else None
-            memory.write("%PDISP", Unclear("PDispSet") if pose is None else pose_record(pose))
+            pose = data_types.pose_matrix(values[0]) if values else None
+            memory.write("%PDISP", syntax.Unclear("PDispSet") if pose is None else data_types.pose_record(pose))
             return pose is not None
         case _:
             return _displace(memory, call, values, options)
 
 
-def _displace(memory: ProgramMemory, call: Invocation, values: list[Value], options: Mapping[str, Value]) -> bool:
+def _displace(
+    memory: ProgramMemory, call: syntax.Invocation, values: list[syntax.Value], options: Mapping[str, syntax.Value]
+) -> bool:
     """1 PDispOn: by how much where the arm stands, or ExeP, is off the programmed point; turned too with ``\\Rot``."""
-    memory.write("%PDISP", Unclear("PDispOn"))
+    memory.write("%PDISP", syntax.Unclear("PDispOn"))
     if len(values) != 2:
         return False
     tool, _ = _tool(memory, call.arguments[1], values[1])
     base, _ = _base(memory, dict(call.keywords).get("WOBJ"), options.get("WOBJ"))
-    programmed = pose_matrix(typed(values[0], ROBTARGET))
+    programmed = data_types.pose_matrix(data_types.typed(values[0], data_types.ROBTARGET))
     given = options.get("EXEP")
     actual = (
-        pose_matrix(typed(given, ROBTARGET))
+        data_types.pose_matrix(data_types.typed(given, data_types.ROBTARGET))
         if given is not None
         else _here(memory).seen(tool, base, memory.cell.flange)
     )
@@ -553,40 +515,40 @@ def _displace(memory: ProgramMemory, call: Invocation, values: list[Value], opti
     if "ROT" not in options:
         moved = np.eye(4)
         moved[:3, 3] = actual[:3, 3] - programmed[:3, 3]
-    memory.write("%PDISP", pose_record(moved))
+    memory.write("%PDISP", data_types.pose_record(moved))
     return True
 
 
-def arithmetic(sign: str, left: Value, right: Value) -> Value:
+def arithmetic(sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:
     """Sums and products: of numbers, texts and positions, a number times a position, cross products, turns.
 
     RAPID Reference Manual, 7.1: pos * pos is the cross product, orient * orient the product of turns.
     """
     for side in (left, right):
-        if isinstance(side, Unclear):
+        if isinstance(side, syntax.Unclear):
             return side
-    unclear = Unclear(f"{shown(left)} {sign} {shown(right)}")
+    unclear = syntax.Unclear(f"{syntax.shown(left)} {sign} {syntax.shown(right)}")
     if sign == "+" and isinstance(left, str) and isinstance(right, str):
         return left + right if len(left) + len(right) < 1000 else unclear
-    a, b = number(left), number(right)
+    a, b = syntax.number(left), syntax.number(right)
     if a is not None and b is not None:
         found = a + b if sign == "+" else a - b if sign == "-" else a * b
         whole = isinstance(left, int) and isinstance(right, int) and abs(found) < 2**53
         return int(found) if whole else found
-    xyz, other = plain(left, 3), plain(right, 3)
+    xyz, other = data_types.plain(left, 3), data_types.plain(right, 3)
     if xyz is not None and other is not None:
         p, q = np.array(xyz), np.array(other)
-        return pos_record((p + q if sign == "+" else p - q if sign == "-" else np.cross(p, q)) / 1000)
+        return data_types.pos_record((p + q if sign == "+" else p - q if sign == "-" else np.cross(p, q)) / 1000)
     if sign == "*" and (a is not None or b is not None) and (xyz is not None or other is not None):
         scale = a if a is not None else b
         assert scale is not None
-        return pos_record(scale * np.array(xyz if xyz is not None else other) / 1000)
-    turn, then = rotation_of(left), rotation_of(right)
-    return orient_record(turn @ then) if sign == "*" and turn is not None and then is not None else unclear
+        return data_types.pos_record(scale * np.array(xyz if xyz is not None else other) / 1000)
+    turn, then = data_types.rotation_of(left), data_types.rotation_of(right)
+    return data_types.orient_record(turn @ then) if sign == "*" and turn is not None and then is not None else unclear
 
 
-def _number_of(name: str, values: tuple[Value, ...]) -> Value | None:
-    plain_values = numbers(values)
+def _number_of(name: str, values: tuple[syntax.Value, ...]) -> syntax.Value | None:
+    plain_values = syntax.numbers(values)
     if plain_values is None:
         return None
     try:
@@ -599,12 +561,16 @@ def _number_of(name: str, values: tuple[Value, ...]) -> Value | None:
 
 def _here(memory: ProgramMemory) -> Position:
     """Where the arm stands; not known behind a motion that the program does not wait for (7-zonedata-1)."""
-    return memory.here if memory.read(PASSING) in (None, False) else Position()
+    return memory.here if memory.read(reader.PASSING) in (None, False) else Position()
 
 
 def _of_position(
-    memory: ProgramMemory, name: str, values: tuple[Value, ...], named: Mapping[str, Value], given: Invocation
-) -> Value | None:
+    memory: ProgramMemory,
+    name: str,
+    values: tuple[syntax.Value, ...],
+    named: Mapping[str, syntax.Value],
+    given: syntax.Invocation,
+) -> syntax.Value | None:
     """Where the arm stands, and what its table gives.
 
     2 CRobT, 2 CPos: in the work object, for the tool; where none is given, those of the last motion.
@@ -614,8 +580,8 @@ def _of_position(
     if name == "CJOINTT":
         if here.joints is None:
             return None
-        degrees: list[Value] = [*map(float, np.degrees(here.joints)), *[0.0] * (6 - len(here.joints))]
-        return typed((tuple(degrees), (NO_AXIS,) * 6), JOINTTARGET)
+        degrees: list[syntax.Value] = [*map(float, np.degrees(here.joints)), *[0.0] * (6 - len(here.joints))]
+        return data_types.typed((tuple(degrees), (data_types.NO_AXIS,) * 6), data_types.JOINTTARGET)
     if name in ("CTOOL", "CWOBJ"):
         return None
     tool = _tool(memory, words.get("TOOL"), named["TOOL"])[0] if "TOOL" in named else here.tool
@@ -624,21 +590,21 @@ def _of_position(
         seen = here.seen(tool, _displaced(memory, base) if "WOBJ" in named else base, memory.cell.flange)
         if seen is None:
             return None
-        conf: Value = (0, 0, 0, 0)
+        conf: syntax.Value = (0, 0, 0, 0)
         if here.joints is not None and len(here.joints) == 6:
-            conf = (*quarters_of(here.joints), -1)
+            conf = (*data_types.quarters_of(here.joints), -1)
         elif isinstance(here.pose, np.ndarray):
-            conf = (Unclear("cf1"),) * 4
-        return pos_record(seen[:3, 3]) if name == "CPOS" else _robtarget(seen, conf)
-    data = typed(values[0], JOINTTARGET if name == "CALCROBT" else ROBTARGET)
+            conf = (syntax.Unclear("cf1"),) * 4
+        return data_types.pos_record(seen[:3, 3]) if name == "CPOS" else _robtarget(seen, conf)
+    data = data_types.typed(values[0], data_types.JOINTTARGET if name == "CALCROBT" else data_types.ROBTARGET)
     given_tool, _ = _tool(memory, given.arguments[1], values[1])
     base, _ = _base(memory, words.get("WOBJ"), named.get("WOBJ"))
     if name == "CALCJOINTT":
-        wobj = named.get("WOBJ") or predefined("WOBJ0")
-        if pose_matrix(data) is None or wobj is None:
+        wobj = named.get("WOBJ") or data_types.predefined("WOBJ0")
+        if data_types.pose_matrix(data) is None or wobj is None:
             return None
-        return Record(JOINTS_OF, (("TARGET", data), ("TOOL", values[1]), ("WOBJ", wobj)))
-    degrees_given = plain(part(data, "ROBAX"), 6)
+        return syntax.Record(JOINTS_OF, (("TARGET", data), ("TOOL", values[1]), ("WOBJ", wobj)))
+    degrees_given = data_types.plain(data_types.part(data, "ROBAX"), 6)
     flange = memory.cell.flange
     if (
         degrees_given is None
@@ -650,63 +616,63 @@ def _of_position(
         return None
     joints = np.radians(degrees_given)
     pose: Reals = np.linalg.inv(base.pose) @ flange(joints) @ given_tool.pose
-    return _robtarget(pose, (*quarters_of(joints), -1))
+    return _robtarget(pose, (*data_types.quarters_of(joints), -1))
 
 
-def _robtarget(T: Reals, conf: Value) -> Record:
+def _robtarget(T: Reals, conf: syntax.Value) -> syntax.Record:
     """A robtarget of a pose (4, 4) in m; its cfx is -1 where the arm's sides are not known."""
-    items = (("TRANS", pos_record(T[:3, 3])), ("ROT", orient_record(T[:3, :3])))
-    found = typed((0, 0, conf, (NO_AXIS,) * 6), ROBTARGET)
-    assert isinstance(found, Record)
-    return Record("ROBTARGET", (*items, *found.items[2:]))
+    items = (("TRANS", data_types.pos_record(T[:3, 3])), ("ROT", data_types.orient_record(T[:3, :3])))
+    found = data_types.typed((0, 0, conf, (data_types.NO_AXIS,) * 6), data_types.ROBTARGET)
+    assert isinstance(found, syntax.Record)
+    return syntax.Record("ROBTARGET", (*items, *found.items[2:]))
 
 
-def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
+def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, syntax.Value]) -> syntax.Value | None:
     """Functions of positions, texts and numbers, as ABB's manual defines them (2, each by its name)."""
-    plain_values = numbers(values)
+    plain_values = syntax.numbers(values)
     match name:
         case "OFFS" | "RELTOOL":
             return _shifted(name, values, named)
         case "POSEMULT":
-            a, b = map(pose_matrix, values)
-            return None if a is None or b is None else pose_record(a @ b)
+            a, b = map(data_types.pose_matrix, values)
+            return None if a is None or b is None else data_types.pose_record(a @ b)
         case "POSEINV":
-            pose = pose_matrix(values[0])
-            return None if pose is None else pose_record(np.asarray(np.linalg.inv(pose), np.float64))
+            pose = data_types.pose_matrix(values[0])
+            return None if pose is None else data_types.pose_record(np.asarray(np.linalg.inv(pose), np.float64))
         case "POSEVECT":
-            pose, xyz = pose_matrix(values[0]), plain(values[1], 3)
+            pose, xyz = data_types.pose_matrix(values[0]), data_types.plain(values[1], 3)
             if pose is None or xyz is None:
                 return None
-            return pos_record(pose[:3, :3] @ np.array(xyz) / 1000 + pose[:3, 3])
+            return data_types.pos_record(pose[:3, :3] @ np.array(xyz) / 1000 + pose[:3, 3])
         case "ORIENTZYX" if plain_values is not None:  # about z, then the new y, then the new x
-            return orient_record(transform(np.zeros(3), np.radians(plain_values[::-1]))[:3, :3])
+            return data_types.orient_record(transform(np.zeros(3), np.radians(plain_values[::-1]))[:3, :3])
         case "EULERZYX":
-            turn = rotation_of(values[0])
+            turn = data_types.rotation_of(values[0])
             axis = next((i for i, letter in enumerate("XYZ") if letter in named), None)
             return None if turn is None or axis is None else float(np.degrees(rpy_of(turn)[axis]))
         case "NORIENT":
-            turn = rotation_of(values[0])
-            return None if turn is None else orient_record(turn)
+            turn = data_types.rotation_of(values[0])
+            return None if turn is None else data_types.orient_record(turn)
         case "DEFFRAME":
             return _frame_of_points(values, named)
         case "DISTANCE" | "DOTPROD":
-            a3, b3 = plain(values[0], 3), plain(values[1], 3)
+            a3, b3 = data_types.plain(values[0], 3), data_types.plain(values[1], 3)
             if a3 is None or b3 is None:
                 return None
             return float(np.linalg.norm(np.subtract(a3, b3)) if name == "DISTANCE" else np.dot(a3, b3))
         case "VECTMAGN":
-            xyz = plain(values[0], 3)
+            xyz = data_types.plain(values[0], 3)
             return None if xyz is None else float(np.linalg.norm(xyz))
         case "TRUNC" | "ROUND" if plain_values is not None:
-            return _rounded(name, plain_values[0], number(named.get("DEC")) or 0)
+            return _rounded(name, plain_values[0], syntax.number(named.get("DEC")) or 0)
         case "DIM":
             return _dimension(values)
         case "PRESENT":
-            return None if isinstance(values[0], Unclear) else values[0] != ABSENT
+            return None if isinstance(values[0], syntax.Unclear) else values[0] != reader.ABSENT
         case "STRLEN" if isinstance(values[0], str):
             return len(values[0])
         case "STRPART" if isinstance(values[0], str):
-            start, length = number(values[1]), number(values[2])
+            start, length = syntax.number(values[1]), syntax.number(values[2])
             return None if start is None or length is None else values[0][int(start) - 1 : int(start) - 1 + int(length)]
         case "NUMTOSTR" if plain_values is not None:
             return f"{plain_values[0]:.{int(plain_values[1])}f}" if 0 <= plain_values[1] <= 15 else None
@@ -717,30 +683,32 @@ def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -
     return None
 
 
-def _shifted(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
+def _shifted(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, syntax.Value]) -> syntax.Value | None:
     """2 Offs: along the object's axes. 2 RelTool: along the tool's, then turned about x, the new y, the new z."""
-    target = typed(values[0], ROBTARGET)
-    pose = pose_matrix(target)
-    shift = numbers(values[1:])
-    if not isinstance(target, Record) or pose is None or shift is None:
+    target = data_types.typed(values[0], data_types.ROBTARGET)
+    pose = data_types.pose_matrix(target)
+    shift = syntax.numbers(values[1:])
+    if not isinstance(target, syntax.Record) or pose is None or shift is None:
         return None
     moved = pose.copy()
     if name == "OFFS":
         moved[:3, 3] += np.array(shift) / 1000
-        return target.having("TRANS", pos_record(moved[:3, 3]))
-    turns = [number(named.get(key, 0.0)) for key in ("RX", "RY", "RZ")]
+        return target.having("TRANS", data_types.pos_record(moved[:3, 3]))
+    turns = [syntax.number(named.get(key, 0.0)) for key in ("RX", "RY", "RZ")]
     angles = [each for each in turns if each is not None]
     if len(angles) < 3:
         return None
     step = np.eye(4)
     step[:3, 3] = np.array(shift) / 1000
     step[:3, :3] = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
-    return moved_target(target, pose @ step)
+    return data_types.moved_target(target, pose @ step)
 
 
-def _frame_of_points(values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
+def _frame_of_points(values: tuple[syntax.Value, ...], named: Mapping[str, syntax.Value]) -> syntax.Value | None:
     """2 DefFrame: origin at the first point, x towards the second, the third with a positive y."""
-    points = [plain(part(typed(each, ROBTARGET), "TRANS"), 3) for each in values]
+    points = [
+        data_types.plain(data_types.part(data_types.typed(each, data_types.ROBTARGET), "TRANS"), 3) for each in values
+    ]
     if named or None in points:
         return None
     first, second, third = (np.array(each) / 1000 for each in points if each is not None)
@@ -751,19 +719,19 @@ def _frame_of_points(values: tuple[Value, ...], named: Mapping[str, Value]) -> V
     T = np.eye(4)
     T[:3, 0], T[:3, 2], T[:3, 3] = x / np.linalg.norm(x), z / np.linalg.norm(z), first
     T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
-    return pose_record(T)
+    return data_types.pose_record(T)
 
 
-def _rounded(name: str, value: float, digits: float) -> Value:
+def _rounded(name: str, value: float, digits: float) -> syntax.Value:
     scale = 10.0 ** int(digits)
     found = math.trunc(value * scale) if name == "TRUNC" else math.floor(abs(value) * scale + 0.5)
     signed = found if name == "TRUNC" else math.copysign(found, value)
     return int(signed) if not digits else signed / scale
 
 
-def _dimension(values: tuple[Value, ...]) -> Value | None:
+def _dimension(values: tuple[syntax.Value, ...]) -> syntax.Value | None:
     """2 Dim: how many elements an array has in a dimension."""
-    found, level = values[0], number(values[1])
+    found, level = values[0], syntax.number(values[1])
     for _ in range(int(level or 1) - 1):
         found = found[0] if isinstance(found, tuple) and found else ()
     return len(found) if isinstance(found, tuple) and found else None

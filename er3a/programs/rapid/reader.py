@@ -14,36 +14,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from er3a.errors import InputError
+from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked, within
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
 from er3a.programs.program_findings import NameTwice, NotSimulated, NotUnderstood, ProgramFinding
 from er3a.programs.rapid.data_types import SHAPES, Shape, starting
-from er3a.programs.syntax import (
-    Assign,
-    Binary,
-    Constant,
-    Doing,
-    Element,
-    Expression,
-    Fixed,
-    Halt,
-    Invocation,
-    Listed,
-    Member,
-    Move,
-    Opaque,
-    Program,
-    Return,
-    Routine,
-    RoutineParameter,
-    Unclear,
-    Value,
-    Variable,
-    Waiting,
-    inner,
-    number,
-)
 
 PATTERN = re.compile(
     rf"""(?P<comment>![^\n]*)|(?P<text>"(?:[^"\n]|"")*")|(?P<number>0[xX][\da-fA-F]+|0[oO][0-7]+|0[bB][01]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
@@ -137,24 +113,24 @@ class RapidWords(Words):
         self.kinds = [*(token.kind for token in kept), "end"]
         self.texts = [*(token.text for token in kept), ""]
 
-    def special(self) -> Expression | None:
+    def special(self) -> syntax.Expression | None:
         """Aggregates, texts, the target that only the pendant shows."""
         if self.kind == "text":
-            return Constant(self.take()[1:-1].replace('""', '"'))
+            return syntax.Constant(self.take()[1:-1].replace('""', '"'))
         if self.next == "*" and self.kind == "mark":
-            return Opaque(self.take())
+            return syntax.Opaque(self.take())
         if not self.accept("["):
             return None
-        items: list[Expression] = []
+        items: list[syntax.Expression] = []
         while not self.accept("]"):
             items.append(self.expression())
             if not self.accept(","):
                 self.expect("]")
                 break
-        values = tuple(each.value for each in items if isinstance(each, Constant))
-        return Constant(values) if len(values) == len(items) else Listed("", tuple(items))
+        values = tuple(each.value for each in items if isinstance(each, syntax.Constant))
+        return syntax.Constant(values) if len(values) == len(items) else syntax.Listed("", tuple(items))
 
-    def parts_of(self, found: Expression) -> Expression:
+    def parts_of(self, found: syntax.Expression) -> syntax.Expression:
         """As in other languages, but for elements, which stand in braces."""
         while True:
             found = super().parts_of(found) if self.next != "[" else found
@@ -165,12 +141,14 @@ class RapidWords(Words):
                 indices.append(self.expression())
             self.expect("}")
             for index in indices:
-                found = Element(found, (index,))
+                found = syntax.Element(found, (index,))
 
-    def arguments(self, close: str = ")") -> tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]:
+    def arguments(
+        self, close: str = ")"
+    ) -> tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]:
         """Arguments by place and, behind a backslash, by name; a name alone is a switch."""
-        placed: list[Expression | None] = []
-        named: list[tuple[str, Expression]] = []
+        placed: list[syntax.Expression | None] = []
+        named: list[tuple[str, syntax.Expression]] = []
         first = self.at
         while not (self.accept(close) if close else self.kind == "end"):
             if self.kind == "end":
@@ -186,9 +164,9 @@ class RapidWords(Words):
             if self.accept(":="):
                 named.append((name, self.expression()))
             elif self.accept("?"):
-                named.append((name, Variable(self.name())))
+                named.append((name, syntax.Variable(self.name())))
             else:
-                named.append((name, Constant(True)))
+                named.append((name, syntax.Constant(True)))
         return tuple(placed), tuple(named)
 
 
@@ -207,39 +185,41 @@ class Scope:
     shapes: dict[str, Shape] = field(default_factory=dict)
     own: set[str] = field(default_factory=set)
 
-    def settled(self, expression: Expression) -> Expression:
+    def settled(self, expression: syntax.Expression) -> syntax.Expression:
         """An expression with the module's own names, and with sums and products that RAPID has for positions too."""
         expression = within(expression, self.settled)
-        if isinstance(expression, Variable) and expression.name not in self.own:
+        if isinstance(expression, syntax.Variable) and expression.name not in self.own:
             return replace(expression, name=self.private.get(expression.name, expression.name))
-        if isinstance(expression, Invocation):
+        if isinstance(expression, syntax.Invocation):
             return replace(expression, function=self.private.get(expression.function, expression.function))
-        if isinstance(expression, Binary) and expression.operator in ("+", "-", "*"):
-            return Invocation(ARITHMETIC, (Constant(expression.operator), expression.left, expression.right))
+        if isinstance(expression, syntax.Binary) and expression.operator in ("+", "-", "*"):
+            return syntax.Invocation(
+                ARITHMETIC, (syntax.Constant(expression.operator), expression.left, expression.right)
+            )
         return expression
 
-    def shape_of(self, target: Expression, name: str) -> Shape | None:
+    def shape_of(self, target: syntax.Expression, name: str) -> Shape | None:
         """The type of a variable with this name, or of a part of it."""
-        if isinstance(target, Element):
+        if isinstance(target, syntax.Element):
             array = self.shape_of(target.of, name)
             return array[1] if array and array[0] == "[]" and isinstance(array[1], tuple) else None
-        if isinstance(target, Member):
+        if isinstance(target, syntax.Member):
             parts = (each for each in self.shape_of(target.of, name) or () if isinstance(each, tuple))
             return next((each[1] for each in parts if each[0] == target.name and isinstance(each[1], tuple)), None)
         return self.shapes.get(name)
 
-    def typed(self, value: Expression, shape: Shape | None) -> Expression:
+    def typed(self, value: syntax.Expression, shape: Shape | None) -> syntax.Expression:
         """A value with the names of its type's components."""
         if shape is None or (len(shape) == 1):
             return value
-        return Invocation(TYPED, (value, Constant(_as_value(shape))))
+        return syntax.Invocation(TYPED, (value, syntax.Constant(_as_value(shape))))
 
 
-def _as_value(shape: Shape) -> Value:
+def _as_value(shape: Shape) -> syntax.Value:
     return tuple(each if isinstance(each, str) else _as_value(each) for each in shape)
 
 
-def read_rapid(source: ProgramText) -> Program:
+def read_rapid(source: ProgramText) -> syntax.Program:
     """The program of a module: its ``main``, or else the first of its procedures that no other calls.
 
     Raises
@@ -262,12 +242,14 @@ def read_rapid(source: ProgramText) -> Program:
         findings += [*cursor.source.findings, *reader.findings]
     own = [each for each in readers[-1].routines if each.name not in readers[-1].traps]
     data = [each for reader in readers for each in reader.data]
-    names = [each.target.name for each in data if isinstance(each.target, Variable)]
+    names = [each.target.name for each in data if isinstance(each.target, syntax.Variable)]
     for name in sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else ():
-        last = next(each for each in reversed(data) if isinstance(each.target, Variable) and each.target.name == name)
+        last = next(
+            each for each in reversed(data) if isinstance(each.target, syntax.Variable) and each.target.name == name
+        )
         findings.append(NameTwice(name, last.place))
     by_name, unlinked = linked([each for reader in readers for each in reader.routines])
-    return Program(
+    return syntax.Program(
         "rapid",
         source.path.stem,
         source.path,
@@ -279,7 +261,7 @@ def read_rapid(source: ProgramText) -> Program:
     )
 
 
-def _entry(own: list[Routine], routines: Mapping[str, Routine]) -> str:
+def _entry(own: list[syntax.Routine], routines: Mapping[str, syntax.Routine]) -> str:
     if "MAIN" in routines:
         return "MAIN"
     called = {name for routine in routines.values() for name in _called(routine) if name != routine.name}
@@ -288,7 +270,7 @@ def _entry(own: list[Routine], routines: Mapping[str, Routine]) -> str:
     return free[0].name if free else (own[0].name if own else "")
 
 
-def _called(routine: Routine) -> Iterable[str]:
+def _called(routine: syntax.Routine) -> Iterable[str]:
     for operation in routine.code:
         yield getattr(operation, "routine", "")
 
@@ -405,9 +387,9 @@ class _ModuleReader:
 
     def __init__(self, cursor: Cursor, scope: Scope, procedures: Mapping[str, int]):
         self.cursor, self.scope, self.procedures = cursor, scope, procedures
-        self.routines: list[Routine] = []
+        self.routines: list[syntax.Routine] = []
         self.traps: set[str] = set()
-        self.data: list[Assign] = []
+        self.data: list[syntax.Assign] = []
         self.findings: list[ProgramFinding] = []
 
     def read(self) -> None:
@@ -438,9 +420,9 @@ class _ModuleReader:
 
     def _keep(self, builder: CodeBuilder) -> None:
         for each in builder.code:
-            if isinstance(each, Assign):
+            if isinstance(each, syntax.Assign):
                 self.data.append(each)
-            elif isinstance(each, Fixed):
+            elif isinstance(each, syntax.Fixed):
                 self.findings.append(NotUnderstood(getattr(each.instruction, "text", ""), each.place))
 
     def _skip_head(self, token: Token) -> None:
@@ -472,7 +454,7 @@ class _ModuleReader:
             words.take()
             kind, name = words.name(), words.name()
             shape: Shape = scope.types.get(kind, (kind,))
-            sizes: list[Expression] = []
+            sizes: list[syntax.Expression] = []
             if words.accept("{"):
                 sizes.append(words.expression())
                 while words.accept(","):
@@ -481,7 +463,7 @@ class _ModuleReader:
             initial = starting(shape)
             for size in reversed(sizes):
                 shape = ("[]", shape)
-                count = number(size.value) if isinstance(size, Constant) else None
+                count = syntax.number(size.value) if isinstance(size, syntax.Constant) else None
                 known = count is not None and 0 < count <= MOST_ELEMENTS
                 initial = (initial,) * int(count or 0) if known and initial is not None else None
             scope.shapes[name] = shape
@@ -489,7 +471,7 @@ class _ModuleReader:
                 scope.own.add(name)
             else:
                 name = scope.private.get(name, name)
-            value: Expression | None = words.expression() if words.accept(":=") else None
+            value: syntax.Expression | None = words.expression() if words.accept(":=") else None
             words.finish()
         except MisreadError:
             builder.unknown(place, self.cursor.text(tokens), may_move=False)
@@ -497,8 +479,8 @@ class _ModuleReader:
         if value is not None:
             value = scope.typed(scope.settled(value), shape)
         elif initial is not None:
-            value = Constant(initial)
-        builder.add(Assign(place, Variable(name), value, self.cursor.text(tokens), kind, local))
+            value = syntax.Constant(initial)
+        builder.add(syntax.Assign(place, syntax.Variable(name), value, self.cursor.text(tokens), kind, local))
 
     def _routine(self, word: str) -> None:
         place = self.cursor.place()
@@ -509,7 +491,7 @@ class _ModuleReader:
         self.cursor.at += 1
         scope = Scope(self.scope.types, self.scope.private, dict(self.scope.shapes))
         name = scope.private.get(name, name)
-        parameters: list[RoutineParameter] = []
+        parameters: list[syntax.RoutineParameter] = []
         opened = self.cursor.next()
         if word != "TRAP":
             if not name or opened is None or opened.text != "(":
@@ -523,8 +505,8 @@ class _ModuleReader:
         for parameter in parameters:
             shape = scope.shapes.get(parameter.name)
             if shape is not None and len(shape) > 1:
-                variable = Variable(parameter.name)
-                builder.add(Assign(place, variable, scope.typed(variable, shape), "", local=True))
+                variable = syntax.Variable(parameter.name)
+                builder.add(syntax.Assign(place, variable, scope.typed(variable, shape), "", local=True))
         end = f"END{word}"
         _BodyReader(self, builder, scope).read(end)
         self.routines.append(builder.routine(self.cursor.place()))
@@ -532,8 +514,8 @@ class _ModuleReader:
         self.cursor.at += 1
 
 
-def _parameters(tokens: list[Token], scope: Scope, place: Place) -> list[RoutineParameter]:
-    found: list[RoutineParameter] = []
+def _parameters(tokens: list[Token], scope: Scope, place: Place) -> list[syntax.RoutineParameter]:
+    found: list[syntax.RoutineParameter] = []
     optional = out = False
     words: list[str] = []
 
@@ -542,7 +524,7 @@ def _parameters(tokens: list[Token], scope: Scope, place: Place) -> list[Routine
             kind, name = words[-2], words[-1]
             shape = scope.types.get(kind, (kind,))
             scope.shapes[name] = ("[]", shape) if arrays else shape
-            found.append(RoutineParameter(name, out, Constant(ABSENT) if optional else None))
+            found.append(syntax.RoutineParameter(name, out, syntax.Constant(ABSENT) if optional else None))
         elif words:
             raise fault(place, "a parameter has no type or no name", "Write PROC name(num n)")
 
@@ -583,20 +565,20 @@ class _BodyReader:
         known = sorted(self.scope.own)
         name = f"{self.builder.name}/ERROR"
         if handler:  # what it does may come about at any time
-            call = Invocation(name, tuple(map(Variable, known)))
+            call = syntax.Invocation(name, tuple(map(syntax.Variable, known)))
             self.builder.beside(self.builder.place, call, f"{handler} ({self.builder.name})", "interrupt")
         self.instructions(end)
         if self.cursor.word() not in HANDLERS:
             return
         place = self.cursor.place()
-        builder = CodeBuilder(name, tuple(map(RoutineParameter, known)), place)
+        builder = CodeBuilder(name, tuple(map(syntax.RoutineParameter, known)), place)
         inside = _BodyReader(self.module, builder, self.scope)
         while self.cursor.word() in HANDLERS:
             self.cursor.at += 1
             if (token := self.cursor.next()) is not None and token.text == "(":
                 self.cursor.head(")")
             inside.instructions(end)
-            builder.add(Return(place))
+            builder.add(syntax.Return(place))
         if handler:
             self.module.routines.append(builder.routine(self.cursor.place()))
 
@@ -636,21 +618,25 @@ class _BodyReader:
             self.builder.unknown(place, text)
             if words.texts[1:2] == [":="] and words.kinds[0] == "name":
                 name = words.texts[0]
-                self.builder.add(Assign(place, self.scope.settled(Variable(name)), Constant(Unclear(name)), text))
+                self.builder.add(
+                    syntax.Assign(
+                        place, self.scope.settled(syntax.Variable(name)), syntax.Constant(syntax.Unclear(name)), text
+                    )
+                )
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
-    def condition(self, tokens: list[Token]) -> Expression:
+    def condition(self, tokens: list[Token]) -> syntax.Expression:
         """A condition; one that is not understood is kept."""
         words = RapidWords(tokens)
         try:
             found = words.expression()
             words.finish()
         except MisreadError:
-            return Opaque(self.cursor.text(tokens))
+            return syntax.Opaque(self.cursor.text(tokens))
         return self.scope.settled(found)
 
-    def value(self, words: RapidWords) -> Expression:
+    def value(self, words: RapidWords) -> syntax.Expression:
         """The expression that comes next."""
         return self.scope.settled(words.expression())
 
@@ -663,22 +649,24 @@ class _BodyReader:
             tuple((name, settled(each)) for name, each in named),
         )
 
-    def forget_changed(self, place: Place, expression: Expression, text: str) -> None:
+    def forget_changed(self, place: Place, expression: syntax.Expression, text: str) -> None:
         """What a function in an expression changes has no known value behind it."""
-        for each in inner(expression):
+        for each in syntax.inner(expression):
             self.forget_changed(place, each, text)
-        if isinstance(expression, Invocation) and expression.function in CHANGING_FUNCTIONS:
+        if isinstance(expression, syntax.Invocation) and expression.function in CHANGING_FUNCTIONS:
             at = CHANGING_FUNCTIONS[expression.function]
             given = expression.arguments[at] if at < len(expression.arguments) else None
-            if isinstance(given, (Variable, Element, Member)):
-                self.builder.add(Assign(place, given, Constant(Unclear(expression.function.lower())), text))
+            if isinstance(given, (syntax.Variable, syntax.Element, syntax.Member)):
+                self.builder.add(
+                    syntax.Assign(place, given, syntax.Constant(syntax.Unclear(expression.function.lower())), text)
+                )
 
-    def late(self, place: Place, called: Expression, given: Given, text: str) -> None:
+    def late(self, place: Place, called: syntax.Expression, given: Given, text: str) -> None:
         """A call of the procedure that a text names when the program runs: one after the other is asked for."""
         prefix, whole = _prefix(called)
         prefix = prefix.upper()
         if whole:
-            self.builder.add(Doing(place, Invocation(prefix, *given), text))
+            self.builder.add(syntax.Doing(place, syntax.Invocation(prefix, *given), text))
             return
         fitting = [
             name
@@ -689,14 +677,14 @@ class _BodyReader:
             self.builder.unknown(place, text)
             return
         for i, name in enumerate(fitting):
-            test = Binary("=", Invocation(UPPER, (called,)), Constant(name))
+            test = syntax.Binary("=", syntax.Invocation(UPPER, (called,)), syntax.Constant(name))
             if i == 0:
                 self.builder.open_if(place, test, text)
             else:
                 self.builder.next_arm(place, test, text)
-            self.builder.add(Doing(place, Invocation(name, *given), text))
+            self.builder.add(syntax.Doing(place, syntax.Invocation(name, *given), text))
         self.builder.next_arm(place, None, text)
-        self.builder.add(Doing(place, Invocation(LATE, ()), text))
+        self.builder.add(syntax.Doing(place, syntax.Invocation(LATE, ()), text))
         self.builder.close("if", place)
 
     def _remark(self, token: Token) -> None:
@@ -724,7 +712,7 @@ class _BodyReader:
             words.expect(":=")
             value = self.value(words)
             words.finish()
-            builder.add(Assign(place, target, self.scope.typed(value, self.scope.shape_of(target, first)), text))
+            builder.add(syntax.Assign(place, target, self.scope.typed(value, self.scope.shape_of(target, first)), text))
             self.forget_changed(place, value, text)
             return
         words.take()
@@ -734,7 +722,7 @@ class _BodyReader:
         given = self.given(words)
         name = self.scope.private.get(first, first)
         if name in self.module.procedures:
-            builder.add(Doing(place, Invocation(name, *given), text))
+            builder.add(syntax.Doing(place, syntax.Invocation(name, *given), text))
         else:
             self._builtin(place, name, given, text)
 
@@ -745,35 +733,37 @@ class _BodyReader:
         if name in NOT_SIMULATED and not (name == "SINGAREA" and "OFF" in options):
             self.module.findings.append(NotSimulated(text, place))
         if name in MOTIONS:
-            builder.add(Move(place, name, placed, text, (), named))
+            builder.add(syntax.Move(place, name, placed, text, (), named))
             if name in SEARCHES:  # the arm stops where the signal comes, and the point sought is there
                 builder.unknown(place, text)
-                if len(placed) > 1 and isinstance(placed[1], (Variable, Element, Member)):
-                    builder.add(Assign(place, placed[1], Constant(Unclear(f"what {name} finds")), text))
+                if len(placed) > 1 and isinstance(placed[1], (syntax.Variable, syntax.Element, syntax.Member)):
+                    builder.add(
+                        syntax.Assign(place, placed[1], syntax.Constant(syntax.Unclear(f"what {name} finds")), text)
+                    )
             if name in CALLING and placed and placed[-1] is not None:
                 self.late(place, placed[-1], ((), ()), text)
             return
         if name in LEAVING or (name.startswith("WAIT") and options & ARRIVING):
-            builder.add(Assign(place, Variable(PASSING), Constant(name in LEAVING), ""))
+            builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(name in LEAVING), ""))
         if name == "WAITTIME" and placed:
-            builder.add(Waiting(place, "seconds", placed[0], text))
+            builder.add(syntax.Waiting(place, "seconds", placed[0], text))
             return
         if name == "CALLBYVAR" and len(placed) == 2 and placed[0] is not None and placed[1] is not None:
-            suffix = Invocation("NUMTOSTR", (placed[1], Constant(0)))
-            self.late(place, Invocation(ARITHMETIC, (Constant("+"), placed[0], suffix)), ((), ()), text)
+            suffix = syntax.Invocation("NUMTOSTR", (placed[1], syntax.Constant(0)))
+            self.late(place, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), placed[0], suffix)), ((), ()), text)
             return
         if name in WAITS:
-            builder.add(Waiting(place, "condition", None, text))
+            builder.add(syntax.Waiting(place, "condition", None, text))
         else:
-            builder.add(Doing(place, Invocation(name, placed, named), text))
+            builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
         changed = [each for key, each in named if key in ("TIMEFLAG", "VALUE")]
         if name in CHANGING and CHANGING[name] < len(placed):
-            changed.append(placed[CHANGING[name]] or Constant(0))
+            changed.append(placed[CHANGING[name]] or syntax.Constant(0))
         if name.startswith(READING):
             changed += [each for each in (*placed, *(each for _, each in named)) if each is not None]
         for each in changed:
-            if isinstance(each, (Variable, Element, Member)):
-                builder.add(Assign(place, each, Constant(Unclear(f"what {name} gives")), text))
+            if isinstance(each, (syntax.Variable, syntax.Element, syntax.Member)):
+                builder.add(syntax.Assign(place, each, syntax.Constant(syntax.Unclear(f"what {name} gives")), text))
 
     def _handler_moves(self, end: str) -> str:
         """The first of the routine's handlers that may move the arm; empty if none may."""
@@ -789,16 +779,16 @@ class _BodyReader:
         return ""
 
 
-Given = tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]
+Given = tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]
 """Arguments by place and by name."""
 Block = Callable[[_BodyReader, Place], None]
 
 
-def _prefix(expression: Expression) -> tuple[str, bool]:
+def _prefix(expression: syntax.Expression) -> tuple[str, bool]:
     """With what a text begins, as far as the program says, and whether that is all of it."""
-    if isinstance(expression, Constant) and isinstance(expression.value, str):
+    if isinstance(expression, syntax.Constant) and isinstance(expression.value, str):
         return expression.value, True
-    if not isinstance(expression, Invocation) or expression.function != ARITHMETIC:
+    if not isinstance(expression, syntax.Invocation) or expression.function != ARITHMETIC:
         return "", False
     (first, whole), (second, ends) = (
         _prefix(each) if each is not None else ("", False) for each in expression.arguments[1:]
@@ -873,12 +863,12 @@ def _for(body: _BodyReader, place: Place) -> None:
         first = body.value(words)
         words.expect("TO")
         last = body.value(words)
-        step = body.value(words) if words.accept("STEP") else Invocation(STEP, (first, last))
+        step = body.value(words) if words.accept("STEP") else syntax.Invocation(STEP, (first, last))
         words.finish()
     except MisreadError as error:
         raise fault(place, f"this FOR can't be read ({error})", "Write FOR i FROM 1 TO 9 DO") from None
     body.scope.own.add(name)
-    body.builder.add(Assign(place, Variable(name), None, "", local=True))
+    body.builder.add(syntax.Assign(place, syntax.Variable(name), None, "", local=True))
     body.builder.open_for(place, name, first, last, step, cursor.text(tokens))
     _inside(body, place, "for", "ENDFOR")
 
@@ -904,7 +894,7 @@ def _test(body: _BodyReader, place: Place) -> None:
         cursor.at += 1
         tokens = cursor.head(":")
         text = cursor.text(tokens)
-        values: list[Expression] | None = None
+        values: list[syntax.Expression] | None = None
         if word == "CASE":
             words = RapidWords(tokens)
             try:
@@ -926,7 +916,7 @@ BLOCKS: dict[str, Block] = {"IF": _if, "WHILE": _while, "FOR": _for, "TEST": _te
 def _return(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     value = None if words.kind == "end" else body.value(words)
     words.finish()
-    body.builder.add(Return(place, value))
+    body.builder.add(syntax.Return(place, value))
 
 
 def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
@@ -935,17 +925,17 @@ def _goto(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None
 
 def _stop(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     """Stop, behind which the arm stands at its target, and Break, which does not wait for that."""
-    body.builder.add(Waiting(place, "operator", None, text))
-    body.builder.add(Assign(place, Variable(PASSING), Constant(text[:5].upper() == "BREAK"), ""))
+    body.builder.add(syntax.Waiting(place, "operator", None, text))
+    body.builder.add(syntax.Assign(place, syntax.Variable(PASSING), syntax.Constant(text[:5].upper() == "BREAK"), ""))
 
 
 def _halt(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
-    body.builder.add(Halt(place))
+    body.builder.add(syntax.Halt(place))
 
 
 def _leave(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     """RAISE, RETRY, TRYNEXT: where they lead to is known when an error comes about, so nothing follows here."""
-    body.builder.add(Return(place))
+    body.builder.add(syntax.Return(place))
 
 
 def _connect(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
@@ -953,7 +943,7 @@ def _connect(body: _BodyReader, place: Place, words: RapidWords, text: str) -> N
     words.reference()
     words.expect("WITH")
     name = words.name()
-    body.builder.beside(place, Invocation(body.scope.private.get(name, name), ()), text, "interrupt")
+    body.builder.beside(place, syntax.Invocation(body.scope.private.get(name, name), ()), text, "interrupt")
 
 
 def _counted(change: int | None) -> Callable[[_BodyReader, Place, RapidWords, str], None]:
@@ -962,12 +952,14 @@ def _counted(change: int | None) -> Callable[[_BodyReader, Place, RapidWords, st
     def read(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
         target = body.scope.settled(words.reference())
         if change is not None:
-            amount: Expression = Constant(change)
+            amount: syntax.Expression = syntax.Constant(change)
         else:
             words.expect(",")
             amount = body.value(words)
         words.finish()
-        body.builder.add(Assign(place, target, Invocation(ARITHMETIC, (Constant("+"), target, amount)), text))
+        body.builder.add(
+            syntax.Assign(place, target, syntax.Invocation(ARITHMETIC, (syntax.Constant("+"), target, amount)), text)
+        )
 
     return read
 
@@ -975,7 +967,7 @@ def _counted(change: int | None) -> Callable[[_BodyReader, Place, RapidWords, st
 def _clear(body: _BodyReader, place: Place, words: RapidWords, text: str) -> None:
     target = body.scope.settled(words.reference())
     words.finish()
-    body.builder.add(Assign(place, target, Constant(0), text))
+    body.builder.add(syntax.Assign(place, target, syntax.Constant(0), text))
 
 
 PLAIN_WORDS: dict[str, Callable[[_BodyReader, Place, RapidWords, str], None]] = {

@@ -14,37 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.instructions import (
-    ArmMotion,
-    JointTarget,
-    Listing,
-    NamedFrame,
-    Output,
-    Pause,
-    PoseTarget,
-    Zone,
-    numbers_of,
-)
-from er3a.programs.rapid.data_types import (
-    AXIS_SPEED,
-    LEAST_LOAD,
-    SLIDE_SPEED,
-    TOOL_SPEEDS,
-    TURN_SPEED,
-    ZONES,
-    quarters_of,
-)
-from er3a.programs.writing import (
-    LOAD_DIGITS,
-    ReadyMotion,
-    WriteOptions,
-    Writer,
-    ascii_text,
-    fixed,
-    principal_axes,
-    share_of_max,
-    short,
-)
+from er3a.programs import instructions, writing
+from er3a.programs.rapid import data_types
 from er3a.robots.masses import MassBody
 
 NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -58,68 +29,46 @@ xor
 RESERVED = frozenset(RESERVED_TEXT.split())
 
 
-class RapidWriter(Writer):
+class RapidWriter(writing.Writer):
     """Writes RAPID."""
 
     languages = ("rapid",)
+    remark, ends = "!", ";"
+    loop = ("WHILE TRUE DO", "ENDWHILE")
+    wait = ("WaitTime {};", "Stop;", "{}")
 
-    def __init__(self, listing: Listing, options: WriteOptions):
+    def __init__(self, listing: instructions.Listing, options: writing.WriteOptions):
         super().__init__(listing, options)
         if self.name.lower() in RESERVED:
             self.name = f"p{self.name}"
         self.frames: dict[tuple[str, bytes, MassBody | None], str] = {}
         self.declared: list[str] = []
-        self.settings: dict[str, str] = {}
 
     def files(self, head: list[str]) -> dict[str, str]:
         """The .mod file."""
         lines = [
             f"MODULE {self.name}",
-            *(f"  ! {ascii_text(line)}" for line in head),
+            *(f"  ! {writing.ascii_text(line)}" for line in head),
             *(f"  {each}" for each in self.declared),
         ]
         body = ["PROC main()", *(f"  {line}" for line in self.lines), "ENDPROC"]
         return {".mod": "\n".join((*lines, *(f"  {line}" for line in body), "ENDMODULE", ""))}
 
-    def begin_loop(self) -> None:
-        """``WHILE TRUE DO``; what was set before does not count within."""
-        self.lines.append("WHILE TRUE DO")
-        self.settings.clear()
-
-    def end_loop(self) -> None:
-        """``ENDWHILE``."""
-        self.lines.append("ENDWHILE")
-
-    def comment(self, text: str) -> None:
-        """``! text``."""
-        self.lines.append(f"! {ascii_text(text)}")
-
-    def pause(self, pause: Pause) -> None:
-        """WaitTime, Stop, or the wait that was read."""
-        if pause.seconds is not None:
-            self.lines.append(f"WaitTime {short(pause.seconds)};")
-        else:
-            self.lines.append("Stop;" if pause.condition is None else f"{pause.condition};")
-
-    def output(self, output: Output) -> None:
+    def output(self, output: instructions.Output) -> None:
         """The instruction that was read."""
-        self.lines.append(f"{output.value};")
-
-    def verbatim(self, text: str) -> None:
-        """A line as it was read."""
-        self.lines.append(f"{text};")
+        self.verbatim(output.value)
 
     def set_load(self, load: MassBody | None) -> None:
         """In the data of the tools (:meth:`_frame`)."""
 
-    def motion(self, ready: ReadyMotion) -> None:
+    def motion(self, ready: writing.ReadyMotion) -> None:
         """MoveAbsJ, MoveJ, MoveL, MoveC with what has to be set before."""
         motion = ready.motion
         target = motion.target
-        own_pose = self.own and motion.kind == "joint" and isinstance(target, PoseTarget)
+        own_pose = self.own and motion.kind == "joint" and isinstance(target, instructions.PoseTarget)
         if motion.kind == "joint" and not own_pose:
             joints = ready.joints
-            if joints is None and isinstance(target, JointTarget):
+            if joints is None and isinstance(target, instructions.JointTarget):
                 joints = target.joints
             if joints is None or np.isnan(joints).any():
                 self.left_out(motion)
@@ -144,21 +93,21 @@ class RapidWriter(Writer):
         self._set_before(motion)
         self.lines.append(f"{form} {','.join(texts)},{speed},{zone},{tool}{base};")
 
-    def _configuration(self, ready: ReadyMotion, supervision: str) -> str:
+    def _configuration(self, ready: writing.ReadyMotion, supervision: str) -> str:
         """The target's confdata as it was read, or by the joints; not supervised where neither is known."""
         target = ready.motion.target
-        said = dict(target.configuration) if isinstance(target, PoseTarget) and self.own else {}
+        said = dict(target.configuration) if isinstance(target, instructions.PoseTarget) and self.own else {}
         if {"cf1", "cf4", "cf6", "cfx"} <= said.keys():
-            followed = isinstance(target, PoseTarget) and target.branch is not None
-            self._set(supervision, f"{supervision} \\{'On' if followed else 'Off'};")
+            followed = isinstance(target, instructions.PoseTarget) and target.branch is not None
+            self.set_once(supervision, f"{supervision} \\{'On' if followed else 'Off'};")
             return "[" + ",".join(f"{float(said[key]):g}" for key in ("cf1", "cf4", "cf6", "cfx")) + "]"
-        self._set(supervision, f"{supervision} \\Off;")
+        self.set_once(supervision, f"{supervision} \\Off;")
         joints = ready.joints if not self.own and ready.motion.kind != "joint" else None
         if joints is None or len(joints) != 6 or np.isnan(joints).any():
             return "[0,0,0,0]"
-        return "[" + ",".join(map(str, quarters_of(joints))) + ",0]"
+        return "[" + ",".join(map(str, data_types.quarters_of(joints))) + ",0]"
 
-    def _frame(self, frame: NamedFrame, kind: str) -> str:
+    def _frame(self, frame: instructions.NamedFrame, kind: str) -> str:
         """The name of a tool or work object, which is declared once."""
         plain = frame.name.isidentifier() and frame.name.isascii() and frame.name.lower() not in RESERVED
         null = f"{kind}0"
@@ -184,79 +133,75 @@ class RapidWriter(Writer):
                 self.declared.append(f'PERS wobjdata {name}:=[FALSE,TRUE,"",{pose},{null_pose}];')
         return self.frames[key]
 
-    def _speed(self, ready: ReadyMotion) -> str:
+    def _speed(self, ready: writing.ReadyMotion) -> str:
         motion = ready.motion
         speed = motion.speed
         if speed is None or not speed.value > 0:
-            self._set("vel", "VelSet 100,5000;")
+            self.set_once("vel", "VelSet 100,5000;")
             return "v100" if motion.kind != "joint" else "vmax"
         if speed.unit == "s":
-            return f"v1000\\T:={short(speed.value)}"
+            return f"v1000\\T:={writing.short(speed.value)}"
         if speed.unit == "m/s":
-            self._set("vel", "VelSet 100,5000;")
+            self.set_once("vel", "VelSet 100,5000;")
             along = speed.value * 1000
-            turn = TURN_SPEED if motion.turn_speed is None else math.degrees(motion.turn_speed)
-            if along in TOOL_SPEEDS and abs(turn - TURN_SPEED) < 1e-9:
+            turn = data_types.TURN_SPEED if motion.turn_speed is None else math.degrees(motion.turn_speed)
+            if along in data_types.TOOL_SPEEDS and abs(turn - data_types.TURN_SPEED) < 1e-9:
                 return f"v{along:g}"
-            return f"[{short(along)},{short(turn)},{SLIDE_SPEED:g},{AXIS_SPEED:g}]"
-        share = share_of_max(ready, self.robot)
+            return (
+                f"[{writing.short(along)},{writing.short(turn)},{data_types.SLIDE_SPEED:g},{data_types.AXIS_SPEED:g}]"
+            )
+        share = writing.share_of_max(ready, self.robot)
         if speed.unit != "share":
             self.count["estimated"] += 1
         if share is None:
-            self._set("vel", "VelSet 100,5000;")
+            self.set_once("vel", "VelSet 100,5000;")
             return "v100"
         self.count["cut"] += share > 1 + 1e-9
-        self._set("vel", f"VelSet {short(min(max(share, 0.001), 1) * 100, 3)},5000;")
+        self.set_once("vel", f"VelSet {writing.short(min(max(share, 0.001), 1) * 100, 3)},5000;")
         return "vmax"
 
-    def _zone(self, motion: ArmMotion) -> str:
+    def _zone(self, motion: instructions.ArmMotion) -> str:
         """A zone by its name, or with turn and external axes as those that have one."""
-        zone: Zone = motion.zone
+        zone: instructions.Zone = motion.zone
         if zone.kind != "distance" or zone.value <= 0:
             self.count["zones"] += zone.kind != "fine"
             return "fine"
         size = zone.value * 1000
-        name = next((name.lower() for name, sizes in ZONES.items() if abs(sizes[0] - size) < 1e-9), "")
-        wide = short(1.5 * size)
-        return name or f"[FALSE,{short(size)},{wide},{wide},{short(0.15 * size)},{wide},{short(0.15 * size)}]"
+        name = next((name.lower() for name, sizes in data_types.ZONES.items() if abs(sizes[0] - size) < 1e-9), "")
+        own, wide, turn = (writing.short(share * size) for share in (1.0, 1.5, 0.15))
+        return name or f"[FALSE,{own},{wide},{wide},{turn},{wide},{turn}]"
 
-    def _set_before(self, motion: ArmMotion) -> None:
+    def _set_before(self, motion: instructions.ArmMotion) -> None:
         acceleration = motion.acceleration
         if acceleration is None:
             return
         if acceleration.unit == "share":
-            self._set("acc", f"AccSet {short(min(max(acceleration.value * 100, 20), 100), 3)},100;")
+            self.set_once("acc", f"AccSet {writing.short(min(max(acceleration.value * 100, 20), 100), 3)},100;")
         elif acceleration.unit == "m/s2":
-            value = short(acceleration.value)
-            self._set("limit", f"PathAccLim TRUE\\AccMax:={value},TRUE\\DecelMax:={value};")
-
-    def _set(self, key: str, line: str) -> None:
-        """A line that sets something, unless it is set so already."""
-        if self.settings.get(key) != line:
-            self.settings[key] = line
-            self.lines.append(line)
+            value = writing.short(acceleration.value)
+            self.set_once("limit", f"PathAccLim TRUE\\AccMax:={value},TRUE\\DecelMax:={value};")
 
 
 def _joints_text(joints: Reals) -> str:
-    degrees = [fixed(math.degrees(value), DIGITS) for value in joints]
+    degrees = [writing.fixed(math.degrees(value), DIGITS) for value in joints]
     return f"[[{','.join([*degrees, *['0'] * (6 - len(degrees))])}],{NO_AXES}]"
 
 
 def _load_text(load: MassBody | None) -> str:
     """loaddata, with the principal axes of the inertia; the least that a controller takes if it is not known."""
     if load is None:
-        return f"[{LEAST_LOAD},[0,0,{LEAST_LOAD}],[1,0,0,0],0,0,0]"
-    pose, moments = principal_axes(load)
-    quaternion = ",".join(fixed(each, QUATERNION_DIGITS) for each in numbers_of(pose, "abb")[3:])
-    centre = ",".join(short(each * 1000) for each in load.centre)
-    about = ",".join(short(float(each), LOAD_DIGITS) for each in moments)
-    return f"[{short(load.mass)},[{centre}],[{quaternion}],{about}]"
+        return f"[{data_types.LEAST_LOAD},[0,0,{data_types.LEAST_LOAD}],[1,0,0,0],0,0,0]"
+    pose, moments = writing.principal_axes(load)
+    quaternion = ",".join(writing.fixed(each, QUATERNION_DIGITS) for each in instructions.numbers_of(pose, "abb")[3:])
+    centre = ",".join(writing.short(each * 1000) for each in load.centre)
+    about = ",".join(writing.short(float(each), writing.LOAD_DIGITS) for each in moments)
+    return f"[{writing.short(load.mass)},[{centre}],[{quaternion}],{about}]"
 
 
 def _pose_text(pose: Reals) -> str:
-    x, y, z, *quaternion = numbers_of(pose, "abb")
-    turn = ",".join(fixed(each, QUATERNION_DIGITS) for each in quaternion)
-    return f"[[{fixed(x, DIGITS)},{fixed(y, DIGITS)},{fixed(z, DIGITS)}],[{turn}]]"
+    x, y, z, *quaternion = instructions.numbers_of(pose, "abb")
+    turn = ",".join(writing.fixed(each, QUATERNION_DIGITS) for each in quaternion)
+    return f"[[{writing.fixed(x, DIGITS)},{writing.fixed(y, DIGITS)},{writing.fixed(z, DIGITS)}],[{turn}]]"
 
 
 def _target_text(pose: Reals, conf: str) -> str:

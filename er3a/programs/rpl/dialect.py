@@ -6,36 +6,9 @@ import re
 
 import numpy as np
 
+from er3a.programs import instructions, syntax
 from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory
-from er3a.programs.instructions import (
-    FINE,
-    ArmMotion,
-    Aside,
-    Instruction,
-    JointTarget,
-    NamedFrame,
-    PoseTarget,
-    Rate,
-    Target,
-    Unknown,
-    UnresolvedTarget,
-    Zone,
-    pose_of,
-)
 from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, OUTER, POSITION
-from er3a.programs.syntax import (
-    Doing,
-    Expression,
-    Invocation,
-    Move,
-    Record,
-    Unclear,
-    Value,
-    finite,
-    number,
-    numbers,
-    shown,
-)
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
 ZONE = re.compile(r"z(\d+(?:\.\d+)?)$", re.IGNORECASE)
@@ -52,118 +25,120 @@ class RplDialect(Dialect):
         """Outputs, and what goes to the field bus."""
         return name.startswith(("io.", "fidbus."))
 
-    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Points, OFFSET, some mathematics."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
         if name in FIELDS:
             return _point(name, values)
-        if name == "OFFSET" and values and isinstance(values[0], Record):
+        if name == "OFFSET" and values and isinstance(values[0], syntax.Record):
             return _offset(values[0], values[1:])
-        plain = numbers(tuple(values))
+        plain = syntax.numbers(tuple(values))
         if name.upper() in IN_DEGREES and plain is not None and len(plain) == 1:
             try:
                 return float(IN_DEGREES[name.upper()](plain[0]))
             except (ValueError, OverflowError):
                 pass
-        return Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
+        return syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
 
-    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
         """MJOINT and MLIN: target, speed, zone, tool, reference frame."""
         given = [*move.arguments, *[None] * (5 - len(move.arguments))]
-        point = Unclear(move.text) if given[0] is None else memory.value(given[0])
-        goal = _target(point, move.text) if len(given) == 5 else UnresolvedTarget(move.text, "not_understood")
+        point = syntax.Unclear(move.text) if given[0] is None else memory.value(given[0])
+        goal = (
+            _target(point, move.text) if len(given) == 5 else instructions.UnresolvedTarget(move.text, "not_understood")
+        )
         tool, base = (_word(memory, each) for each in given[3:5])
         frames = memory.cell.frames
         base_pose = frames.get(base or NO_BASE)
         if base_pose is None and base in ("", NO_BASE):
             base_pose = np.eye(4)
-        return ArmMotion(
+        return instructions.ArmMotion(
             "joint" if move.form == "MJOINT" else "line",
             goal,
             move.form,
             speed=_speed(_word(memory, given[1])),
             zone=_zone(_word(memory, given[2])),
-            tool=NamedFrame(tool, frames.get(tool)),
-            base=NamedFrame(base or NO_BASE, base_pose),
+            tool=instructions.NamedFrame(tool, frames.get(tool)),
+            base=instructions.NamedFrame(base or NO_BASE, base_pose),
         )
 
-    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
         """Functions of libraries move nothing; others are unknown."""
         call = doing.what
-        assert isinstance(call, Invocation)
-        return Aside(doing.text) if self.harmless(call) else Unknown(doing.text)
+        assert isinstance(call, syntax.Invocation)
+        return instructions.Aside(doing.text) if self.harmless(call) else instructions.Unknown(doing.text)
 
-    def harmless(self, call: Invocation) -> bool:
+    def harmless(self, call: syntax.Invocation) -> bool:
         """Functions of the controller's libraries for signals, texts and sockets, and those that are evaluated."""
         name = call.function
         return name.startswith(LIBRARIES) or name in FIELDS or name == "OFFSET" or name.upper() in IN_DEGREES
 
 
-def _word(memory: ProgramMemory, expression: Expression | None) -> str:
+def _word(memory: ProgramMemory, expression: syntax.Expression | None) -> str:
     """The name of a speed, zone or tool, also where a variable of the program holds it."""
-    return "" if expression is None else shown(memory.value(expression))
+    return "" if expression is None else syntax.shown(memory.value(expression))
 
 
-def _speed(word: str) -> Rate | None:
+def _speed(word: str) -> instructions.Rate | None:
     match = SPEED.match(word)
     if match is None:
         return None
     value = float(match[1])
-    return Rate(value / 100, "share", word) if match[2] else Rate(value / 1000, "m/s", word)
+    return instructions.Rate(value / 100, "share", word) if match[2] else instructions.Rate(value / 1000, "m/s", word)
 
 
-def _zone(word: str) -> Zone:
+def _zone(word: str) -> instructions.Zone:
     match = ZONE.match(word)
     if match is not None:
-        return Zone("distance", float(match[1]) / 1000, word)
-    return FINE if word in ("fine", "") else Zone("named", 0.0, word)
+        return instructions.Zone("distance", float(match[1]) / 1000, word)
+    return instructions.FINE if word in ("fine", "") else instructions.Zone("named", 0.0, word)
 
 
-def _point(name: str, values: list[Value | None]) -> Value:
+def _point(name: str, values: list[syntax.Value | None]) -> syntax.Value:
     """A point of its parts; an unclear one makes it unclear only when it is gone to."""
     fields = FIELDS[name]
     if not 6 <= len(values) <= len(fields) or None in values:
-        return Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
+        return syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
     given = [each for each in values if each is not None]
     if name == "EPOINTC" and len(given) == 10 and isinstance(given[6], str):
         fields = FIELDS["POINTC"]
-    return Record(name, tuple(zip(fields, given)))
+    return syntax.Record(name, tuple(zip(fields, given)))
 
 
-def _offset(point: Record, by: list[Value | None]) -> Value:
+def _offset(point: syntax.Record, by: list[syntax.Value | None]) -> syntax.Value:
     if len(by) > 3:
-        return Unclear(f"OFFSET({shown(point)}, ...)")
+        return syntax.Unclear(f"OFFSET({syntax.shown(point)}, ...)")
     for key, step in zip(POSITION, by):
         old = point.get(key)
         for part in (old, step):
-            if isinstance(part, Unclear):
+            if isinstance(part, syntax.Unclear):
                 return part
-        a, b = number(old), number(step)
+        a, b = syntax.number(old), syntax.number(step)
         if a is None or b is None:
-            return Unclear(f"OFFSET({shown(point)})")
+            return syntax.Unclear(f"OFFSET({syntax.shown(point)})")
         point = point.having(key, a + b)
     return point
 
 
-def _target(value: Value, text: str) -> Target:
-    if isinstance(value, Unclear):
+def _target(value: syntax.Value, text: str) -> instructions.Target:
+    if isinstance(value, syntax.Unclear):
         finite_word = value.text.upper().lstrip("+-") not in ("NAN", "INF")
-        return UnresolvedTarget(value.text, "undefined" if finite_word else "not_finite")
-    if not isinstance(value, Record):
-        return UnresolvedTarget(text, "not_understood")
+        return instructions.UnresolvedTarget(value.text, "undefined" if finite_word else "not_finite")
+    if not isinstance(value, syntax.Record):
+        return instructions.UnresolvedTarget(text, "not_understood")
     keys = JOINTS if value.kind in ("POINTJ", "EPOINTJ") else POSITION
     parts = [value.get(key) for key in keys]
     for part in parts:
-        if isinstance(part, Unclear):
+        if isinstance(part, syntax.Unclear):
             return _target(part, text)
-    plain = numbers(tuple(parts))
+    plain = syntax.numbers(tuple(parts))
     if plain is None:
-        return UnresolvedTarget(text, "not_understood")
-    if not finite(plain):
-        return UnresolvedTarget(text, "not_finite")
-    outer = tuple((key, part) for key in OUTER if (part := number(value.get(key))))
+        return instructions.UnresolvedTarget(text, "not_understood")
+    if not syntax.finite(plain):
+        return instructions.UnresolvedTarget(text, "not_finite")
+    outer = tuple((key, part) for key in OUTER if (part := syntax.number(value.get(key))))
     if keys is JOINTS:
-        return JointTarget(np.radians(plain), outer)
+        return instructions.JointTarget(np.radians(plain), outer)
     given = ((key, value.get(key)) for key in CONFIGURATION)
     configuration = tuple((key, part) for key, part in given if isinstance(part, (int, float, str)))
-    return PoseTarget(pose_of(plain, "efort"), configuration, external=outer)
+    return instructions.PoseTarget(instructions.pose_of(plain, "efort"), configuration, external=outer)

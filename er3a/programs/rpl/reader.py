@@ -10,25 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from er3a.errors import InputError
+from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
-from er3a.programs.syntax import (
-    Assign,
-    Constant,
-    Doing,
-    Expression,
-    Invocation,
-    Move,
-    Opaque,
-    Program,
-    Record,
-    Return,
-    Value,
-    Variable,
-    Waiting,
-)
 
 RPL = Lexicon(
     re.compile(
@@ -73,19 +59,19 @@ class RplWords(Words):
     def __init__(self, text: str):
         super().__init__(RPL, text)
 
-    def special(self) -> Expression | None:
+    def special(self) -> syntax.Expression | None:
         """The taught point ``*`` of a motion."""
-        return Opaque(self.take()) if self.next == "*" and self.kind == "mark" else None
+        return syntax.Opaque(self.take()) if self.next == "*" and self.kind == "mark" else None
 
 
 LIBRARY_NAMES = frozenset(("io", "fidbus", "sys", "str", "log", "tcpip"))
 """Names that belong to the controller, not to a program's .var file."""
 
 
-def expression(text: str) -> Expression:
+def expression(text: str) -> syntax.Expression:
     """An expression that stands alone; one that is not understood is kept."""
     if WORD.match(text) and text.upper() not in RPL.constants and text not in RPL.right:
-        return Variable(text)
+        return syntax.Variable(text)
     if (point := plain_point(text)) is not None:
         return point
     words = RplWords(text)
@@ -93,11 +79,11 @@ def expression(text: str) -> Expression:
         found = words.expression()
         words.finish()
     except MisreadError:
-        return Opaque(" ".join(text.split()))
+        return syntax.Opaque(" ".join(text.split()))
     return found
 
 
-def initial(text: str, kind: str) -> Expression:
+def initial(text: str, kind: str) -> syntax.Expression:
     """A first value: a number, or ``(x,y,z,a,b,c,2,0,0,-1)`` of a position's type."""
     if kind not in FIELDS or not text.startswith("("):
         return expression(text)
@@ -105,8 +91,8 @@ def initial(text: str, kind: str) -> Expression:
     try:
         numbers = [float(part) for part in parts]
     except ValueError:
-        return Opaque(text)
-    return Constant(Record(kind, tuple(zip(FIELDS[kind], numbers))))
+        return syntax.Opaque(text)
+    return syntax.Constant(syntax.Record(kind, tuple(zip(FIELDS[kind], numbers))))
 
 
 def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
@@ -118,37 +104,37 @@ def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
     if words.accept(":="):
         value = words.expression()
         words.finish()
-        builder.add(Assign(place, left, value, text))
+        builder.add(syntax.Assign(place, left, value, text))
         return
     words.finish()
-    if not isinstance(left, Invocation):
+    if not isinstance(left, syntax.Invocation):
         raise MisreadError("neither an assignment nor a call")
     call(builder, place, left, text)
 
 
-def call(builder: CodeBuilder, place: Place, left: Invocation, text: str) -> None:
+def call(builder: CodeBuilder, place: Place, left: syntax.Invocation, text: str) -> None:
     """A statement that is a call: a motion, a wait, a routine."""
     name, given = left.function.upper(), left.arguments
     if name in MOTIONS:
-        builder.add(Move(place, name, given, text))
+        builder.add(syntax.Move(place, name, given, text))
     elif name == "WAIT" and len(given) == 1:
-        builder.add(Waiting(place, "condition", given[0], text[text.index("(") + 1 : text.rindex(")")].strip()))
+        builder.add(syntax.Waiting(place, "condition", given[0], text[text.index("(") + 1 : text.rindex(")")].strip()))
     elif name == "DWELL" and len(given) == 1:
-        builder.add(Waiting(place, "seconds", given[0], text))
-    elif name == "CALL" and len(given) == 1 and isinstance(given[0], Invocation):
-        builder.add(Doing(place, given[0], text))
+        builder.add(syntax.Waiting(place, "seconds", given[0], text))
+    elif name == "CALL" and len(given) == 1 and isinstance(given[0], syntax.Invocation):
+        builder.add(syntax.Doing(place, given[0], text))
     else:
-        builder.add(Doing(place, left, text))
+        builder.add(syntax.Doing(place, left, text))
 
 
-def plain_point(text: str) -> Constant | None:
+def plain_point(text: str) -> syntax.Constant | None:
     """A point of numbers alone, without a look at its words."""
     match = POINT.match(text)
     if match is None:
         return None
     kind, parts, configuration, turns = match.groups()
     try:
-        values: list[Value] = [float(part) for part in parts.split(",")]
+        values: list[syntax.Value] = [float(part) for part in parts.split(",")]
     except ValueError:
         return None
     if len(values) != 6 or (configuration is not None and kind == "POINTJ"):
@@ -156,7 +142,7 @@ def plain_point(text: str) -> Constant | None:
     if configuration is not None:
         values += [configuration, *(int(turn) for turn in turns.split(",")[1:])]
     fields = FIELDS[kind]
-    return None if len(values) > len(fields) else Constant(Record(kind, tuple(zip(fields, values))))
+    return None if len(values) > len(fields) else syntax.Constant(syntax.Record(kind, tuple(zip(fields, values))))
 
 
 def _plain_motion(builder: CodeBuilder, place: Place, plain: re.Match[str]) -> bool:
@@ -164,8 +150,8 @@ def _plain_motion(builder: CodeBuilder, place: Place, plain: re.Match[str]) -> b
     target = plain_point(plain[2])
     if target is None:
         return False
-    names = [Variable(name) for name in plain.groups()[2:] if name]
-    builder.add(Move(place, plain[1], (target, *names), plain.group()))
+    names = [syntax.Variable(name) for name in plain.groups()[2:] if name]
+    builder.add(syntax.Move(place, plain[1], (target, *names), plain.group()))
     return True
 
 
@@ -179,7 +165,7 @@ VARIABLE = re.compile(
 MAIN = "MAIN"
 
 
-def read_rpl(source: ProgramText) -> Program:
+def read_rpl(source: ProgramText) -> syntax.Program:
     """The program of a .pgm file.
 
     Raises
@@ -200,15 +186,17 @@ def read_rpl(source: ProgramText) -> Program:
         findings.append(DataFileMissing(source.path.with_suffix(".var").name))
     by_name, more = linked([routine])
     findings = [*source.findings, *findings, *more]
-    return Program("rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines)
+    return syntax.Program(
+        "rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines
+    )
 
 
-def _variables(source: ProgramText) -> tuple[list[Assign], list[ProgramFinding]]:
+def _variables(source: ProgramText) -> tuple[list[syntax.Assign], list[ProgramFinding]]:
     """Declarations of the .var file."""
     path = data_file_of(source.path, ".var")
     if path is None:
         return [], []
-    data: list[Assign] = []
+    data: list[syntax.Assign] = []
     found: list[ProgramFinding] = []
     seen: set[str] = set()
     for number, line in enumerate(read_program_text(path).lines, 1):
@@ -223,7 +211,7 @@ def _variables(source: ProgramText) -> tuple[list[Assign], list[ProgramFinding]]
             found.append(NameTwice(name, place))
         seen.add(name)
         value = initial(first, kind.upper()) if first else None
-        data.append(Assign(place, Variable(name), value, line.strip(), kind.upper()))
+        data.append(syntax.Assign(place, syntax.Variable(name), value, line.strip(), kind.upper()))
     return data, found
 
 
@@ -315,7 +303,7 @@ def _block(builder: CodeBuilder, place: Place, text: str, first: str) -> bool:
         case "CONTINUE":
             builder.next_round(place)
         case "RETURN":
-            builder.add(Return(place, expression(inner) if inner else None))
+            builder.add(syntax.Return(place, expression(inner) if inner else None))
         case "GOTO":
             builder.goto(place, inner)
         case "LABEL":

@@ -12,26 +12,12 @@ from pathlib import Path
 from xml.parsers import expat
 
 from er3a.errors import InputError
+from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.lexing import ProgramText
 from er3a.programs.program_findings import FormInferred
 from er3a.programs.rpl.reader import expression, initial
-from er3a.programs.syntax import (
-    Assign,
-    Doing,
-    Expression,
-    Fixed,
-    Halt,
-    Invocation,
-    Move,
-    Opaque,
-    Program,
-    Routine,
-    RoutineParameter,
-    Variable,
-    Waiting,
-)
 
 DEEPEST_ELEMENT = 100
 DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
@@ -119,7 +105,7 @@ OTHER_SIDES = ("elsif", "elseif", "else")
 MOTION_PARTS = ("target", "speed", "zone", "tool", "refsys")
 
 
-def read_xpl(source: ProgramText) -> Program:
+def read_xpl(source: ProgramText) -> syntax.Program:
     """The program of an .XPL file.
 
     Raises
@@ -149,14 +135,16 @@ def read_xpl(source: ProgramText) -> Program:
         for var in kind.all("Var")
     )
     found = (*source.findings, *findings, *(each for reader in readers for each in reader.inferred))
-    return Program("xpl", source.path.stem, source.path, by_name, entry.text_of("Name"), data, found, source.lines)
+    return syntax.Program(
+        "xpl", source.path.stem, source.path, by_name, entry.text_of("Name"), data, found, source.lines
+    )
 
 
-def _declared(source: ProgramText, var: XmlNode, local: bool) -> Assign:
+def _declared(source: ProgramText, var: XmlNode, local: bool) -> syntax.Assign:
     kind, name, first = var.text_of("Type"), var.text_of("Name"), var.text_of("InitValue")
     place = Place(source.path, var.line, f"Var {name}")
     value = initial(first, kind) if first else None
-    return Assign(place, Variable(name), value, f"{kind} {name} := {first}", kind, local)
+    return syntax.Assign(place, syntax.Variable(name), value, f"{kind} {name} := {first}", kind, local)
 
 
 class _Pou:
@@ -168,7 +156,7 @@ class _Pou:
         self.place = Place(source.path, pou.line, self.name)
         self.inferred: list[FormInferred] = []
 
-    def routine(self) -> Routine:
+    def routine(self) -> syntax.Routine:
         interface = [
             var
             for group in self.pou.all("VarDeclarations")
@@ -176,7 +164,7 @@ class _Pou:
             for var in kind.all("Var")
         ]
         parameters = tuple(
-            RoutineParameter(var.text_of("Name"), var.text_of("Attrib") not in ("In", "")) for var in interface
+            syntax.RoutineParameter(var.text_of("Name"), var.text_of("Attrib") not in ("In", "")) for var in interface
         )
         builder = CodeBuilder(self.name, parameters, self.place)
         for group in self.pou.all("VarDeclarations"):
@@ -193,7 +181,7 @@ class _Pou:
                 counts[element.tag] = counts.get(element.tag, 0) + 1
                 place = Place(self.source.path, element.line, f"{path}/{element.tag}[{counts[element.tag]}]")
                 if element.attributes.get("disable", "").lower() == "true":
-                    builder.add(Fixed(place, Disabled(text_of(element))))
+                    builder.add(syntax.Fixed(place, Disabled(text_of(element))))
                 elif element.tag in ("while", "for"):
                     self._loop(builder, element, place, (*within, pou))
                 elif sides:
@@ -244,7 +232,7 @@ class _Pou:
             body = self._named(name, within)
             if body is None or body in within or len(within) > MOST_LOOPS:
                 raise fault(place, f"there is no <Pou> '{name}' for a body here", "Add it, or correct <pouref>")
-            builder.open_if(place, Opaque(source), source)
+            builder.open_if(place, syntax.Opaque(source), source)
             self._body(builder, body, f"{place.element}/{name}", within)
             builder.close("if", place)
 
@@ -301,27 +289,27 @@ def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
     if element.tag in ("mjoint", "mlin"):
         parts = [element.child(tag) for tag in MOTION_PARTS]
         given = tuple(None if part is None or not part.text else expression(part.text) for part in parts)
-        builder.add(Move(place, element.tag.upper(), given, source))
+        builder.add(syntax.Move(place, element.tag.upper(), given, source))
     elif element.tag == "set":
         target = expression(element.text_of("dest"))
-        builder.add(Assign(place, target, expression(element.text_of("expr")), source))
+        builder.add(syntax.Assign(place, target, expression(element.text_of("expr")), source))
     elif element.tag == "wait":
         condition = element.text_of("condition")
-        builder.add(Waiting(place, "condition", expression(condition), condition))
+        builder.add(syntax.Waiting(place, "condition", expression(condition), condition))
         if (timeout_flag := element.text_of("var")) and element.text_of("timeout"):  # whether it came in time
-            builder.add(Assign(place, expression(timeout_flag), Opaque(source), source))
+            builder.add(syntax.Assign(place, expression(timeout_flag), syntax.Opaque(source), source))
     elif element.tag == "end_pro":
-        builder.add(Halt(place))
+        builder.add(syntax.Halt(place))
     elif element.tag == "dwell":
-        builder.add(Waiting(place, "seconds", expression(element.text_of("expr")), source))
+        builder.add(syntax.Waiting(place, "seconds", expression(element.text_of("expr")), source))
     elif element.tag == "rem":
         builder.remark(place, element.text_of("text"))
     elif element.tag == "call" and (routine := element.child("subroutine")) is not None:
         name = routine.text_of("name")
-        given_arguments: tuple[Expression, ...] = ()
+        given_arguments: tuple[syntax.Expression, ...] = ()
         for arguments in routine.all("args"):
             given_arguments = tuple(expression(each.text) for each in arguments.all("arg") if each.text)
-        builder.add(Doing(place, Invocation(name, given_arguments), source))
+        builder.add(syntax.Doing(place, syntax.Invocation(name, given_arguments), source))
     else:
         builder.unknown(place, source)
 

@@ -12,47 +12,12 @@ import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
+from er3a.programs import instructions, syntax
 from er3a.programs.evaluation import Dialect, Position, ProgramMemory
-from er3a.programs.instructions import (
-    FINE,
-    ArmMotion,
-    Aside,
-    Instruction,
-    JointTarget,
-    MotionKind,
-    NamedFrame,
-    Output,
-    PoseTarget,
-    Rate,
-    Target,
-    Unknown,
-    UnresolvedTarget,
-    Zone,
-    centre_and_angle,
-    numbers_of,
-    pose_of,
-)
-from er3a.programs.syntax import (
-    POSE_KEYS,
-    Assign,
-    Doing,
-    Invocation,
-    Move,
-    Program,
-    Record,
-    Solved,
-    Unclear,
-    Value,
-    Variable,
-    finite,
-    number,
-    numbers,
-    shown,
-)
 from er3a.programs.urscript.reader import CHANGED, LIST_METHODS, THREAD
 from er3a.robots.masses import MassBody
 
-KINDS: dict[str, MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
+KINDS: dict[str, instructions.MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
 PARAMETERS = {
     "movej": ("q", "a", "v", "t", "r"),
     "movel": ("pose", "a", "v", "t", "r"),
@@ -60,7 +25,7 @@ PARAMETERS = {
     "movec": ("pose_via", "pose_to", "a", "v", "r", "mode"),
 }
 DEFAULTS = {"movej": (1.4, 1.05), "movel": (1.2, 0.25), "movep": (1.2, 0.25), "movec": (1.2, 0.25)}
-ROBOT_BASE = NamedFrame("base", np.eye(4))
+ROBOT_BASE = instructions.NamedFrame("base", np.eye(4))
 PASSING = "%passing"  # whether the program goes on while the arm still moves to its last target
 READING = ("get_actual_", "get_target_", "get_forward_kin")  # beginnings of functions that read where the arm is
 NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
@@ -170,13 +135,13 @@ class UrScriptDialect(Dialect):
     servers : names of variables that hold what ``rpc_factory`` gives: other processes, which move nothing here
     """
 
-    def __init__(self, program: Program):
-        assigned = (each for each in program.operations() if isinstance(each, Assign))
+    def __init__(self, program: syntax.Program):
+        assigned = (each for each in program.operations() if isinstance(each, syntax.Assign))
         self.servers = frozenset(
             each.target.name
             for each in assigned
-            if isinstance(each.target, Variable)
-            and isinstance(each.value, Invocation)
+            if isinstance(each.target, syntax.Variable)
+            and isinstance(each.value, syntax.Invocation)
             and each.value.function == "rpc_factory"
         )
         reads = any(word in line for line in program.lines for word in READING)
@@ -186,25 +151,25 @@ class UrScriptDialect(Dialect):
     setters = frozenset(("set_tcp", *LOADS))
     first_index = 0
 
-    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """Numbers of the language."""
         return math.pi if name == "MATH_PI" else None
 
-    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
+    def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
         """``[...]``, and ``p[...]`` with six numbers."""
         if not kind:
             return values
         if len(values) != 6:
-            return Unclear(f"p[{', '.join(map(shown, values))}]")
-        return Record("p", tuple(zip(POSE_KEYS, values)))
+            return syntax.Unclear(f"p[{', '.join(map(syntax.shown, values))}]")
+        return syntax.Record("p", tuple(zip(syntax.POSE_KEYS, values)))
 
-    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Mathematics, poses, where the arm stands; what is not known, or called otherwise than known, is unclear."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
         keywords = {key: memory.value(each) for key, each in given.keywords}
         if name == "struct":
-            return Record(name, tuple(keywords.items()))
-        unclear = Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
+            return syntax.Record(name, tuple(keywords.items()))
+        unclear = syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
         if name == CHANGED:
             return _changed(values, unclear)
         placed = _placed(SIGNATURES.get(name), values, keywords)
@@ -216,38 +181,48 @@ class UrScriptDialect(Dialect):
         if found is None:
             found = _of_lists(name, placed)
         if found is None and name in PLAIN:
-            plain = numbers(tuple(placed.get(key) for key in SIGNATURES[name]))
+            plain = syntax.numbers(tuple(placed.get(key) for key in SIGNATURES[name]))
             try:
                 found = None if plain is None else PLAIN[name](*plain)
             except (ValueError, OverflowError, ZeroDivisionError, TypeError):
                 found = None
         return unclear if found is None else found
 
-    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
         """movej, movel, movep, movec."""
         kind = KINDS[move.form]
         placed = [None if each is None else memory.value(each) for each in move.arguments]
         settings = {name: memory.value(each) for name, each in move.settings}
         values = _placed(PARAMETERS[move.form], placed, settings)
         if values is None:
-            unknown = UnresolvedTarget(move.text, "not_understood")
-            return ArmMotion(kind, unknown, move.form, unknown if kind == "arc" else None, tool=_tool(memory))
+            unknown = instructions.UnresolvedTarget(move.text, "not_understood")
+            return instructions.ArmMotion(
+                kind, unknown, move.form, unknown if kind == "arc" else None, tool=_tool(memory)
+            )
         first, second = PARAMETERS[move.form][:2]
-        goal = values.get(second if kind == "arc" else first, Unclear(move.text))
+        goal = values.get(second if kind == "arc" else first, syntax.Unclear(move.text))
         made = _target(memory, goal, move.text)
-        via = _target(memory, values.get(first, Unclear(move.text)), move.text) if kind == "arc" else None
+        via = _target(memory, values.get(first, syntax.Unclear(move.text)), move.text) if kind == "arc" else None
         if "mode" in values:
             made = _in_mode(memory, values["mode"], via, made, move.text)
         a, v = DEFAULTS[move.form]
         joint = kind == "joint"
-        seconds = number(values.get("t")) or 0.0
-        speed = Rate(seconds, "s") if seconds > 0 else _rate(values.get("v", v), "rad/s" if joint else "m/s")
+        seconds = syntax.number(values.get("t")) or 0.0
+        speed = (
+            instructions.Rate(seconds, "s") if seconds > 0 else _rate(values.get("v", v), "rad/s" if joint else "m/s")
+        )
         radius = values.get("r", 0.0)
-        blend = number(radius)
-        zone = Zone("named", 0.0, shown(radius)) if blend is None else Zone("distance", blend) if blend > 0 else FINE
+        blend = syntax.number(radius)
+        zone = (
+            instructions.Zone("named", 0.0, syntax.shown(radius))
+            if blend is None
+            else instructions.Zone("distance", blend)
+            if blend > 0
+            else instructions.FINE
+        )
         if PASSING in self.modal:
-            memory.write(PASSING, zone is not FINE)
-        return ArmMotion(
+            memory.write(PASSING, zone is not instructions.FINE)
+        return instructions.ArmMotion(
             kind,
             made,
             move.form,
@@ -261,29 +236,33 @@ class UrScriptDialect(Dialect):
             load=_load(memory.read("%load")),
         )
 
-    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
         """The tool, outputs, what is harmless; the rest is unknown."""
         call = doing.what
-        assert isinstance(call, Invocation)
+        assert isinstance(call, syntax.Invocation)
         values = [None if each is None else memory.value(each) for each in call.arguments]
         keywords = {key: memory.value(each) for key, each in call.keywords}
         if call.function == "set_tcp":
             given = _placed(("pose", "tcp_name"), values, keywords)
             if given is None or "pose" not in given:
-                memory.write("%tcp", Unclear(doing.text))
-                return Unknown(doing.text)
+                memory.write("%tcp", syntax.Unclear(doing.text))
+                return instructions.Unknown(doing.text)
             memory.write("%tcp", given["pose"])
             return None
         if call.function in LOADS:
             loaded = _placed(LOADS[call.function], values, keywords)
-            memory.write("%load", Unclear(doing.text) if loaded is None else _load_set(memory.read("%load"), loaded))
-            return Aside(doing.text) if isinstance(_load(memory.read("%load")), str) else None
+            memory.write(
+                "%load", syntax.Unclear(doing.text) if loaded is None else _load_set(memory.read("%load"), loaded)
+            )
+            return instructions.Aside(doing.text) if isinstance(_load(memory.read("%load")), str) else None
         output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
         if output is not None and len(output) == 2:
-            return Output(f"{OUTPUTS[call.function]}[{shown(output['n'])}]", shown(output["b"]))
-        return Aside(doing.text) if self.harmless(call) else Unknown(doing.text)
+            return instructions.Output(
+                f"{OUTPUTS[call.function]}[{syntax.shown(output['n'])}]", syntax.shown(output["b"])
+            )
+        return instructions.Aside(doing.text) if self.harmless(call) else instructions.Unknown(doing.text)
 
-    def harmless(self, call: Invocation) -> bool:
+    def harmless(self, call: syntax.Invocation) -> bool:
         """Functions whose exact name is known, and those that other processes answer."""
         if "." in call.function:
             name, _, method = call.function.partition(".")
@@ -292,8 +271,8 @@ class UrScriptDialect(Dialect):
 
 
 def _placed(
-    names: tuple[str, ...] | None, values: list[Value | None], keywords: dict[str, Value]
-) -> dict[str, Value] | None:
+    names: tuple[str, ...] | None, values: list[syntax.Value | None], keywords: dict[str, syntax.Value]
+) -> dict[str, syntax.Value] | None:
     """Arguments by the names of a function's parameters; None for a call that does not fit them."""
     if names is None or len(values) > len(names) or None in values or not keywords.keys() <= set(names):
         return None
@@ -301,130 +280,136 @@ def _placed(
     return None if placed.keys() & keywords.keys() else placed | keywords
 
 
-def _tool_value(memory: ProgramMemory) -> Value | None:
+def _tool_value(memory: ProgramMemory) -> syntax.Value | None:
     """The pose of the tool as a value; None where neither program nor cell gives it."""
     value = memory.read("%tcp")
     return _record(memory.cell.tool) if value is None and memory.cell.tool is not None else value
 
 
-def _tool(memory: ProgramMemory) -> NamedFrame:
+def _tool(memory: ProgramMemory) -> instructions.NamedFrame:
     value = memory.read("%tcp")
     if value is None:
-        return NamedFrame("", memory.cell.tool)
+        return instructions.NamedFrame("", memory.cell.tool)
     pose = _pose(value)
-    return NamedFrame(value.text if isinstance(value, Unclear) else "", pose)
+    return instructions.NamedFrame(value.text if isinstance(value, syntax.Unclear) else "", pose)
 
 
-def _load_set(before: Value | None, given: dict[str, Value]) -> Value:
+def _load_set(before: syntax.Value | None, given: dict[str, syntax.Value]) -> syntax.Value:
     """Mass (kg), centre of mass (m, in the flange's frame) and inertia (kg m^2, about it); what a call leaves out stays
     as it was, but for the inertia, which only ``set_target_payload`` sets."""
-    kept = dict(before.items) if isinstance(before, Record) else {}
-    return Record("load", tuple((kept | given | {"inertia": given.get("inertia", (0.0,) * 6)}).items()))
+    kept = dict(before.items) if isinstance(before, syntax.Record) else {}
+    return syntax.Record("load", tuple((kept | given | {"inertia": given.get("inertia", (0.0,) * 6)}).items()))
 
 
-def _load(value: Value | None) -> MassBody | str | None:
+def _load(value: syntax.Value | None) -> MassBody | str | None:
     """What the program says hangs on the flange."""
-    if not isinstance(value, Record):
-        return value.text if isinstance(value, Unclear) else None
+    if not isinstance(value, syntax.Record):
+        return value.text if isinstance(value, syntax.Unclear) else None
     mass, centre, inertia = (value.get(key) for key in ("m", "cog", "inertia"))
     parts = (mass, *(centre if isinstance(centre, tuple) else ()), *(inertia if isinstance(inertia, tuple) else ()))
-    plain = numbers(parts)
-    if plain is None or len(plain) != 10 or not finite(plain) or plain[0] < 0:
-        return "set_payload" if mass is None else f"set_payload({shown(mass)})"
+    plain = syntax.numbers(parts)
+    if plain is None or len(plain) != 10 or not syntax.finite(plain) or plain[0] < 0:
+        return "set_payload" if mass is None else f"set_payload({syntax.shown(mass)})"
     kg, x, y, z, xx, yy, zz, xy, xz, yz = plain
     return MassBody(kg, (x, y, z), (xx, yy, zz, xy, xz, yz)) if kg else None
 
 
-def _rate(value: Value, unit: str) -> Rate | None:
-    plain = number(value)
-    units = {"rad/s": Rate(plain or 0.0, "rad/s"), "m/s": Rate(plain or 0.0, "m/s")}
-    units |= {"rad/s2": Rate(plain or 0.0, "rad/s2"), "m/s2": Rate(plain or 0.0, "m/s2")}
+def _rate(value: syntax.Value, unit: str) -> instructions.Rate | None:
+    plain = syntax.number(value)
+    units = {"rad/s": instructions.Rate(plain or 0.0, "rad/s"), "m/s": instructions.Rate(plain or 0.0, "m/s")}
+    units |= {"rad/s2": instructions.Rate(plain or 0.0, "rad/s2"), "m/s2": instructions.Rate(plain or 0.0, "m/s2")}
     return None if plain is None else units[unit]
 
 
-def _pose(value: Value | None) -> Reals | None:
+def _pose(value: syntax.Value | None) -> Reals | None:
     """The transform (4, 4) of a pose of six finite numbers."""
-    if not isinstance(value, Record) or value.kind != "p":
+    if not isinstance(value, syntax.Record) or value.kind != "p":
         return None
-    plain = numbers(value.values())
-    return pose_of(plain, "ur") if plain is not None and finite(plain) else None
+    plain = syntax.numbers(value.values())
+    return instructions.pose_of(plain, "ur") if plain is not None and syntax.finite(plain) else None
 
 
-def _record(pose: Reals) -> Record:
-    return Record("p", tuple(zip(POSE_KEYS, numbers_of(pose, "ur"))))
+def _record(pose: Reals) -> syntax.Record:
+    return syntax.Record("p", tuple(zip(syntax.POSE_KEYS, instructions.numbers_of(pose, "ur"))))
 
 
-def _target(memory: ProgramMemory, value: Value, text: str) -> Target:
+def _target(memory: ProgramMemory, value: syntax.Value, text: str) -> instructions.Target:
     match value:
-        case Solved():
+        case syntax.Solved():
             return _solved_target(memory, value, text)
-        case Unclear(text=unclear):
+        case syntax.Unclear(text=unclear):
             if unclear.lower() in ("nan", "inf"):
-                return UnresolvedTarget(unclear, "not_finite")
-            return UnresolvedTarget(unclear, "undefined" if NAME.fullmatch(unclear) else "not_understood")
-        case Record() | tuple():
-            parts = value.values() if isinstance(value, Record) else value
-            unclear_part = next((each for each in parts if isinstance(each, Unclear)), None)
+                return instructions.UnresolvedTarget(unclear, "not_finite")
+            return instructions.UnresolvedTarget(unclear, "undefined" if NAME.fullmatch(unclear) else "not_understood")
+        case syntax.Record() | tuple():
+            parts = value.values() if isinstance(value, syntax.Record) else value
+            unclear_part = next((each for each in parts if isinstance(each, syntax.Unclear)), None)
             if unclear_part is not None:
                 return _target(memory, unclear_part, text)
-            plain = numbers(parts)
-            if plain is not None and not finite(plain):
-                return UnresolvedTarget(text, "not_finite")
+            plain = syntax.numbers(parts)
+            if plain is not None and not syntax.finite(plain):
+                return instructions.UnresolvedTarget(text, "not_finite")
             matrix = _pose(value)
             if matrix is not None:
-                return PoseTarget(matrix)
+                return instructions.PoseTarget(matrix)
             joints = _joints(value)
             if joints is not None:
-                return JointTarget(joints)
-    return UnresolvedTarget(text, "not_understood")
+                return instructions.JointTarget(joints)
+    return instructions.UnresolvedTarget(text, "not_understood")
 
 
-def _in_mode(memory: ProgramMemory, mode: Value, via: Target | None, goal: Target, text: str) -> Target:
+def _in_mode(
+    memory: ProgramMemory, mode: syntax.Value, via: instructions.Target | None, goal: instructions.Target, text: str
+) -> instructions.Target:
     """An arc's target by its mode: 0 turns the tool from its first orientation to the target's, 1 with the tangent.
 
     An arc of less than half a turn whose tool turns with the tangent is one whose tool turns evenly to the first
     orientation, turned by the arc's angle. Longer ones would turn the other way round, and are not understood.
     """
-    if number(mode) == 0:
+    if syntax.number(mode) == 0:
         return goal
     start = memory.here.seen(_tool(memory), ROBOT_BASE, memory.cell.flange)
-    if number(mode) != 1 or not isinstance(goal, PoseTarget) or not isinstance(via, PoseTarget):
-        return UnresolvedTarget(text, "not_understood")
+    if (
+        syntax.number(mode) != 1
+        or not isinstance(goal, instructions.PoseTarget)
+        or not isinstance(via, instructions.PoseTarget)
+    ):
+        return instructions.UnresolvedTarget(text, "not_understood")
     if start is None:
-        return UnresolvedTarget(text, "position_unknown")
-    circle = centre_and_angle(start[:3, 3], via.pose[:3, 3], goal.pose[:3, 3])
+        return instructions.UnresolvedTarget(text, "position_unknown")
+    circle = instructions.centre_and_angle(start[:3, 3], via.pose[:3, 3], goal.pose[:3, 3])
     if circle is None or circle[2] > HALF_A_TURN:
-        return UnresolvedTarget(text, "not_understood")
+        return instructions.UnresolvedTarget(text, "not_understood")
     pose = goal.pose.copy()
     pose[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(circle[2] * circle[1]).as_matrix() @ start[:3, :3]
-    return PoseTarget(pose)
+    return instructions.PoseTarget(pose)
 
 
-def _solved_target(memory: ProgramMemory, solved: Solved, text: str) -> Target:
+def _solved_target(memory: ProgramMemory, solved: syntax.Solved, text: str) -> instructions.Target:
     """The joints that bring the tool of then to the pose, as a pose of the tool of now."""
     found = _target(memory, solved.pose, text)
-    if not isinstance(found, PoseTarget):
+    if not isinstance(found, instructions.PoseTarget):
         return found
-    if isinstance(solved.near, Unclear):
-        return UnresolvedTarget(solved.near.text, "not_understood")
+    if isinstance(solved.near, syntax.Unclear):
+        return instructions.UnresolvedTarget(solved.near.text, "not_understood")
     now = _tool_value(memory)
     if solved.tool != now:
         then, tool = _pose(solved.tool), _pose(now)
         if then is None or tool is None:
-            return UnresolvedTarget(text, "not_understood")
-        found = PoseTarget(found.pose @ np.linalg.inv(then) @ tool)
+            return instructions.UnresolvedTarget(text, "not_understood")
+        found = instructions.PoseTarget(found.pose @ np.linalg.inv(then) @ tool)
     near = _joints(solved.near)
     if near is None and solved.here != memory.here.key():  # which of the solutions was nearest then is not known
-        return UnresolvedTarget(text, "position_unknown")
+        return instructions.UnresolvedTarget(text, "position_unknown")
     return replace(found, near=near)
 
 
-def _joints(value: Value) -> Reals | None:
-    plain = numbers(value) if isinstance(value, tuple) else None
-    return np.array(plain) if plain is not None and len(plain) == 6 and finite(plain) else None
+def _joints(value: syntax.Value) -> Reals | None:
+    plain = syntax.numbers(value) if isinstance(value, tuple) else None
+    return np.array(plain) if plain is not None and len(plain) == 6 and syntax.finite(plain) else None
 
 
-def _of_position(memory: ProgramMemory, name: str, given: dict[str, Value]) -> Value | None:
+def _of_position(memory: ProgramMemory, name: str, given: dict[str, syntax.Value]) -> syntax.Value | None:
     """Functions of where the arm stands, and of its table.
 
     Behind a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
@@ -438,7 +423,7 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, Value]) -> V
     if name in ("get_actual_joint_positions", "get_target_joint_positions"):
         return None if here.joints is None else tuple(map(float, here.joints))
     if name in ("get_actual_tcp_pose", "get_target_tcp_pose", "get_target_waypoint", "get_actual_tool_flange_pose"):
-        tool = NamedFrame("flange", np.eye(4)) if name.endswith("flange_pose") else _tool(memory)
+        tool = instructions.NamedFrame("flange", np.eye(4)) if name.endswith("flange_pose") else _tool(memory)
         seen = here.seen(tool, ROBOT_BASE, memory.cell.flange)
         return None if seen is None else _record(seen)
     if name == "get_tcp_offset":
@@ -449,18 +434,18 @@ def _of_position(memory: ProgramMemory, name: str, given: dict[str, Value]) -> V
         tool_pose = _pose(given["tcp"]) if "tcp" in given else _tool(memory).pose
         if joints is not None and tool_pose is not None:
             return _record(memory.cell.flange(joints) @ tool_pose)
-    if name == "get_inverse_kin" and isinstance(pose := given.get("x"), Record):
+    if name == "get_inverse_kin" and isinstance(pose := given.get("x"), syntax.Record):
         near = given.get("qnear", () if memory.here.joints is None else tuple(map(float, memory.here.joints)))
         tool_value = given.get("tcp", _tool_value(memory))
-        plain = isinstance(near, Unclear) or near == () or _joints(near) is not None
+        plain = isinstance(near, syntax.Unclear) or near == () or _joints(near) is not None
         if plain and (tool_value is None or _pose(tool_value) is not None):
-            return Solved(pose, near, tool_value, memory.here.key())
+            return syntax.Solved(pose, near, tool_value, memory.here.key())
     return None
 
 
-def _changed(values: list[Value | None], unclear: Unclear) -> Value:
+def _changed(values: list[syntax.Value | None], unclear: syntax.Unclear) -> syntax.Value:
     """A list behind one of its methods, whose name is the second argument."""
-    found, name, *more = (Unclear("") if each is None else each for each in values)
+    found, name, *more = (syntax.Unclear("") if each is None else each for each in values)
     if isinstance(found, tuple) and len(found) < LONGEST_LIST:
         if name == "append" and len(more) == 1:
             return (*found, more[0])
@@ -469,26 +454,26 @@ def _changed(values: list[Value | None], unclear: Unclear) -> Value:
     return unclear
 
 
-def _of_lists(name: str, given: dict[str, Value]) -> Value | None:
+def _of_lists(name: str, given: dict[str, syntax.Value]) -> syntax.Value | None:
     """The number of a list's elements, its length as a vector, and the list over that; a list of one value."""
     value = given.get("v", given.get("a"))
     if name in ("length", "get_list_length", "size"):
         return len(value) if isinstance(value, (tuple, str)) else None
     if name == "make_list":
-        count = number(given.get("length"))
+        count = syntax.number(given.get("length"))
         fits = count is not None and count == int(count) and 0 <= count <= LONGEST_LIST
         return (given["initial_value"],) * int(count or 0) if fits and "initial_value" in given else None
     if name not in ("norm", "normalize"):
         return None
-    parts = value.values() if isinstance(value, Record) and name == "norm" else value
-    plain = numbers(parts) if isinstance(parts, tuple) else numbers((parts,))
+    parts = value.values() if isinstance(value, syntax.Record) and name == "norm" else value
+    plain = syntax.numbers(parts) if isinstance(parts, tuple) else syntax.numbers((parts,))
     size = None if not plain else math.hypot(*plain)
     if not plain or size is None or not math.isfinite(size):
         return None
     return size if name == "norm" else tuple(each / size for each in plain) if size > 0 else None
 
 
-def _of_poses(name: str, given: dict[str, Value]) -> Value | None:
+def _of_poses(name: str, given: dict[str, syntax.Value]) -> syntax.Value | None:
     """Functions of poses, as the manual defines them [1]_.
 
     What it leaves open has no value: how ``pose_dist`` weighs turns against lengths, and in which frame ``pose_sub``
@@ -500,8 +485,8 @@ def _of_poses(name: str, given: dict[str, Value]) -> Value | None:
     """
     values = [given[key] for key in SIGNATURES.get(name, ()) if key in given]
     if name in ("rpy2rotvec", "rotvec2rpy") and values and isinstance(values[0], tuple):
-        plain = numbers(values[0])
-        if plain is not None and len(plain) == 3 and finite(plain):
+        plain = syntax.numbers(values[0])
+        if plain is not None and len(plain) == 3 and syntax.finite(plain):
             if name == "rpy2rotvec":
                 turn = scipy.spatial.transform.Rotation.from_matrix(
                     transform(np.zeros(3), np.array(plain))[:3, :3]
@@ -530,7 +515,7 @@ def _of_poses(name: str, given: dict[str, Value]) -> Value | None:
             same = np.abs(found[:3, :3] - b[:3, :3].T @ a[:3, :3]).max() < SAME_TURN
             return _record(found) if same else None
         case "interpolate_pose":
-            share = number(given.get("alpha"))
+            share = syntax.number(given.get("alpha"))
             if share is None or not math.isfinite(share):
                 return None
             turn = scipy.spatial.transform.Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()

@@ -9,34 +9,10 @@ import re
 from collections.abc import Iterator
 
 from er3a.errors import InputError
+from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, as_number
-from er3a.programs.syntax import (
-    POSE_KEYS,
-    START,
-    Assign,
-    Beside,
-    Call,
-    Constant,
-    Doing,
-    Expression,
-    Halt,
-    Invocation,
-    Listed,
-    Move,
-    Opaque,
-    Operation,
-    Program,
-    Record,
-    Return,
-    Routine,
-    RoutineParameter,
-    Variable,
-    Waiting,
-    expressions_of,
-    inner,
-)
 
 UR = Lexicon(
     re.compile(
@@ -78,12 +54,12 @@ class UrWords(Words):
     def __init__(self, text: str):
         super().__init__(UR, text)
 
-    def special(self) -> Expression | None:
+    def special(self) -> syntax.Expression | None:
         """Lists and poses, with an index behind them."""
         found = self._list()
         return None if found is None else self.parts_of(found)
 
-    def _list(self) -> Expression | None:
+    def _list(self) -> syntax.Expression | None:
         kind = "p" if self.next == "p" and self.texts[self.at + 1] == "[" else ""
         if kind:
             self.take()
@@ -92,15 +68,15 @@ class UrWords(Words):
         self.take()
         numbers = self._numbers()
         if numbers is not None and not kind:
-            return Constant(numbers)
-        if numbers is not None and len(numbers) == len(POSE_KEYS):
-            return Constant(Record("p", tuple(zip(POSE_KEYS, numbers))))
+            return syntax.Constant(numbers)
+        if numbers is not None and len(numbers) == len(syntax.POSE_KEYS):
+            return syntax.Constant(syntax.Record("p", tuple(zip(syntax.POSE_KEYS, numbers))))
         if numbers is not None:
-            return Listed(kind, tuple(map(Constant, numbers)))
+            return syntax.Listed(kind, tuple(map(syntax.Constant, numbers)))
         placed, _ = self.arguments("]")
         if None in placed:
             raise MisreadError("an element is missing")
-        return Listed(kind, tuple(each for each in placed if each is not None))
+        return syntax.Listed(kind, tuple(each for each in placed if each is not None))
 
     def _numbers(self) -> tuple[int | float, ...] | None:
         """Numbers alone up to the closing bracket, which is passed; None, with nothing passed, for anything else."""
@@ -122,7 +98,7 @@ class UrWords(Words):
             at += 1
 
 
-def read_urscript(source: ProgramText) -> Program:
+def read_urscript(source: ProgramText) -> syntax.Program:
     """The program of a .script file: its statements, or else the first of its outermost routines that no other calls.
 
     Raises
@@ -133,7 +109,7 @@ def read_urscript(source: ProgramText) -> Program:
     reader = _UrReader(source)
     routines = reader.read()
     by_name, findings = linked(routines)
-    return Program(
+    return syntax.Program(
         "urscript",
         source.path.stem,
         source.path,
@@ -147,11 +123,11 @@ def read_urscript(source: ProgramText) -> Program:
 class _UrReader:
     def __init__(self, source: ProgramText):
         self.source = source
-        self.routines: list[Routine] = []
+        self.routines: list[syntax.Routine] = []
         self.outermost: list[str] = []
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
 
-    def read(self) -> list[Routine]:
+    def read(self) -> list[syntax.Routine]:
         """All routines; the one without a name holds what stands outside of others."""
         place = Place(self.source.path, 1)
         for place, text, comment in self._statements():
@@ -166,14 +142,14 @@ class _UrReader:
             raise fault(builder.place, f"{builder.name} has no end", "Close it with end")
         top = self.open[0]
         names = {each.name for each in self.routines}
-        if not any(isinstance(each, Move) or names & set(_called(each)) for each in top.code):
+        if not any(isinstance(each, syntax.Move) or names & set(_called(each)) for each in top.code):
             called = {
                 name for each in self.routines for step in each.code for name in _called(step) if name != each.name
             }
             outermost = [each for each in self.routines if each.name in self.outermost and not each.thread]
             starts = [each for each in outermost if each.name not in called] or outermost
             if starts:
-                top.add(Call(starts[0].place, starts[0].name, (), (), starts[0].name, START))
+                top.add(syntax.Call(starts[0].place, starts[0].name, (), (), starts[0].name, syntax.START))
         return [*self.routines, top.routine(place)]
 
     def _statements(self) -> Iterator[tuple[Place, str, str]]:
@@ -228,11 +204,11 @@ class _UrReader:
             words.take()
             value = None if words.kind == "end" else words.expression()
             words.finish()
-            builder.add(Return(place, value))
+            builder.add(syntax.Return(place, value))
         elif first in ("break", "continue") and not follows:
             (builder.leave_loop if first == "break" else builder.next_round)(place)
         elif first == "halt":
-            builder.add(Halt(place))
+            builder.add(syntax.Halt(place))
         elif first == "run" and follows not in ("=", "("):
             words.take()
             _run(builder, words, place, text)
@@ -249,7 +225,7 @@ class _UrReader:
         while not words.accept(")"):
             parameter = words.name()
             default = words.expression() if words.accept("=") else None
-            parameters.append(RoutineParameter(parameter, False, default))
+            parameters.append(syntax.RoutineParameter(parameter, False, default))
             if not words.accept(","):
                 words.expect(")")
                 break
@@ -271,13 +247,13 @@ class _UrReader:
             self.outermost.append(builder.name)
 
 
-def _plain_motion(place: Place, plain: re.Match[str]) -> Move:
+def _plain_motion(place: Place, plain: re.Match[str]) -> syntax.Move:
     """A motion to numbers alone, without a look at its words."""
     numbers = tuple(map(float, plain[3].split(",")))
-    target = Constant(Record("p", tuple(zip(POSE_KEYS, numbers))) if plain[2] else numbers)
+    target = syntax.Constant(syntax.Record("p", tuple(zip(syntax.POSE_KEYS, numbers))) if plain[2] else numbers)
     pairs = (part.split("=") for part in plain[4].split(",")[1:])
-    settings = tuple((name.strip(), Constant(float(value))) for name, value in pairs)
-    return Move(place, plain[1], (target,), plain.group(), (), settings)
+    settings = tuple((name.strip(), syntax.Constant(float(value))) for name, value in pairs)
+    return syntax.Move(place, plain[1], (target,), plain.group(), (), settings)
 
 
 def _split(line: str, place: Place) -> tuple[str, str, int]:
@@ -323,7 +299,7 @@ def _block(builder: CodeBuilder, first: str, words: UrWords, place: Place, text:
         words.accept(":")
         words.finish()
     except MisreadError:
-        condition = Opaque(text.partition(" ")[2].rstrip(":"))
+        condition = syntax.Opaque(text.partition(" ")[2].rstrip(":"))
     source = text.rstrip(":")
     if first == "if":
         builder.open_if(place, condition, source)
@@ -342,50 +318,55 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
         if started:
             words.take()
             _run(builder, words, place, text)
-        value = Invocation(THREAD, ()) if started else words.expression()
+        value = syntax.Invocation(THREAD, ()) if started else words.expression()
         words.finish()
-        builder.add(Assign(place, left, value, text, "global" if scope == "global" else "", scope == "local"))
-        if isinstance(value, Invocation):
+        builder.add(syntax.Assign(place, left, value, text, "global" if scope == "global" else "", scope == "local"))
+        if isinstance(value, syntax.Invocation):
             _method(builder, value, place, text)
         return
     words.finish()
     if scope:
-        builder.add(Assign(place, left, None, text, scope, scope == "local"))
-    elif not isinstance(left, Invocation):
+        builder.add(syntax.Assign(place, left, None, text, scope, scope == "local"))
+    elif not isinstance(left, syntax.Invocation):
         raise MisreadError("neither an assignment nor a call")
     elif left.function in MOTIONS:
-        builder.add(Move(place, left.function, left.arguments, text, (), left.keywords))
+        builder.add(syntax.Move(place, left.function, left.arguments, text, (), left.keywords))
     elif left.function == "sleep" and len(left.arguments) == 1:
-        builder.add(Waiting(place, "seconds", left.arguments[0], text))
+        builder.add(syntax.Waiting(place, "seconds", left.arguments[0], text))
     elif not _method(builder, left, place, text):
-        builder.add(Doing(place, left, text))
+        builder.add(syntax.Doing(place, left, text))
 
 
 def _run(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
     """``run name(...)``: a thread."""
     what = words.expression()
     words.finish()
-    if not isinstance(what, Invocation):
+    if not isinstance(what, syntax.Invocation):
         raise MisreadError("no thread is named")
     builder.beside(place, what, text, "thread")
 
 
-def _method(builder: CodeBuilder, call: Invocation, place: Place, text: str) -> bool:
+def _method(builder: CodeBuilder, call: syntax.Invocation, place: Place, text: str) -> bool:
     """A method that changes its list; False if the call is none."""
     name, _, method = call.function.partition(".")
     if method not in LIST_METHODS:
         return False
     builder.add(
-        Assign(place, Variable(name), Invocation(CHANGED, (Variable(name), Constant(method), *call.arguments)), text)
+        syntax.Assign(
+            place,
+            syntax.Variable(name),
+            syntax.Invocation(CHANGED, (syntax.Variable(name), syntax.Constant(method), *call.arguments)),
+            text,
+        )
     )
     return True
 
 
-def _called(operation: Operation) -> Iterator[str]:
+def _called(operation: syntax.Operation) -> Iterator[str]:
     """Functions that an operation calls, or runs beside it."""
-    waiting = [*expressions_of(operation), *((operation.what,) if isinstance(operation, Beside) else ())]
+    waiting = [*syntax.expressions_of(operation), *((operation.what,) if isinstance(operation, syntax.Beside) else ())]
     while waiting:
         each = waiting.pop()
-        if isinstance(each, Invocation):
+        if isinstance(each, syntax.Invocation):
             yield each.function
-        waiting += inner(each)
+        waiting += syntax.inner(each)

@@ -5,30 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.instructions import Output, Pause, PoseTarget, numbers_of
+from er3a.programs import writing
+from er3a.programs.instructions import Output, PoseTarget, numbers_of
 from er3a.programs.urscript.dialect import DEFAULTS
-from er3a.programs.writing import (
-    LOAD_DIGITS,
-    ReadyMotion,
-    Writer,
-    duration,
-    fixed,
-    leading_joint_speed,
-    short,
-    tool_speed,
-)
 from er3a.robots.masses import MassBody
 
 DIGITS = 9
 
 
-class UrScriptWriter(Writer):
+class UrScriptWriter(writing.Writer):
     """Writes URScript."""
 
     languages = ("urscript",)
     longest_name = 40
     indent = "  "
-    tcp = ""
+    loop = ("while (True):", "end")
+    wait = ("sleep({})", 'popup("Go on?", "Program", False, False, blocking=True)', "{}")
 
     def files(self, head: list[str]) -> dict[str, str]:
         """The .script file."""
@@ -36,46 +28,44 @@ class UrScriptWriter(Writer):
         return {".script": "\n".join(lines)}
 
     def begin_loop(self) -> None:
-        """``while (True):``; what was set before does not count within."""
-        self._line("while (True):")
-        self.indent, self.tcp = "    ", ""
+        """``while (True):``, and what stands within further in."""
+        super().begin_loop()
+        self.indent = "    "
 
     def end_loop(self) -> None:
         """``end``."""
         self.indent = "  "
-        self._line("end")
+        super().end_loop()
 
     def comment(self, text: str) -> None:
         """``# text``."""
-        self._line(text if text.startswith("$ ") else f"# {text}")
-
-    def pause(self, pause: Pause) -> None:
-        """``sleep``, or a message that the operator has to close."""
-        if pause.seconds is not None:
-            self._line(f"sleep({short(pause.seconds)})")
-        elif pause.condition is not None:
-            self.verbatim(pause.condition)
-        else:
-            self._line('popup("Go on?", "Program", False, False, blocking=True)')
+        self.line(text if text.startswith("$ ") else f"# {text}")
 
     def output(self, output: Output) -> None:
         """``set_digital_out(0, True)``."""
         name, _, rest = output.name.partition("[")
         value = output.value.capitalize() if output.value in ("TRUE", "FALSE") else output.value
-        self._line(f"set_{name}({rest.rstrip(']')}, {value})" if rest else f"set_{output.name}({value})")
+        self.line(f"set_{name}({rest.rstrip(']')}, {value})" if rest else f"set_{output.name}({value})")
 
     def verbatim(self, text: str) -> None:
         """A line as it was read."""
-        self._line(" ".join(text.split()))
+        self.line(" ".join(text.split()))
 
     def set_load(self, load: MassBody | None) -> None:
         """``set_payload``, and with an inertia ``set_target_payload``."""
         load = load or MassBody(0.0)
-        parts = [f"[{', '.join(short(each, LOAD_DIGITS) for each in part)}]" for part in (load.centre, load.inertia)]
-        given = ", ".join((short(load.mass), *parts)) if any(load.inertia) else f"{short(load.mass)}, {parts[0]}"
-        self._line(f"set_{'target_' if any(load.inertia) else ''}payload({given})")
+        parts = [
+            f"[{', '.join(writing.short(each, writing.LOAD_DIGITS) for each in part)}]"
+            for part in (load.centre, load.inertia)
+        ]
+        given = (
+            ", ".join((writing.short(load.mass), *parts))
+            if any(load.inertia)
+            else f"{writing.short(load.mass)}, {parts[0]}"
+        )
+        self.line(f"set_{'target_' if any(load.inertia) else ''}payload({given})")
 
-    def motion(self, ready: ReadyMotion) -> None:
+    def motion(self, ready: writing.ReadyMotion) -> None:
         """movej, movel, movep, movec."""
         motion = ready.motion
         target = self._target(ready)
@@ -95,9 +85,9 @@ class UrScriptWriter(Writer):
         else:
             form = "movep" if motion.form == "movep" else "movel"
         via = "" if ready.via is None else f"{_pose_text(self._in_robot(ready, ready.via))}, "
-        self._line(f"{form}({via}{target}{self._speed(ready, form)}{self._zone(ready)})")
+        self.line(f"{form}({via}{target}{self._speed(ready, form)}{self._zone(ready)})")
 
-    def _target(self, ready: ReadyMotion) -> str | None:
+    def _target(self, ready: writing.ReadyMotion) -> str | None:
         target = ready.motion.target
         if ready.motion.kind == "joint":
             if isinstance(target, PoseTarget) and target.joints is None and (self.own or ready.joints is None):
@@ -107,25 +97,22 @@ class UrScriptWriter(Writer):
             return None if ready.joints is None else _joints_text(ready.joints)
         return None if ready.pose is None else _pose_text(self._in_robot(ready, ready.pose))
 
-    def _in_robot(self, ready: ReadyMotion, pose: Reals) -> Reals:
+    def _in_robot(self, ready: writing.ReadyMotion, pose: Reals) -> Reals:
         base = ready.motion.base.pose
         if base is None or np.array_equal(base, np.eye(4)):
             return pose
         found: Reals = base @ pose
         return found
 
-    def _tool(self, ready: ReadyMotion) -> None:
+    def _tool(self, ready: writing.ReadyMotion) -> None:
         tool = ready.motion.tool
         if tool.pose is None:
             if tool.name:
                 self.name_tool(tool.name)
             return
-        line = f"set_tcp({_pose_text(tool.pose)})"
-        if line != self.tcp:
-            self.tcp = line
-            self._line(line)
+        self.set_once("tcp", f"set_tcp({_pose_text(tool.pose)})")
 
-    def _speed(self, ready: ReadyMotion, form: str) -> str:
+    def _speed(self, ready: writing.ReadyMotion, form: str) -> str:
         """Acceleration and speed, or the motion's time."""
         motion = ready.motion
         usual_a, usual_v = DEFAULTS[form]
@@ -134,28 +121,25 @@ class UrScriptWriter(Writer):
         a = given.value if given is not None and given.unit == ("rad/s2" if joint else "m/s2") else usual_a
         speed = motion.speed
         if speed is not None and speed.unit == "s" and form in ("movej", "movel") and speed.value > 0:
-            return f", a={short(a)}, t={short(speed.value)}"
-        v = leading_joint_speed(ready, self.robot) if joint else tool_speed(ready)
-        if v is None and joint and (seconds := duration(ready)) is not None:
-            return f", a={short(a)}, t={short(seconds)}"
+            return f", a={writing.short(a)}, t={writing.short(speed.value)}"
+        v = writing.leading_joint_speed(ready, self.robot) if joint else writing.tool_speed(ready)
+        if v is None and joint and (seconds := writing.duration(ready)) is not None:
+            return f", a={writing.short(a)}, t={writing.short(seconds)}"
         if speed is not None and speed.unit == "s":
             self.count["estimated"] += 1
-        return f", a={short(a)}, v={short(v if v is not None and v > 0 else usual_v)}"
+        return f", a={writing.short(a)}, v={writing.short(v if v is not None and v > 0 else usual_v)}"
 
-    def _zone(self, ready: ReadyMotion) -> str:
+    def _zone(self, ready: writing.ReadyMotion) -> str:
         zone = ready.motion.zone
         if zone.kind == "distance" and zone.value > 0:
-            return f", r={short(zone.value)}"
+            return f", r={writing.short(zone.value)}"
         self.count["zones"] += zone.kind != "fine"
         return ""
 
-    def _line(self, text: str) -> None:
-        self.lines.append(self.indent + text)
-
 
 def _joints_text(joints: Reals) -> str:
-    return "[" + ", ".join(fixed(float(value), DIGITS) for value in joints) + "]"
+    return "[" + ", ".join(writing.fixed(float(value), DIGITS) for value in joints) + "]"
 
 
 def _pose_text(pose: Reals) -> str:
-    return "p[" + ", ".join(fixed(value, DIGITS) for value in numbers_of(pose, "ur")) + "]"
+    return "p[" + ", ".join(writing.fixed(value, DIGITS) for value in numbers_of(pose, "ur")) + "]"

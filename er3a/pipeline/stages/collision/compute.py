@@ -6,20 +6,11 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from er3a.collision import free_space
 from er3a.collision.bodies import Bodies
-from er3a.collision.free_space import (
-    DEPTH,
-    ClearPlaces,
-    JointSpace,
-    Share,
-    find_places,
-    joined_to_home,
-    sample_joint_space,
-)
 from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import Pair
 from er3a.collision.shapes import shapes_assumed
-from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import MANY_TARGETS
@@ -27,25 +18,8 @@ from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
-from er3a.pipeline.stages.collision.model import (
-    BaseInSolid,
-    Closest,
-    CollisionResults,
-    CollisionSummary,
-    FreeShare,
-    FreeSpace,
-    HomeCollides,
-    MatrixRows,
-    Mounting,
-    NeverFree,
-    PairShares,
-    PathClearances,
-    PlaceRows,
-    PlacesSummary,
-    ShapesOverlap,
-    TargetClearances,
-)
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
@@ -56,7 +30,7 @@ from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
 
 
-def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetClearances, list[Closest]]:
+def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[model.TargetClearances, list[model.Closest]]:
     """Clearance of all solutions within the limits, and of the chosen ones where they are nearest to what."""
     tables, closest = [], []
     targets = load_targets(file, robot)
@@ -70,7 +44,7 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetCl
         distance, pair = bodies.min_distance_of_turns(solutions.q[rows])
         between = [bodies.pairs[k].label if k >= 0 else "" for k in pair]
         tables.append(
-            TargetClearances(
+            model.TargetClearances(
                 target=np.full(len(rows), target.name, object),
                 branch=solutions.branch[rows],
                 label=solutions.label[rows],
@@ -86,12 +60,12 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[TargetCl
                 closest.append(
                     _closest(bodies, (target.name, "target", None), solutions.q[chosen], distance[at], pair[at])
                 )
-    return TargetClearances.stacked(tables).of_joints(robot.slides), closest
+    return model.TargetClearances.stacked(tables).of_joints(robot.slides), closest
 
 
 def path_clearances(
     motions: Iterable[ListedMotion], bodies: Bodies, tolerance: float
-) -> tuple[PathClearances, list[Closest]]:
+) -> tuple[model.PathClearances, list[model.Closest]]:
     """Clearance over time of each path, and where each is nearest to anything."""
     tables, closest = [], []
     for entry in motions:
@@ -107,7 +81,7 @@ def path_clearances(
         for row in np.flatnonzero(pair >= 0):
             near[row] = bodies.surface_points(q[row], pair[row])
         tables.append(
-            PathClearances(
+            model.PathClearances(
                 path=np.full(len(q), entry.name, object),
                 t_s=along.t,
                 q_deg=shown(bodies.robot, q),
@@ -121,13 +95,13 @@ def path_clearances(
         if least >= 0 and pair[least] >= 0:
             about = (entry.name, "path", float(along.t[least]))
             closest.append(_closest(bodies, about, q[least], along.distance[least], pair[least]))
-    return PathClearances.stacked(tables).of_joints(bodies.robot.slides), closest
+    return model.PathClearances.stacked(tables).of_joints(bodies.robot.slides), closest
 
 
-def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int) -> Closest:
+def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int) -> model.Closest:
     points = bodies.surface_points(q, int(pair)) * 1000
     name, kind, t = about
-    return Closest(
+    return model.Closest(
         name,
         kind,
         float(distance * 1000),
@@ -144,36 +118,35 @@ CHECKS = 1  # points of a path checked between its samples to begin with; cleara
 SAMPLES_STREAM, PLACES_STREAM = 0, 1
 
 
-def compute(study: Study, name: str) -> CollisionResults:
+def compute(study: Study, name: str) -> model.CollisionResults:
     """Work out where a robot of the study is free of collisions."""
     robot, settings = study.robot(name), study.section(CollisionSettings)
-    scene_file = study.scene(name, STAGE)
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, STAGE)
     bodies = Bodies(robot, scene)
-    space = sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
+    space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
-    places = find_places(bodies, space, settings.cells_across, settings.rounds, random)
+    places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
     home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
     least, nearest = bodies.min_distance(home[None])
     at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and least[0] < 0 else None
     if at_home is None:
-        places.joined[:] = joined_to_home(bodies, places, home, settings.neighbours)
+        places.joined[:] = free_space.joined_to_home(bodies, places, home, settings.neighbours)
     targets, at_targets = target_clearances(robot, bodies, study.entry(name).targets)
     tolerance = settings.penetration_tolerance_mm / 1000
     motions = list(study_motions(study, name, CHECKS))
     paths, on_paths = path_clearances(motions, bodies, tolerance)
     pairs = _pair_shares(bodies, space)
-    mounting = tuple(stated(Mounting, contact) for contact in base_contacts(robot, scene))
+    mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
     matrix = _matrix(bodies)
     places_found = _places_summary(places)
-    wrong = ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
+    wrong = model.ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
     undecided = int((matrix.state == "undecided").sum())
-    home_found = None if at_home is None else HomeCollides(at_home, float(-least[0] * 1000), space.whole.value)
+    home_found = None if at_home is None else model.HomeCollides(at_home, float(-least[0] * 1000), space.whole.value)
     closest = (*at_targets, *on_paths)
     margin = study.section(TrajectorySettings).assumed_margin_mm / 1000
     assumed = shapes_assumed(robot, margin, {each.name: each.clearance_mm / 1000 for each in closest})
-    return CollisionResults(
-        summary=CollisionSummary(
+    return model.CollisionResults(
+        summary=model.CollisionSummary(
             verdict=_verdict(
                 pairs, mounting, wrong or home_found, _free_space(space, places_found, undecided, assumed is not None)
             )
@@ -186,7 +159,7 @@ def compute(study: Study, name: str) -> CollisionResults:
             of_scene=_share(space.of_scene),
             whole=_share(space.whole),
             home_deg=None if at_home else tuple(shown(robot, home).tolist()),
-            proven_m=DEPTH,
+            proven_m=free_space.DEPTH,
             penetration_tolerance_mm=settings.penetration_tolerance_mm,
             places=places_found,
             mounting=mounting,
@@ -203,7 +176,7 @@ def compute(study: Study, name: str) -> CollisionResults:
         ),
         matrix=matrix,
         pairs=pairs,
-        places=PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness)).of_joints(
+        places=model.PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness)).of_joints(
             robot.slides
         ),
         targets=targets,
@@ -211,7 +184,7 @@ def compute(study: Study, name: str) -> CollisionResults:
     )
 
 
-def _left_out(study: Study, name: str, found: TargetClearances, motions: list[ListedMotion]) -> Iterator[LeftOut]:
+def _left_out(study: Study, name: str, found: model.TargetClearances, motions: list[ListedMotion]) -> Iterator[LeftOut]:
     """Targets and paths that no clearance is known of, and turns that many targets leave out."""
     targets = load_targets(study.entry(name).targets, study.robot(name))
     if unsolved := tuple(target.name for target in targets if not (found.target == target.name).any()):
@@ -222,11 +195,11 @@ def _left_out(study: Study, name: str, found: TargetClearances, motions: list[Li
         yield LeftOut("paths", skipped)
 
 
-def _matrix(bodies: Bodies) -> MatrixRows:
+def _matrix(bodies: Bodies) -> model.MatrixRows:
     robot = bodies.robot
     unknown = np.full(robot.joints, np.nan)
     watched = {tuple(pair.label.split("/")) for pair, second in zip(bodies.pairs, bodies.second) if second >= 0}
-    return MatrixRows.of_rows(
+    return model.MatrixRows.of_rows(
         (
             row.first,
             row.second,
@@ -242,26 +215,26 @@ def _matrix(bodies: Bodies) -> MatrixRows:
     ).of_joints(robot.slides)
 
 
-def _pair_shares(bodies: Bodies, space: JointSpace) -> PairShares:
+def _pair_shares(bodies: Bodies, space: free_space.JointSpace) -> model.PairShares:
     """One row for what the results call a pair; it overlaps where any of its bodies do."""
     numbers: dict[Pair, list[int]] = {}
     for number, pair in enumerate(bodies.pairs):
         numbers.setdefault(pair, []).append(number)
     rows = []
     for pair, own in numbers.items():
-        share = Share(space.count(own), len(space.q))
+        share = free_space.Share(space.count(own), len(space.q))
         always = share.count == share.of and any(bodies.always_overlaps(number) for number in own)
         rows.append((pair, bool(bodies.second[own[0]] >= 0), share.value, *share.interval, always))
-    return PairShares.of_rows(sorted(rows, key=lambda row: (-row[2], row[0].label)))
+    return model.PairShares.of_rows(sorted(rows, key=lambda row: (-row[2], row[0].label)))
 
 
-def _share(share: Share) -> FreeShare:
-    return FreeShare(share.value, share.interval)
+def _share(share: free_space.Share) -> model.FreeShare:
+    return model.FreeShare(share.value, share.interval)
 
 
-def _places_summary(places: ClearPlaces) -> PlacesSummary:
+def _places_summary(places: free_space.ClearPlaces) -> model.PlacesSummary:
     cell, clear = places.cell**3, int(places.clear.sum())
-    return PlacesSummary(
+    return model.PlacesSummary(
         cell_m=places.cell,
         reached=len(places.clear),
         clear=clear,
@@ -273,24 +246,29 @@ def _places_summary(places: ClearPlaces) -> PlacesSummary:
     )
 
 
-def _free_space(space: JointSpace, places: PlacesSummary, undecided: int, assumed: bool) -> FreeSpace:
-    return FreeSpace(space.whole.value, places.reached, places.clear, places.joined, undecided, assumed)
+def _free_space(
+    space: free_space.JointSpace, places: model.PlacesSummary, undecided: int, assumed: bool
+) -> model.FreeSpace:
+    return model.FreeSpace(space.whole.value, places.reached, places.clear, places.joined, undecided, assumed)
 
 
 def _verdict(
-    pairs: PairShares, mounting: tuple[Mounting, ...], known: ShapesOverlap | HomeCollides | None, found: FreeSpace
-) -> Verdict[NeverFree | ShapesOverlap | BaseInSolid | HomeCollides | FreeSpace]:
+    pairs: model.PairShares,
+    mounting: tuple[model.Mounting, ...],
+    known: model.ShapesOverlap | model.HomeCollides | None,
+    found: model.FreeSpace,
+) -> Verdict[model.NeverFree | model.ShapesOverlap | model.BaseInSolid | model.HomeCollides | model.FreeSpace]:
     if pairs.always.any():
-        return Verdict("fail", NeverFree(tuple(pairs.between[pairs.always]), found.assumed))
+        return Verdict("fail", model.NeverFree(tuple(pairs.between[pairs.always]), found.assumed))
     if inside := tuple(contact.solid for contact in mounting if contact.inside):
-        return Verdict("fail", BaseInSolid(inside))
+        return Verdict("fail", model.BaseInSolid(inside))
     if known:
-        return Verdict("fail" if isinstance(known, ShapesOverlap) else "caution", known)
+        return Verdict("fail" if isinstance(known, model.ShapesOverlap) else "caution", known)
     return Verdict("caution" if found.undecided or not found.clear else "pass", found)
 
 
-def _figures(space: JointSpace, places: PlacesSummary, matrix: MatrixRows) -> tuple[Figure, ...]:
-    def percent(name: str, share: Share) -> Figure:
+def _figures(space: free_space.JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:
+    def percent(name: str, share: free_space.Share) -> Figure:
         low, high = share.interval
         return Figure(name, 100 * share.value, "%", 50 * (high - low))
 

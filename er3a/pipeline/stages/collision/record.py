@@ -8,7 +8,6 @@ import numpy as np
 import rerun as rr
 
 from er3a.collision.shapes import arm_bodies
-from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision.model import CollisionResults, PathClearances
@@ -20,7 +19,6 @@ from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escap
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-STAGE = "collision"
 BODY_ALPHA = 70
 NOTE = """# Where it is free of collisions
 
@@ -40,15 +38,15 @@ curve shows how far they are apart. Below 0 they overlap.
 def record(study: Study, stored: Stored[CollisionResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     name, results = stored.robot, stored.results
-    robot, scene = study.robot(name), study.scene(name, STAGE)
+    robot = study.robot(name)
     shown = Recorded(
         robot=robot,
         name=name,
-        stage=STAGE,
+        stage=stored.stage,
         note=NOTE,
         runs=[_run(robot, results, path) for path in dict.fromkeys(results.paths.path.tolist())],
         curves=[Curves("clearance", "Clearance (mm)", ["clearance"], [MODEL], whole=True)],
-        scene=load_scene(scene) if scene else None,
+        scene=study.scene(name, stored.stage),
         home=meant(robot, np.array(results.summary.home_deg or np.zeros(robot.joints))),
         views={"Places and nearest pair": ["**"]},
         shapes=_bodies(robot) | _places(results),

@@ -9,28 +9,20 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colors import ListedColormap
 
 from er3a.collision.pairs import TRIED
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.collision import FIGURES, body_word, state_word, why
+from er3a.pipeline.messages.collision import body_word, state_word, why
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.collision.model import (
-    STATES,
-    Closest,
-    CollisionResults,
-    MatrixRows,
-    PairShares,
-    TargetClearances,
-)
+from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
+from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -41,7 +33,7 @@ ROW_HEIGHT = 1.5
 LOST, CLEAR, JOINED = 0, 1, 2
 
 
-def by_pair(pairs: PairShares) -> Picture | None:
+def by_pair(pairs: model.PairShares) -> Picture | None:
     """How much of joint space each pair takes; None where none takes any."""
     shown = pairs.take(np.flatnonzero(pairs.ratio > 0)[:MOST_PAIRS])
     if not len(shown):
@@ -63,7 +55,7 @@ def by_pair(pairs: PairShares) -> Picture | None:
     return Picture(figure, tr("Bars: share of joint space per pair. {conclusion}", conclusion=caption), caption)
 
 
-def workspace(results: CollisionResults) -> Picture:
+def workspace(results: model.CollisionResults) -> Picture:
     """From the side and from above: what of the reached places is clear, joined to home, or lost."""
     rows = results.places
     state = np.where(rows.joined, JOINED, np.where(rows.clear, CLEAR, LOST))
@@ -131,7 +123,7 @@ def _mixed(share: float) -> tuple[float, ...]:
     return tuple(1 - (0.35 + 0.65 * share) * (1 - (1 - share) * ends[0] - share * ends[1]))
 
 
-def clearance_over_time(results: CollisionResults) -> Picture | None:
+def clearance_over_time(results: model.CollisionResults) -> Picture | None:
     """Smallest distance over time, path by path."""
     rows = results.paths
     names = [str(name) for name in dict.fromkeys(rows.path) if np.isfinite(rows.clearance_mm[rows.path == name]).any()]
@@ -162,7 +154,7 @@ def clearance_over_time(results: CollisionResults) -> Picture | None:
     return Picture(figure, alt, caption, panels)
 
 
-def closest_pair(robot: Robot, found: Closest) -> Picture:
+def closest_pair(robot: Robot, found: model.Closest) -> Picture:
     """The arm where it is nearest to anything, from the side and from above, with the two points."""
     points = skeleton(robot, meant(robot, np.array(found.q_deg))) * 1000
     pair = np.array([found.from_mm, found.to_mm])
@@ -194,21 +186,17 @@ NO_BREAK_SPACE = "\u00a0"
 MOST_ROWS = 100  # of a table of targets and paths
 
 
-def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot = study.robot(name)
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
     nearest = closest[0] if closest else None
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{name}/collision.html"),
-        robot=robot,
-        robot_pages=study.pages(name),
         matrix=_matrix(robot, results.matrix, results.summary.verdict.shapes is not None),
         tried=TRIED,
         by_pair=by_pair(results.pairs),
@@ -216,7 +204,7 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         workspace=workspace(results),
         targets=_targets(results.targets),
         clearance=clearance_over_time(results),
-        player=player(robot, motions(robot, results), load_scene(scene) if scene else None),
+        player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MOST_ROWS]],
         rows_left_out=max(len(closest), len(set(results.targets.target))) - MOST_ROWS,
@@ -225,8 +213,8 @@ def report(study: Study, stored: Stored[CollisionResults], output: Path) -> None
     )
 
 
-def _matrix(robot: Robot, rows: MatrixRows, assumed: bool) -> list[list[str]]:
-    order = sorted(range(len(rows)), key=lambda k: STATES.index(rows.state[k]))
+def _matrix(robot: Robot, rows: model.MatrixRows, assumed: bool) -> list[list[str]]:
+    order = sorted(range(len(rows)), key=lambda k: model.STATES.index(rows.state[k]))
     return [
         [
             *(body_word(name).replace(" ", NO_BREAK_SPACE) for name in (rows.first[k], rows.second[k])),
@@ -253,14 +241,14 @@ def _angles(robot: Robot, values: Reals) -> str:
     return ", ".join(fixed(value, 0) + (" mm" if slides else "°") for value, slides in zip(values, robot.slides))
 
 
-def _pairs(rows: PairShares) -> list[list[str]]:
+def _pairs(rows: model.PairShares) -> list[list[str]]:
     return [
         [say(pair), fixed(100 * ratio, 2), tr("{low} to {high}", low=fixed(100 * low, 2), high=fixed(100 * high, 2))]
         for pair, ratio, low, high in zip(rows.between, rows.ratio, rows.low, rows.high)
     ]
 
 
-def _targets(rows: TargetClearances) -> list[list[str]]:
+def _targets(rows: model.TargetClearances) -> list[list[str]]:
     """One row for each target: solutions within limits, clear ones, the best clearance and its branch.
 
     Of many targets those whose best clearance is least.
@@ -290,7 +278,7 @@ def _between(label: str) -> str:
     return tr(" and ").join(body_word(part) for part in label.split("/")) if label else tr("nothing")
 
 
-def _closest(found: Closest) -> list[str]:
+def _closest(found: model.Closest) -> list[str]:
     kind = tr("chosen solution of a target") if found.kind == "target" else tr("path")
     at = "" if found.t_s is None else moment(found.name, found.t_s, tr("t = {t} s", t=fixed(found.t_s, 2)))
     return [found.name, kind, fixed(found.clearance_mm, 1), at, say(found.between)]

@@ -9,54 +9,18 @@ from functools import cached_property
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
-from er3a.dynamics.margins import (
-    ASSUMED,
-    DriveLimits,
-    Margin,
-    load_diagram,
-    load_tolerance,
-    max_payload,
-    max_speed_scale,
-    tolerances_of,
-    torque_tolerance,
-    wrist_use,
-)
 from er3a.dynamics.plausibility import MassFinding, MissingLink, mass_findings
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import load_of
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
-from er3a.pipeline.stages.dynamics.model import (
-    AllWithin,
-    BindingLimit,
-    DataOpen,
-    DiagramRows,
-    DynamicsResults,
-    DynamicsSummary,
-    HoldingTorque,
-    JointLoad,
-    LinkEntry,
-    Marginal,
-    MassesUsed,
-    MotorNeed,
-    Need,
-    NoData,
-    NoLimits,
-    Overload,
-    PathLoad,
-    ShortestTime,
-    TolerancesUsed,
-    TorqueRows,
-    Use,
-    WristMoment,
-    hardest_held,
-)
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
 from er3a.pipeline.stages.trajectory.judgement import verdict_of as verdict_of_motion
 from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, limits_of, near_singular, study_motions
@@ -67,10 +31,12 @@ from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, no_body, together
 from er3a.robots.robot import Grade, Robot
 
-DynamicsVerdict = Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
+DynamicsVerdict = Verdict[model.NoData | model.NoLimits | model.AllWithin | model.Marginal | model.Overload]
 
 
-def drive_uses(robot: Robot, paths: tuple[PathLoad, ...], holding: tuple[HoldingTorque, ...]) -> tuple[Use, ...]:
+def drive_uses(
+    robot: Robot, paths: tuple[model.PathLoad, ...], holding: tuple[model.HoldingTorque, ...]
+) -> tuple[model.Use, ...]:
     """Peak and effective torques of the paths that count against the drives', holding torques against rated ones."""
     drives, found = drives_of(robot), []
     for path in paths:
@@ -78,23 +44,23 @@ def drive_uses(robot: Robot, paths: tuple[PathLoad, ...], holding: tuple[Holding
             peak, rated = (float(limit[load.joint - 1]) for limit in (drives.peak, drives.rated))
             if np.isfinite(peak):
                 upper = load.peak + load.tolerance
-                found.append(Use("peak", load.joint, path.name, load.peak, upper, peak, load.unit))
+                found.append(model.Use("peak", load.joint, path.name, load.peak, upper, peak, load.unit))
             if np.isfinite(rated):
                 upper = load.rms + load.rms_tolerance
-                found.append(Use("rms", load.joint, path.name, load.rms, upper, rated, load.unit))
+                found.append(model.Use("rms", load.joint, path.name, load.rms, upper, rated, load.unit))
     for held in holding:
         rated = float(drives.rated[held.joint - 1])
         if np.isfinite(rated):
             upper = held.bound + held.tolerance
-            found.append(Use("holding", held.joint, None, abs(held.torque), upper, rated, held.unit))
+            found.append(model.Use("holding", held.joint, None, abs(held.torque), upper, rated, held.unit))
     return tuple(found)
 
 
-def unknowns(robot: Robot, load: Load | None) -> tuple[DataOpen, ...]:
+def unknowns(robot: Robot, load: Load | None) -> tuple[model.DataOpen, ...]:
     """What the files leave open, with links or joints."""
     drives, wrist, joints = drives_of(robot), robot.masses.wrist, range(1, robot.joints + 1)
     links = tuple(link for link in range(1, robot.rows + 1) if robot.masses.body(link) is None)
-    open_joints: dict[Need, tuple[int, ...]] = {
+    open_joints: dict[model.Need, tuple[int, ...]] = {
         "masses": links,
         "peak": _open(drives.peak),
         "rated": _open(drives.rated),
@@ -102,19 +68,19 @@ def unknowns(robot: Robot, load: Load | None) -> tuple[DataOpen, ...]:
         "friction": _open(drives.coulomb + drives.viscous),
     }
     found = [
-        DataOpen(what, () if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers)
+        model.DataOpen(what, () if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers)
         for what, numbers in open_joints.items()
         if numbers
     ]
     last = {joint for joint in joints[-3:] if not robot.slides[joint - 1]}
     if wrist is None or not np.isfinite(wrist.payload):
-        found.append(DataOpen("payload"))
-    asked: tuple[tuple[Need, set[int]], ...] = (
+        found.append(model.DataOpen("payload"))
+    asked: tuple[tuple[model.Need, set[int]], ...] = (
         ("wrist_moment", last - {joint for joint, _ in (wrist.moment if wrist else ())}),
         ("wrist_inertia", last - {joint for joint, _ in (wrist.inertia if wrist else ())}),
     )
-    found += [DataOpen(what, tuple(sorted(missing))) for what, missing in asked if missing]
-    return (*found, DataOpen("load")) if load is None else tuple(found)
+    found += [model.DataOpen(what, tuple(sorted(missing))) for what, missing in asked if missing]
+    return (*found, model.DataOpen("load")) if load is None else tuple(found)
 
 
 def _open(values: np.ndarray) -> tuple[int, ...]:
@@ -126,11 +92,11 @@ DOCUMENTED: tuple[Grade, ...] = ("official", "measured")
 
 def verdict_of(
     paths: list[PathTorques],
-    holding: tuple[HoldingTorque, ...],
-    uses: tuple[Use, ...],
+    holding: tuple[model.HoldingTorque, ...],
+    uses: tuple[model.Use, ...],
     findings: tuple[MassFinding, ...],
-    unknown: tuple[DataOpen, ...],
-    masses: MassesUsed | None,
+    unknown: tuple[model.DataOpen, ...],
+    masses: model.MassesUsed | None,
     *,
     skipped: tuple[str, ...] = (),
 ) -> DynamicsVerdict:
@@ -143,7 +109,7 @@ def verdict_of(
     shown = missing, doubts, None if masses is None or masses.grade in DOCUMENTED else masses.grade
     if not uses:
         if not holding:
-            return Verdict("no_reference", NoData(unknown))
+            return Verdict("no_reference", model.NoData(unknown))
         return Verdict("no_reference", _no_limits([path.summary for path in paths], holding, *shown))
     beyond = sum(use.ratio > 1 for use in uses)
     unsettled = sum(use.ratio <= 1 and use.upper > use.allowed for use in uses)
@@ -151,25 +117,25 @@ def verdict_of(
     not_run = (*skipped, *(path.summary.name for path in paths if path.asked and not path.summary.counts))
     guessed = masses is not None and masses.grade == "inferred"
     open_ = unsettled or doubts or needs or not_run or guessed
-    kind = Overload if beyond else Marginal if open_ else AllWithin
+    kind = model.Overload if beyond else model.Marginal if open_ else model.AllWithin
     status: Status = "fail" if beyond else "caution" if open_ else "pass"
     return Verdict(status, kind(len(uses), beyond, uses[0], unsettled, needs, not_run, *shown))
 
 
 def _no_limits(
-    paths: list[PathLoad],
-    holding: tuple[HoldingTorque, ...],
+    paths: list[model.PathLoad],
+    holding: tuple[model.HoldingTorque, ...],
     missing: tuple[int, ...],
     doubts: int,
     grade: Grade | None,
-) -> NoLimits:
+) -> model.NoLimits:
     counted, shown = [path for path in paths if path.counts], (missing, doubts, grade)
     if counted:
         path = max(counted, key=lambda path: path.hardest.peak)
         load = path.hardest
-        return NoLimits(len(counted), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
-    held = hardest_held(holding)
-    return NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, *shown)
+        return model.NoLimits(len(counted), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
+    held = model.hardest_held(holding)
+    return model.NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, *shown)
 
 
 @dataclass(frozen=True)
@@ -210,7 +176,7 @@ class LoadedArm:
 
     def tolerance(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
         """Half-widths (N, n) of the torques' intervals."""
-        return torque_tolerance(self.model, q, qd, qdd, self.links_grade, self.load_grade)
+        return margins.torque_tolerance(self.model, q, qd, qdd, self.links_grade, self.load_grade)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,9 +191,9 @@ class PathTorques:
     load : that the program names which the path is from
     """
 
-    summary: PathLoad
+    summary: model.PathLoad
     asked: bool
-    rows: TorqueRows
+    rows: model.TorqueRows
     demand: Demand | None
     inertia: Reals
     imbalance: float | None
@@ -266,8 +232,8 @@ def path_torques(
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None, (), None, None)
-        absent = PathLoad(entry.name, entry.title, verdict, False, False, *nothing)
-        return PathTorques(absent, asked, TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
+        absent = model.PathLoad(entry.name, entry.title, verdict, False, False, *nothing)
+        return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
     timed, kinematic, no_law = _timings(arm, motion.joints, t, q)
     evenly, t = t, np.union1d(t, motion.t)
     rates = np.stack(motion.rates(t), axis=1)
@@ -278,7 +244,7 @@ def path_torques(
     needed = demand(t, qd, tau)
     own = np.diagonal(arm.model.mass_matrix(q), axis1=1, axis2=2)
     payload, scale = _margins(arm, parts, t, q, qd, qdd)
-    summary = PathLoad(
+    summary = model.PathLoad(
         name=entry.name,
         title=entry.title,
         verdict=verdict,
@@ -295,7 +261,7 @@ def path_torques(
         program_load_kg=named.mass if isinstance(named := program_load(motion), MassBody) else None,
         program_load_open=named if isinstance(named, str) else "",
     )
-    rows = TorqueRows(
+    rows = model.TorqueRows(
         path=np.full(len(t), entry.name, object),
         t_s=t,
         q=shown(arm.robot, q),
@@ -313,12 +279,14 @@ def path_torques(
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 
 
-def _joint_loads(robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, asked: Demand) -> tuple[JointLoad, ...]:
+def _joint_loads(
+    robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, asked: Demand
+) -> tuple[model.JointLoad, ...]:
     found = []
     for j, slides in enumerate(robot.slides):
         at = int(asked.peak_at[j])
         found.append(
-            JointLoad(
+            model.JointLoad(
                 joint=j + 1,
                 unit="N" if slides else "N m",
                 peak=float(asked.peak[j]),
@@ -338,16 +306,16 @@ def _joint_loads(robot: Robot, t: Reals, parts: TorqueParts, tolerance: Reals, a
 
 def _margins(
     arm: LoadedArm, parts: TorqueParts, t: Reals, q: Reals, qd: Reals, qdd: Reals
-) -> tuple[Margin | None, Margin | None]:
+) -> tuple[margins.Margin | None, margins.Margin | None]:
     """Largest further payload and maximum speed scale under peak and rated torques, and joint speeds."""
     drives = drives_of(arm.robot)
     more = arm.with_unit.rigid_torques(q, qd, qdd) - arm.model.rigid_torques(q, qd, qdd)
     viscous = known(drives.viscous) * qd
     at_rest = parts.gravity + parts.tool + parts.friction - viscous
-    limits = DriveLimits(drives.peak, drives.rated, arm.robot.speed)
+    limits = margins.DriveLimits(drives.peak, drives.rated, arm.robot.speed)
     return (
-        max_payload(t, parts.total, more, limits),
-        max_speed_scale(t, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits),
+        margins.max_payload(t, parts.total, more, limits),
+        margins.max_speed_scale(t, (at_rest, viscous, parts.inertia + parts.velocity), qd, limits),
     )
 
 
@@ -356,7 +324,7 @@ HALVINGS = 2
 
 def _timings(
     arm: LoadedArm, joints: Callable[[Reals], Reals], t: Reals, q: Reals
-) -> tuple[tuple[ShortestTime, ...], float | None, NoTimeLaw | None]:
+) -> tuple[tuple[model.ShortestTime, ...], float | None, NoTimeLaw | None]:
     """Shortest times under torques, each with the steps before halved, and the one under assumed accelerations."""
     peak, found = drives_of(arm.robot).peak, []
     if not np.isfinite(peak).any():
@@ -366,7 +334,7 @@ def _timings(
         kinematic = fastest(nodes, arm.limits).duration
         for _ in range(HALVINGS + 1):
             shortest = fastest_under_torques(arm.model, joints(t), arm.limits.speed, peak)
-            found.append(ShortestTime(len(t), shortest.timed.duration, shortest.least))
+            found.append(model.ShortestTime(len(t), shortest.timed.duration, shortest.least))
             t = np.sort(np.concatenate([t, (t[1:] + t[:-1]) / 2]))
         return tuple(found), kinematic, None
     except TimingError as error:
@@ -375,22 +343,22 @@ def _timings(
 
 def _wrist_moments(
     arm: LoadedArm, t: Reals, q: Reals, qd: Reals, qdd: Reals, wrist: tuple[int, ...]
-) -> tuple[WristMoment, ...]:
+) -> tuple[model.WristMoment, ...]:
     """What the load's own mass asks of the wrist's joints."""
     if arm.load is None:
         return ()
     by_load = np.abs(arm.model.rigid_torques(q, qd, qdd) - arm.bare.rigid_torques(q, qd, qdd))
-    off = load_tolerance(arm.model, q, qd, qdd, arm.load_grade)
+    off = margins.load_tolerance(arm.model, q, qd, qdd, arm.load_grade)
     most = [(j, int(by_load[:, j - 1].argmax())) for j in wrist]
-    return tuple(WristMoment(j, float(by_load[at, j - 1]), float(off[at, j - 1]), float(t[at])) for j, at in most)
+    return tuple(model.WristMoment(j, float(by_load[at, j - 1]), float(off[at, j - 1]), float(t[at])) for j, at in most)
 
 
-def _bound(margin: Margin | None, t: Reals) -> BindingLimit | None:
+def _bound(margin: margins.Margin | None, t: Reals) -> model.BindingLimit | None:
     if margin is None:
         return None
     value = margin.value if np.isfinite(margin.value) else None
     joint = None if margin.joint is None else margin.joint + 1
-    return BindingLimit(value, margin.by, joint, None if margin.sample is None else float(t[margin.sample]))
+    return model.BindingLimit(value, margin.by, joint, None if margin.sample is None else float(t[margin.sample]))
 
 
 DIAGRAM_POINTS = 501
@@ -401,7 +369,7 @@ UNITS = {"payload": "kg", "moment": "N m", "inertia": "kg m²"}
 
 def wrist_uses(
     robot: Robot, load: Load | None, grade: Grade, gravity: float, paths: Sequence[PathTorques]
-) -> tuple[Use, ...]:
+) -> tuple[model.Use, ...]:
     """All that the wrist's data limit, for the study's load and those that programs name; upper ends by the loads'
     tolerances."""
     wrist = robot.masses.wrist
@@ -411,9 +379,9 @@ def wrist_uses(
     loads: list[tuple[str | None, Load, Grade]] = [(None, load, grade)] if load else []
     loads += [(path, each, "claim") for path, each in named]
     uses = [
-        Use(use.quantity, use.joint, path, use.asked, use.most, use.allowed, UNITS[use.quantity])
+        model.Use(use.quantity, use.joint, path, use.asked, use.most, use.allowed, UNITS[use.quantity])
         for path, each, known in loads
-        for use in wrist_use(robot, wrist, each, gravity, tolerances_of(each, known))
+        for use in margins.wrist_use(robot, wrist, each, gravity, margins.tolerances_of(each, known))
     ]
     allowed = dict(wrist.moment)
     for path in (each.summary for each in paths):
@@ -421,27 +389,27 @@ def wrist_uses(
             asked = moment.moment_n_m
             if moment.joint in allowed:
                 upper, limit = asked + moment.tolerance, allowed[moment.joint]
-                uses.append(Use("moment", moment.joint, path.name, asked, upper, limit, "N m"))
+                uses.append(model.Use("moment", moment.joint, path.name, asked, upper, limit, "N m"))
     return tuple(uses)
 
 
-def diagram_rows(robot: Robot, load: Load | None, gravity: float) -> DiagramRows:
+def diagram_rows(robot: Robot, load: Load | None, gravity: float) -> model.DiagramRows:
     """Curves for the rated payload and parts of it, and for the load's own mass; none where no limit is known."""
     wrist = robot.masses.wrist
     if wrist is None:
-        return DiagramRows.empty()
+        return model.DiagramRows.empty()
     masses = {round(part * wrist.payload, 3) for part in PARTS_OF_PAYLOAD if np.isfinite(wrist.payload)}
     masses |= {load.mass} if load and load.mass > 0 else set()
     if not masses:
-        return DiagramRows.empty()
+        return model.DiagramRows.empty()
     along = np.linspace(0.0, FARTHEST_M, DIAGRAM_POINTS)
-    diagram = load_diagram(robot, wrist, np.array(sorted(masses)), along, gravity)
+    diagram = margins.load_diagram(robot, wrist, np.array(sorted(masses)), along, gravity)
     if diagram is None:
-        return DiagramRows.empty()
+        return model.DiagramRows.empty()
     reached = np.isfinite(diagram.across).any(axis=0)
     last = min(int(np.flatnonzero(reached).max(initial=0)) + 2, DIAGRAM_POINTS)
     count = len(diagram.mass)
-    return DiagramRows(
+    return model.DiagramRows(
         mass_kg=np.repeat(diagram.mass, last),
         along_mm=1000 * np.tile(diagram.along[:last], count),
         across_mm=1000 * diagram.across[:, :last].ravel(),
@@ -452,7 +420,7 @@ WRIST_JOINTS = 3
 NO_FIGURE = Figure("holding_torque", None, "")
 
 
-def compute(study: Study, name: str) -> DynamicsResults:
+def compute(study: Study, name: str) -> model.DynamicsResults:
     """Compute the dynamics stage of a robot."""
     settings = study.section(DynamicsSettings)
     given = study.robot(name)
@@ -475,7 +443,7 @@ def compute(study: Study, name: str) -> DynamicsResults:
     unknown = unknowns(robot, load)
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
-    summary = DynamicsSummary(
+    summary = model.DynamicsSummary(
         verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped),
         figures=_figures(summaries, holding, uses, imbalances, masses),
         gravity_m_s2=settings.gravity_m_s2,
@@ -492,8 +460,8 @@ def compute(study: Study, name: str) -> DynamicsResults:
         not_examined=_left_out(robot, summaries, skipped, unknown, settings.samples) if holding or uses else (),
     )
     followed = [path.rows for path in paths if path.demand]
-    rows = TorqueRows.stacked(followed) if followed else TorqueRows.empty()
-    return DynamicsResults(summary, rows, diagram_rows(robot, load, settings.gravity_m_s2))
+    rows = model.TorqueRows.stacked(followed)
+    return model.DynamicsResults(summary, rows, diagram_rows(robot, load, settings.gravity_m_s2))
 
 
 def with_estimates(robot: Robot, density: float | None) -> Robot:
@@ -537,10 +505,14 @@ def _loaded_arm(
 
 
 def _left_out(
-    robot: Robot, paths: tuple[PathLoad, ...], skipped: tuple[str, ...], unknown: tuple[DataOpen, ...], samples: int
+    robot: Robot,
+    paths: tuple[model.PathLoad, ...],
+    skipped: tuple[str, ...],
+    unknown: tuple[model.DataOpen, ...],
+    samples: int,
 ) -> tuple[LeftOut, ...]:
     """What the files leave open, paths that count for nothing, and what the model and its samples can't see."""
-    subjects: dict[Need, LeftOutSubject] = {
+    subjects: dict[model.Need, LeftOutSubject] = {
         "masses": "link_masses",
         "peak": "peak_torques",
         "rated": "rated_torques",
@@ -574,8 +546,7 @@ def _paths(
     joints, trajectory = arm.robot.joints, study.section(TrajectorySettings)
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
-    scene = study.scene(name, "trajectory")
-    bodies = Bodies(study.robot(name), load_scene(scene) if scene else None)
+    bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
     surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
     judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
     found, skipped = [], []
@@ -607,13 +578,13 @@ def with_load(arm: LoadedArm, load: MassBody | str | None) -> LoadedArm:
     return replace(arm, load=known, load_grade="claim")
 
 
-def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:
+def _holding(arm: LoadedArm) -> tuple[model.HoldingTorque, ...]:
     found = worst_holding(arm.model)
     rest = np.zeros_like(found.q)
     tolerance = np.diagonal(arm.tolerance(found.q, rest, rest))
     slides, q = arm.robot.slides, shown(arm.robot, found.q)
     return tuple(
-        HoldingTorque(
+        model.HoldingTorque(
             joint=j + 1,
             torque=float(found.values[j]),
             bound=float(found.bound[j]),
@@ -625,7 +596,9 @@ def _holding(arm: LoadedArm) -> tuple[HoldingTorque, ...]:
     )
 
 
-def _motors(robot: Robot, paths: list[PathTorques], holding: tuple[HoldingTorque, ...]) -> tuple[MotorNeed, ...]:
+def _motors(
+    robot: Robot, paths: list[PathTorques], holding: tuple[model.HoldingTorque, ...]
+) -> tuple[model.MotorNeed, ...]:
     paths = [path for path in paths if path.summary.counts]
     asked = [path.demand for path in paths if path.demand]
     drives = drives_of(robot)
@@ -637,7 +610,7 @@ def _motors(robot: Robot, paths: list[PathTorques], holding: tuple[HoldingTorque
         peak = max(float(each.peak[j]) for each in asked)
         ratio = drives.gear_ratio[j]
         found.append(
-            MotorNeed(
+            model.MotorNeed(
                 joint=j + 1,
                 unit="N" if slides else "N m",
                 peak=peak,
@@ -663,19 +636,19 @@ def _known(value: float) -> float | None:
 
 def _masses_used(
     given: Robot, robot: Robot, load: Load | None, grades: tuple[Grade, Grade | None], settings: DynamicsSettings
-) -> MassesUsed | None:
+) -> model.MassesUsed | None:
     if not robot.masses.links:
         return None
     links = []
     for link in range(robot.rows + 1):
         body = robot.masses.body(link)
         centre = tuple(1000 * value for value in body.centre) if body else ()
-        links.append(LinkEntry(link, body.mass if body else None, centre, given.masses.body(link) is not body))
+        links.append(model.LinkEntry(link, body.mass if body else None, centre, given.masses.body(link) is not body))
     source = robot.sources.get("inertia")
     stated = [each.body for each in given.masses.links if each.link > 0]
     own = bool(stated) and all(body.mass_tolerance is not None for body in stated)
-    tolerance = ASSUMED[grades[0]]
-    return MassesUsed(
+    tolerance = margins.ASSUMED[grades[0]]
+    return model.MassesUsed(
         grade=grades[0],
         source=source.source if source else "",
         density_kg_m3=settings.capsule_density_kg_m3 if robot is not given else None,
@@ -684,7 +657,7 @@ def _masses_used(
         load_kg=load.mass if load else None,
         load_centre_mm=tuple(1000 * value for value in load.centre) if load else (),
         load_grade=grades[1],
-        tolerances=TolerancesUsed(grades[0], 100 * tolerance.mass_ratio, 1000 * tolerance.centre, not own),
+        tolerances=model.TolerancesUsed(grades[0], 100 * tolerance.mass_ratio, 1000 * tolerance.centre, not own),
     )
 
 
@@ -692,7 +665,7 @@ def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]
     loads = [load for path in summaries for load in path.joints if path.counts]
     turning = [load for load in loads if load.unit == "N m"]
     peak = max(turning, key=lambda load: load.peak, default=None)
-    held = hardest_held(holding) if holding else None
+    held = model.hardest_held(holding) if holding else None
     energy = [sum(load.work_j for load in path.joints) for path in summaries if path.counts]
     total = sum(link.mass_kg or 0.0 for link in masses.links) if masses else None
     figures = (

@@ -20,7 +20,6 @@ from er3a.pipeline.viewing.recording import Curves, Recorded, Run, escaped, writ
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
-STAGE = "dynamics"
 LONGEST = 0.35  # of the arm's size, the arrow of the maximum torque
 WIDTH = 0.012  # of the arm's size
 CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
@@ -45,7 +44,7 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
     shown = Recorded(
         robot=robot,
         name=stored.robot,
-        stage=STAGE,
+        stage=stored.stage,
         note=NOTE.format(title=escaped(robot.title), finding=say(results.summary.verdict.finding)),
         runs=[_run(robot, motion, titles[motion.name], results, scale) for motion in motions(robot, results)],
         curves=[

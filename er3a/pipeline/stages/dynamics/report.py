@@ -7,30 +7,18 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from er3a.pipeline.messages.dynamics import BINDING, FIGURES, payload_text, quantity_word
+from er3a.pipeline.messages.dynamics import BINDING, payload_text, quantity_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.dynamics.model import (
-    BindingLimit,
-    DiagramRows,
-    DynamicsResults,
-    DynamicsSummary,
-    HoldingTorque,
-    MotorNeed,
-    PathLoad,
-    TorqueRows,
-    Unit,
-    Use,
-    hardest_held,
-)
+from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command
+from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
 DRAWN = 161
@@ -49,12 +37,12 @@ def bound_text(bound: float) -> str:
     return number(float(np.ceil(bound / digit - 1e-5) * digit), 4)
 
 
-def torque_unit(units: set[Unit]) -> str:
+def torque_unit(units: set[model.Unit]) -> str:
     """The unit of torques and forces of several joints, for a heading."""
     return units.pop() if len(units) == 1 else tr("N m or N")
 
 
-def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
+def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
     figure, (torque, parts, power) = row_of_panels(3, 13.0, 3.4, (0.75, 0.55, 0.1, 0.15, 0.85))
@@ -99,7 +87,7 @@ def torque_figure(path: PathLoad, rows: TorqueRows) -> Picture:
     return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
 
 
-def holding_figure(summary: DynamicsSummary) -> Picture:
+def holding_figure(summary: model.DynamicsSummary) -> Picture:
     """Bars of the largest holding torque at each joint."""
     figure, ax = new_figure(1, 1, width=7.0, height=2.8)
     joints = np.arange(len(summary.holding))
@@ -110,7 +98,7 @@ def holding_figure(summary: DynamicsSummary) -> Picture:
     ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
     ax.set_ylabel(tr("holding torque ({unit})", unit=torque_unit({held.unit for held in summary.holding})))
     ax.grid(visible=False, axis="x")
-    worst = hardest_held(summary.holding)
+    worst = model.hardest_held(summary.holding)
     caption = tr(
         "At rest J{joint} needs the greatest holding torque: {torque} ± {tolerance} {unit}. No pose within the "
         "joint limits needs more than {bound} {unit} there, for the masses as given.",
@@ -123,7 +111,7 @@ def holding_figure(summary: DynamicsSummary) -> Picture:
     return Picture(figure, tr("Bars: the greatest holding torque at each joint, with its tolerance."), caption)
 
 
-def diagram_figure(summary: DynamicsSummary, rows: DiagramRows) -> Picture:
+def diagram_figure(summary: model.DynamicsSummary, rows: model.DiagramRows) -> Picture:
     """The load diagram, with the load in it."""
     figure, ax = new_figure(1, 1, width=7.0, height=4.2)
     for i, mass in enumerate(np.unique(rows.mass_kg)):
@@ -149,7 +137,7 @@ MOST_USES = 12
 NONE = "–"
 
 
-def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) -> None:
     """Write the dynamics page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
     summary = results.summary
@@ -160,14 +148,10 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
     ]
     holding = holding_figure(summary) if summary.holding else None
     diagram = diagram_figure(summary, results.diagram) if len(results.diagram) else None
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{stored.robot}/dynamics.html"),
-        robot=robot,
-        robot_pages=study.pages(stored.robot),
         payload=payload_text(summary, robot),
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),
@@ -192,7 +176,7 @@ def report(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
     )
 
 
-def _links(summary: DynamicsSummary) -> list[list[str]]:
+def _links(summary: model.DynamicsSummary) -> list[list[str]]:
     rows = []
     for link in summary.masses.links if summary.masses else ():
         name = tr("base") if link.link == 0 else str(link.link)
@@ -202,7 +186,7 @@ def _links(summary: DynamicsSummary) -> list[list[str]]:
     return rows
 
 
-def _use(use: Use) -> list[str]:
+def _use(use: model.Use) -> list[str]:
     return [
         quantity_word(use.quantity),
         f"J{use.joint}" if use.joint else NONE,
@@ -215,7 +199,7 @@ def _use(use: Use) -> list[str]:
     ]
 
 
-def _units(summary: DynamicsSummary) -> dict[str, str]:
+def _units(summary: model.DynamicsSummary) -> dict[str, str]:
     """Units of torques, speeds and inertias in headings, by what the arm's joints do."""
     torque = {held.unit for held in summary.holding}
     turning = {"torque": "N m", "speed": tr("deg/s"), "inertia": "kg m²"}
@@ -224,11 +208,11 @@ def _units(summary: DynamicsSummary) -> dict[str, str]:
     return mixed if len(torque) > 1 else sliding if torque == {"N"} else turning
 
 
-def _label(joint: int, unit: Unit) -> str:
+def _label(joint: int, unit: model.Unit) -> str:
     return f"J{joint}" if unit == "N m" else tr("J{joint} (slides)", joint=joint)
 
 
-def _motor(motor: MotorNeed) -> list[str]:
+def _motor(motor: model.MotorNeed) -> list[str]:
     inertia = f"{number(motor.inertia_low, 2)} – {number(motor.inertia_high, 2)}"
     needs = motor.peak, motor.rms, motor.holding, motor.speed, motor.power_w
     return [
@@ -248,7 +232,7 @@ def _motor(motor: MotorNeed) -> list[str]:
     ]
 
 
-def _not_run(path: PathLoad) -> list[str]:
+def _not_run(path: model.PathLoad) -> list[str]:
     if not path.complete:
         return [path.name, outcome_word(path.verdict), tr("not followed to its end")]
     worst = path.hardest
@@ -256,7 +240,7 @@ def _not_run(path: PathLoad) -> list[str]:
     return [Markup('<a href="#{0}">{0}</a>').format(path.name), outcome_word(path.verdict), peak]
 
 
-def _nodes(summary: DynamicsSummary) -> list[list[str]]:
+def _nodes(summary: model.DynamicsSummary) -> list[list[str]]:
     """Shortest times under torques by the number of nodes, and the time that no motion undercuts."""
     return [
         [path.name, number(each.nodes), fixed(each.time_s, 4), fixed(each.least_s, 4)]
@@ -265,7 +249,7 @@ def _nodes(summary: DynamicsSummary) -> list[list[str]]:
     ]
 
 
-def _path(path: PathLoad) -> list[str]:
+def _path(path: model.PathLoad) -> list[str]:
     worst = path.hardest
     energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
     timed = fixed(path.torque_times[-1].time_s, 2) if path.torque_times else NONE
@@ -283,7 +267,7 @@ def _path(path: PathLoad) -> list[str]:
     ]
 
 
-def _bound(bound: BindingLimit | None) -> str:
+def _bound(bound: model.BindingLimit | None) -> str:
     if bound is None:
         return NONE
     value = tr("no bound") if bound.value is None else number(bound.value, 3)
@@ -292,7 +276,7 @@ def _bound(bound: BindingLimit | None) -> str:
     return bracketed(value, joined([f"J{bound.joint}", word("dynamics.binding", BINDING, bound.by)], ", "))
 
 
-def _joints(path: PathLoad) -> list[list[str]]:
+def _joints(path: model.PathLoad) -> list[list[str]]:
     return [
         [
             _label(load.joint, load.unit),
@@ -311,18 +295,18 @@ def _both(given: float, taken: float) -> Markup:
     return Markup("{}<br>{}").format(number(_no_noise(given), 3), number(_no_noise(taken), 3))
 
 
-def _held(held: HoldingTorque) -> list[str]:
+def _held(held: model.HoldingTorque) -> list[str]:
     found, bound, tolerance = (_no_noise(value) for value in (abs(held.torque), held.bound, held.tolerance))
     pose = panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q))
     return [_label(held.joint, held.unit), number(found, 4), bound_text(bound), number(tolerance, 2), pose]
 
 
-def _wrist_uses(summary: DynamicsSummary) -> list[list[str]]:
+def _wrist_uses(summary: model.DynamicsSummary) -> list[list[str]]:
     at_rest = [use for use in summary.uses if use.path is None and use.quantity in ("payload", "moment", "inertia")]
     return [[*_use(use)[:2], *_use(use)[3:]] for use in at_rest]
 
 
-def _wrist(summary: DynamicsSummary) -> list[list[str]]:
+def _wrist(summary: model.DynamicsSummary) -> list[list[str]]:
     return [
         [
             path.name,

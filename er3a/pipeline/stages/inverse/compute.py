@@ -13,7 +13,6 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
-from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.geometry.transforms import rotation_angle, rpy_of, transform
 from er3a.kinematics.batch import inverse_batch
@@ -37,41 +36,8 @@ from er3a.pipeline.progress import shown_progress
 from er3a.pipeline.results import Figure, LeftOut, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
+from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.entry import InverseSettings
-from er3a.pipeline.stages.inverse.model import (
-    SINGULAR_PARTS,
-    Advice,
-    AllSolved,
-    AtSingularity,
-    BranchesCollide,
-    BranchesLeaveLimits,
-    InverseResults,
-    InverseSummary,
-    MapRows,
-    MoveObstacle,
-    NearLimit,
-    NeighbourPoses,
-    NoneSolved,
-    NothingFound,
-    NotReproduced,
-    Obstacle,
-    RankingRows,
-    ReachMissing,
-    RoundTrips,
-    SelfMotion,
-    ShiftingDoesNotHelp,
-    ShiftTool,
-    SolutionRows,
-    SomeUnsolved,
-    Stop,
-    TargetResult,
-    TiltMissing,
-    ToolOrientation,
-    TurningDoesNotHelp,
-    TurnTool,
-    UnsolvedTarget,
-    VisitOrder,
-)
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
@@ -89,8 +55,8 @@ LITTLE_MARGIN_DEG = 2.0
 class SolvedTarget:
     """What the summary holds of a target, one row for each of its solutions, and what they were made from."""
 
-    result: TargetResult
-    rows: SolutionRows
+    result: model.TargetResult
+    rows: model.SolutionRows
     solutions: Solutions
 
 
@@ -117,27 +83,27 @@ def solve_target(
     rows = _rows(robot, target, solutions, choice, refused)
     found, within = np.unique(rows.branch), np.unique(rows.branch[rows.within_limits])
     chosen = choice.chosen
-    near: NeighbourPoses | None = None
-    obstacle: Obstacle | None = None
-    advice: tuple[Advice, ...] = ()
+    near: model.NeighbourPoses | None = None
+    obstacle: model.Obstacle | None = None
+    advice: tuple[model.Advice, ...] = ()
     if chosen is not None:
         advice = _what_to_know(rows, chosen)
     else:
         if isinstance(choice.reason, AllCollide):
-            obstacle = BranchesCollide(len(within))
+            obstacle = model.BranchesCollide(len(within))
             alone = scene is not None and _usable(robot, None, clearance)(solutions.q[solutions.within_limits]).any()
-            advice = (MoveObstacle(),) if alone else ()
+            advice = (model.MoveObstacle(),) if alone else ()
         else:
             obstacle = _obstacle(robot, target, solutions, len(found))
         if advise and has_branches(robot):
             usable = _usable(robot, scene, clearance)
-            near = stated(NeighbourPoses, neighbours(robot, target.T, random, usable))
+            near = stated(model.NeighbourPoses, neighbours(robot, target.T, random, usable))
             advice = (*advice, *_what_would_help(near, clearance))
     quaternion = scipy.spatial.transform.Rotation.from_matrix(target.T[:3, :3]).as_quat(
         canonical=True, scalar_first=True
     )
     result = stated(
-        TargetResult,
+        model.TargetResult,
         target,
         xyz=target.T[:3, 3],
         rpy=rpy_of(target.T),
@@ -161,21 +127,21 @@ def solve_target(
     return SolvedTarget(result, rows, solutions)
 
 
-def collides(rows: SolutionRows) -> Flags:
+def collides(rows: model.SolutionRows) -> Flags:
     """Which rows are refused because something overlaps."""
     return np.array([isinstance(why, PairOverlaps) for why in rows.refusal], dtype=bool)
 
 
 def _rows(
     robot: Robot, target: Target, solutions: Solutions, choice: Choice, refused: tuple[Refusal | None, ...]
-) -> SolutionRows:
+) -> model.SolutionRows:
     q, T, count = solutions.q, target.T, len(solutions.q)
     back = forward(robot, q)
     rank = np.zeros(count, dtype=int)
     rank[choice.order] = np.arange(1, len(choice.order) + 1)
     why = np.full(count, None, dtype=object)
     why[:] = refused
-    return SolutionRows.of(
+    return model.SolutionRows.of(
         solutions,
         target=target.name,
         q_deg=shown(robot, q) + 0.0,
@@ -205,14 +171,14 @@ def _missed_orientation(robot: Robot, R: Reals, asked: Reals) -> Reals:
 
 def _singular(robot: Robot, solutions: Solutions) -> Flags:
     """Which of ``SINGULAR_PARTS`` each row is on, (n, 4); arms without closed form by the Jacobian's rank."""
-    found = np.zeros((len(solutions.q), len(SINGULAR_PARTS)), dtype=bool)
+    found = np.zeros((len(solutions.q), len(model.SINGULAR_PARTS)), dtype=bool)
     if has_branches(robot):
         factors = determinant_factors(robot, solutions.q)
         for column, kind in enumerate(TYPES):
             found[:, column] = np.abs(getattr(factors, kind)) < SINGULAR
     else:
         smallest = conditioning(robot, solutions.q, characteristic_length(robot)).smallest_singular_value
-        found[:, SINGULAR_PARTS.index("rank")] = smallest < SINGULAR
+        found[:, model.SINGULAR_PARTS.index("rank")] = smallest < SINGULAR
     return found
 
 
@@ -227,9 +193,9 @@ def _first_of_branch(branch: Integers, rank: Integers) -> Flags:
     return first
 
 
-def _self_motion(family: Family | SelfMotionCurve) -> SelfMotion:
+def _self_motion(family: Family | SelfMotionCurve) -> model.SelfMotion:
     direction = shown(family.robot, family.direction) / np.degrees(1.0)
-    return stated(SelfMotion, family, q0_deg=shown(family.robot, family.q0), direction=direction)
+    return stated(model.SelfMotion, family, q0_deg=shown(family.robot, family.q0), direction=direction)
 
 
 def _method(robot: Robot, method: Method) -> Method:
@@ -239,26 +205,26 @@ def _method(robot: Robot, method: Method) -> Method:
     return method
 
 
-def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int) -> Obstacle:
+def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int) -> model.Obstacle:
     """Why there is no solution within the limits: of the branch that misses the pose by least."""
     if branches:
-        return BranchesLeaveLimits(branches)
+        return model.BranchesLeaveLimits(branches)
     if not has_branches(robot):
-        return NothingFound()
+        return model.NothingFound()
     _, fault, gap = (batch[0] for batch in solve_slots(robot, target.T[None], target.q_ref[None]))
     least = int(gap.argmin())
     if fault[least] == ORIENTATION:
-        return TiltMissing(float(np.degrees(gap[least])))
-    return ReachMissing(float(gap[least] * 1000))
+        return model.TiltMissing(float(np.degrees(gap[least])))
+    return model.ReachMissing(float(gap[least] * 1000))
 
 
-def _outcome(obstacle: Obstacle | None) -> TargetOutcome:
+def _outcome(obstacle: model.Obstacle | None) -> TargetOutcome:
     match obstacle:
         case None:
             return "reached"
-        case BranchesLeaveLimits():
+        case model.BranchesLeaveLimits():
             return "leaves limits"
-        case BranchesCollide():
+        case model.BranchesCollide():
             return "collides"
         case _:
             return "unreachable"
@@ -276,21 +242,21 @@ def _usable(robot: Robot, scene: Scene | None, clearance: float) -> Usable:
     return usable
 
 
-def _what_would_help(near: NeighbourPoses, clearance: float) -> tuple[Advice, ...]:
-    turn: Advice = TurningDoesNotHelp()
+def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[model.Advice, ...]:
+    turn: model.Advice = model.TurningDoesNotHelp()
     if near.least_turn_deg is not None and near.turned_to_deg is not None:
         kept = LITTLE_MARGIN_DEG, 1000 * clearance
-        turn = TurnTool(near.orientation_ratio, near.least_turn_deg, near.turned_to_deg, *kept)
-    shift: Advice = ShiftingDoesNotHelp()
+        turn = model.TurnTool(near.orientation_ratio, near.least_turn_deg, near.turned_to_deg, *kept)
+    shift: model.Advice = model.ShiftingDoesNotHelp()
     if near.least_shift_mm is not None and near.shifted_to_mm is not None:
-        shift = ShiftTool(near.least_shift_mm, near.shifted_to_mm, LITTLE_MARGIN_DEG, 1000 * clearance)
+        shift = model.ShiftTool(near.least_shift_mm, near.shifted_to_mm, LITTLE_MARGIN_DEG, 1000 * clearance)
     return turn, shift
 
 
-def _what_to_know(rows: SolutionRows, chosen: int) -> tuple[Advice, ...]:
-    found: list[Advice] = [AtSingularity(kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on]
+def _what_to_know(rows: model.SolutionRows, chosen: int) -> tuple[model.Advice, ...]:
+    found: list[model.Advice] = [model.AtSingularity(kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on]
     margin = float(rows.limit_margin_deg[chosen])
-    return (*found, NearLimit(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
+    return (*found, model.NearLimit(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
 
 
 MIX = "mix"
@@ -299,14 +265,16 @@ SAME_COST = 1e-9
 
 def rankings(
     robot: Robot, target: Target, solved: SolvedTarget, scene: Scene | None, mix: Mapping[RuleName, float]
-) -> RankingRows:
+) -> model.RankingRows:
     """Place and measure of each branch's best row within the limits, by each rule."""
     rows = np.flatnonzero(solved.rows.first_of_branch & solved.rows.within_limits)
     few = solved.solutions.take(rows)
     free = ~collides(solved.rows)[rows]
     names = np.full(len(rows), target.name, dtype=object)
-    return RankingRows.stacked(
-        RankingRows(names, few.branch, few.label, np.full(len(rows), rule, dtype=object), measure, _places(cost, free))
+    return model.RankingRows.stacked(
+        model.RankingRows(
+            names, few.branch, few.label, np.full(len(rows), rule, dtype=object), measure, _places(cost, free)
+        )
         for rule, measure, cost in _measured(robot, few.q, target.q_ref, scene, mix, free)
     )
 
@@ -336,7 +304,7 @@ def sequence(
     targets: tuple[Target, ...],
     solved: list[SolvedTarget],
     acceleration: Reals | None = None,
-) -> VisitOrder | None:
+) -> model.VisitOrder | None:
     """Visiting all targets that are reached, in order: the best rows as a whole, against the greedy ones."""
     reached = [one for one in solved if one.result.chosen_deg is not None]
     if len(reached) < 2:
@@ -346,7 +314,7 @@ def sequence(
     sets = [one.solutions.q[rows] for one, rows in zip(reached, usable)]
     found = best_of_sets(robot, sets, targets[0].q_ref, rule, acceleration)
     stops = tuple(
-        Stop(
+        model.Stop(
             target=one.result.name,
             branch=int(one.rows.branch[rows[row]]),
             label=one.rows.label[rows[row]],
@@ -357,16 +325,16 @@ def sequence(
         for one, rows, row, q, greedy in zip(reached, usable, found.rows, found.q, found.greedy_rows)
     )
     differs = bool((found.rows != found.greedy_rows).any())
-    return VisitOrder(rule, found.cost, found.greedy_cost, stops, differs)
+    return model.VisitOrder(rule, found.cost, found.greedy_cost, stops, differs)
 
 
-RPY_DEG: dict[ToolOrientation, tuple[float, float, float]] = {
+RPY_DEG: dict[model.ToolOrientation, tuple[float, float, float]] = {
     "tool_down": (180.0, 0.0, 0.0),
     "tool_level": (0.0, 90.0, 0.0),
 }
 
 
-def solution_map(robot: Robot, cells: int, scene: Scene | None) -> MapRows:
+def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows:
     """Number of branches, of those within the limits, and of those clear too, on a grid of ``cells`` by ``cells``."""
     points, T_base_tool = axes_at_zero_theta(robot)[1:]
     if closed_form_missing(robot) is None:
@@ -387,7 +355,7 @@ def solution_map(robot: Robot, cells: int, scene: Scene | None) -> MapRows:
         slot, pose = np.nonzero(clear.T)
         clear[pose, slot] = bodies.free(found.q[pose, slot])
         tables.append(
-            MapRows(
+            model.MapRows(
                 orientation=np.full(len(x), orientation, dtype=object),
                 x_mm=x * 1000,
                 z_mm=z * 1000,
@@ -396,7 +364,7 @@ def solution_map(robot: Robot, cells: int, scene: Scene | None) -> MapRows:
                 clear=clear.sum(axis=1),
             )
         )
-    return MapRows.stacked(tables)
+    return model.MapRows.stacked(tables)
 
 
 STAGE = "inverse"
@@ -406,13 +374,12 @@ MOST_ADVISED = 100  # of many targets those for which it is looked for what woul
 ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
 
 
-def compute(study: Study, name: str) -> InverseResults:
+def compute(study: Study, name: str) -> model.InverseResults:
     """Solve the targets of a robot of the study."""
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets, robot)
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
-    scene_file = study.scene(name, STAGE)
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, STAGE)
     assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
     clearance = (motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm) / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()
@@ -424,14 +391,14 @@ def compute(study: Study, name: str) -> InverseResults:
             advised += solved[-1].result.neighbours is not None
             advance(1)
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
-    solutions = SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
+    solutions = model.SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
     results = tuple(one.result for one in solved)
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
     wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MOST_BY_CLASS)
     trips = batch_round_trips(robot, random, wanted) if complete else None
     worst = _worst_residuals(solutions, trips)
-    summary = InverseSummary(
+    summary = model.InverseSummary(
         verdict=_verdict(results, worst, trips, scene is not None)
         .without(bodies_of(robot, scene).unexamined)
         .resting_on(assumed),
@@ -448,13 +415,15 @@ def compute(study: Study, name: str) -> InverseResults:
             *left_out_without_tool(robot),
         ),
     )
-    number_of_solutions = solution_map(robot, settings.map_cells, scene) if has_branches(robot) else MapRows.empty()
-    return InverseResults(summary, solutions, RankingRows.stacked(ranked), number_of_solutions)
+    number_of_solutions = (
+        solution_map(robot, settings.map_cells, scene) if has_branches(robot) else model.MapRows.empty()
+    )
+    return model.InverseResults(summary, solutions, model.RankingRows.stacked(ranked), number_of_solutions)
 
 
 def _left_out(
     robot: Robot,
-    targets: Sequence[TargetResult],
+    targets: Sequence[model.TargetResult],
     many: bool,
     mix: Mapping[RuleName, float],
     trips: BatchRoundTrips | None,
@@ -482,27 +451,27 @@ def _is_certain(method: Method) -> bool:
 
 
 def _verdict(
-    targets: Sequence[TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None, collisions: bool
-) -> Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced | ExpectationsUnmet]:
+    targets: Sequence[model.TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None, collisions: bool
+) -> Verdict[model.AllSolved | model.SomeUnsolved | model.NoneSolved | model.NotReproduced | ExpectationsUnmet]:
     position, orientation = worst
     lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
-        return Verdict("fail", NotReproduced(position * 1000, float(np.degrees(orientation)), lost))
+        return Verdict("fail", model.NotReproduced(position * 1000, float(np.degrees(orientation)), lost))
     if unmet := unmet_expectations(targets):
         return Verdict("fail", unmet)
     shown = demonstrations(targets, "reached")
     asked = [target for target in targets if target.expect in (None, "reached")]
-    unsolved = tuple(UnsolvedTarget(target.name, target.obstacle) for target in asked if target.obstacle)
+    unsolved = tuple(model.UnsolvedTarget(target.name, target.obstacle) for target in asked if target.obstacle)
     count, solved = len(asked), len(asked) - len(unsolved)
     if not unsolved:
-        return Verdict("pass", AllSolved(count, solved, unsolved, collisions, shown))
+        return Verdict("pass", model.AllSolved(count, solved, unsolved, collisions, shown))
     if not solved:
-        return Verdict("fail", NoneSolved(count, solved, unsolved, collisions, shown))
-    return Verdict("caution", SomeUnsolved(count, solved, unsolved, collisions, shown))
+        return Verdict("fail", model.NoneSolved(count, solved, unsolved, collisions, shown))
+    return Verdict("caution", model.SomeUnsolved(count, solved, unsolved, collisions, shown))
 
 
 def _figures(
-    targets: Sequence[TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None
+    targets: Sequence[model.TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None
 ) -> tuple[Figure, ...]:
     position, orientation = worst
     asked = [target for target in targets if target.expect in (None, "reached")]  # demonstrations are counted apart
@@ -525,7 +494,7 @@ def _of_random_poses(trips: BatchRoundTrips) -> tuple[Figure, ...]:
     )
 
 
-def _worst_residuals(solutions: SolutionRows, trips: BatchRoundTrips | None) -> tuple[float, float]:
+def _worst_residuals(solutions: model.SolutionRows, trips: BatchRoundTrips | None) -> tuple[float, float]:
     """Over all targets' solutions and all round trips, m and rad."""
     position = solutions.position_residual_mm / 1000
     orientation = np.radians(solutions.orientation_residual_deg)
@@ -535,6 +504,6 @@ def _worst_residuals(solutions: SolutionRows, trips: BatchRoundTrips | None) -> 
     )
 
 
-def _round_trips(trips: BatchRoundTrips) -> RoundTrips:
+def _round_trips(trips: BatchRoundTrips) -> model.RoundTrips:
     own = trips.worst_own if np.isfinite(trips.worst_own) else None
-    return stated(RoundTrips, trips, same_joints=SAME_JOINTS_RAD, worst_own=own)
+    return stated(model.RoundTrips, trips, same_joints=SAME_JOINTS_RAD, worst_own=own)

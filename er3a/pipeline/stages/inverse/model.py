@@ -148,11 +148,11 @@ class NotReproduced:
 
 
 @dataclass(frozen=True)
-class AllSolved:
-    """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``).
+class TargetCounts:
+    """How many targets have an admissible solution, and which have none.
 
     ``collisions``: a scene was given, so that the solutions touch nothing of it. The arm never touches itself.
-    Demonstrations are not counted.
+    ``demonstrations``, which are meant to have none, are not counted.
     """
 
     targets: int
@@ -160,30 +160,30 @@ class AllSolved:
     unsolved: tuple[UnsolvedTarget, ...]
     collisions: bool
     demonstrations: tuple[Demonstration, ...]
+
+
+@dataclass(frozen=True)
+class AllSolved(TargetCounts):
+    """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``).
+
+    ``collisions``: a scene was given, so that the solutions touch nothing of it. The arm never touches itself.
+    Demonstrations are not counted.
+    """
+
     code: Literal["inverse.all_solved"] = "inverse.all_solved"
 
 
 @dataclass(frozen=True)
-class SomeUnsolved:
+class SomeUnsolved(TargetCounts):
     """Some targets have no admissible solution."""
 
-    targets: int
-    solved: int
-    unsolved: tuple[UnsolvedTarget, ...]
-    collisions: bool
-    demonstrations: tuple[Demonstration, ...]
     code: Literal["inverse.some_unsolved"] = "inverse.some_unsolved"
 
 
 @dataclass(frozen=True)
-class NoneSolved:
+class NoneSolved(TargetCounts):
     """No target has an admissible solution."""
 
-    targets: int
-    solved: int
-    unsolved: tuple[UnsolvedTarget, ...]
-    collisions: bool
-    demonstrations: tuple[Demonstration, ...]
     code: Literal["inverse.none_solved"] = "inverse.none_solved"
 
 

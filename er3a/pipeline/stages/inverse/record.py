@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import skeleton
 from er3a.pipeline.messages.inverse import limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word, say
@@ -21,7 +20,6 @@ from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, writ
 from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
 from er3a.robots.robot import Robot
 
-STAGE = "inverse"
 NOTE = """# Joint solutions of each target
 
 **Look first** at how differently the arm can reach one and the same tool pose. Each target has one second: drag the
@@ -42,17 +40,16 @@ def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     name, solutions = stored.robot, stored.results.solutions
     robot, targets = study.robot(name), shown_targets(stored.results.summary.targets)
-    scene = study.scene(name, STAGE)
     shown = Recorded(
         robot=robot,
         name=name,
-        stage=STAGE,
+        stage=stored.stage,
         note=NOTE,
         runs=[
             _run(robot, target, solutions.take((solutions.target == target.name) & solutions.first_of_branch))
             for target in targets
         ],
-        scene=load_scene(scene) if scene else None,
+        scene=study.scene(name, stored.stage),
         views={"Solutions": ["**"]},
         points=[np.array([target.xyz_mm for target in targets]) / 1000],
         now="This target",

@@ -22,7 +22,6 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import ClosedForm, Iteration
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
-    FIGURES,
     FREE_AT,
     NEAREST_RULE,
     ORIENTATION_TITLES,
@@ -34,24 +33,12 @@ from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_wo
 from er3a.pipeline.messages.language import N_, tr, with_unit
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.results import Stored, is_computed, read_stage
-from er3a.pipeline.stages.inverse.model import (
-    SINGULAR_PARTS,
-    InverseResults,
-    InverseSummary,
-    MapRows,
-    RankingRows,
-    RoundTrips,
-    SelfMotion,
-    SolutionRows,
-    TargetResult,
-    VisitOrder,
-    shown_targets,
-)
+from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command
+from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, colour_of, shape_of
 from er3a.robots.joint_limits import LimitsExceeded, meant, shown
 from er3a.robots.robot import Robot
@@ -60,7 +47,7 @@ from er3a.selection.select import RULES
 NAMED = 12  # targets that a cell names
 
 
-def symptoms(summary: InverseSummary) -> list[list[str]]:
+def symptoms(summary: model.InverseSummary) -> list[list[str]]:
     """Rows of symptom, usual cause, what was tried here and what helps, from the summary's targets alone."""
     targets = summary.targets
     unreachable = [target.name for target in targets if not target.solutions]
@@ -120,7 +107,7 @@ def _names(names: list[str]) -> str:
     return joined(names, ", ") if names else tr("no target")
 
 
-def _greed(sequence: VisitOrder | None) -> str:
+def _greed(sequence: model.VisitOrder | None) -> str:
     if sequence is None:
         return tr("Fewer than two targets can be reached, so there is no sequence")
     return tr(
@@ -134,7 +121,7 @@ def _greed(sequence: VisitOrder | None) -> str:
 TITLE: dict[str, Any] = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
 
 
-def overlay(robot: Robot, target: TargetResult, branches: SolutionRows) -> Picture:
+def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> Picture:
     """All arm shapes that solve a target, from the side and from above, with the joint angles of each branch.
 
     Parameters
@@ -155,7 +142,7 @@ def overlay(robot: Robot, target: TargetResult, branches: SolutionRows) -> Pictu
     return Picture(figure, alt, _conclude(target))
 
 
-def histogram(trips: RoundTrips) -> Picture:
+def histogram(trips: model.RoundTrips) -> Picture:
     """Share of random poses by the number of their solutions within the limits."""
     counts = np.array(trips.counts_within_limits)
     share = 100 * counts / trips.poses
@@ -182,7 +169,7 @@ def histogram(trips: RoundTrips) -> Picture:
     )
 
 
-def solutions_per_position(table: MapRows) -> Picture:
+def solutions_per_position(table: model.MapRows) -> Picture:
     """Maps of the number of branches within the limits and clear, one for each orientation of the tool."""
     orientations = list(dict.fromkeys(table.orientation))
     figure, axes = new_figure(1, len(orientations), width=10.5, height=4.8, squeeze=False)
@@ -229,7 +216,7 @@ def solutions_per_position(table: MapRows) -> Picture:
     )
 
 
-def _conclude(target: TargetResult) -> str:
+def _conclude(target: model.TargetResult) -> str:
     if target.chosen_deg is not None:
         counts = {"within": target.within_limits, "all": target.solutions, "collide": target.collide}
         if not target.collide:
@@ -250,7 +237,9 @@ def _conclude(target: TargetResult) -> str:
     return tr("The arm, drawn at the reference, can't reach the target.")
 
 
-def _draw_arms(side: Axes, top: Axes, robot: Robot, target: TargetResult, branches: SolutionRows) -> list[Line2D]:
+def _draw_arms(
+    side: Axes, top: Axes, robot: Robot, target: model.TargetResult, branches: model.SolutionRows
+) -> list[Line2D]:
     from_world = np.linalg.inv(robot.base)
 
     def in_base(points_m: np.ndarray) -> np.ndarray:
@@ -306,7 +295,7 @@ def _mark(side: Axes, top: Axes, point: np.ndarray, level: np.ndarray, label: st
     return Line2D([], [], label=label, **style)
 
 
-def _draw_joints(axes: Axes, robot: Robot, target: TargetResult, branches: SolutionRows) -> list[Line2D]:
+def _draw_joints(axes: Axes, robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> list[Line2D]:
     lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
     angles = branches.q_deg
     for joint in range(robot.joints):
@@ -359,7 +348,7 @@ MOST_SELF_MOTIONS = 6
 class TargetSection:
     """What the page says about a target, in words; the worst residuals are None where nothing solves it."""
 
-    target: TargetResult
+    target: model.TargetResult
     picture: Picture
     position: str
     orientation: str
@@ -376,20 +365,16 @@ class TargetSection:
     residual_deg: float | None
 
 
-def report(study: Study, stored: Stored[InverseResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
-    robot, trips, chosen = study.robot(name), summary.round_trips, shown_targets(summary.targets)
+    robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
     rules = list(dict.fromkeys(results.rankings.rule))
     correction = _correction(robot, stored)
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{name}/inverse.html"),
-        robot=robot,
-        robot_pages=study.pages(name),
         nearest_rule=tr(NEAREST_RULE),
         overview=[_overview_row(target) for target in chosen],
         sections=[_section(robot, target, results, rules, correction) for target in chosen],
@@ -418,7 +403,7 @@ class Correction:
     robot: Robot
 
 
-def _correction(robot: Robot, stored: Stored[InverseResults]) -> Correction | None:
+def _correction(robot: Robot, stored: Stored[model.InverseResults]) -> Correction | None:
     """What validation's diagnosis says of the table; None if it was not computed, or names no single fault."""
     folder = stored.folder.parent / "validation" if stored.folder else None
     if folder is None or not is_computed(folder):
@@ -431,7 +416,7 @@ def _correction(robot: Robot, stored: Stored[InverseResults]) -> Correction | No
     return None
 
 
-def _after_correction(target: TargetResult, correction: Correction | None) -> list[str]:
+def _after_correction(target: model.TargetResult, correction: Correction | None) -> list[str]:
     """What a correction of the table would do for a target none of whose solutions keeps the limits."""
     if correction is None or not target.solutions or target.within_limits:
         return []
@@ -448,7 +433,11 @@ def _after_correction(target: TargetResult, correction: Correction | None) -> li
 
 
 def _section(
-    robot: Robot, target: TargetResult, results: InverseResults, rules: list[str], correction: Correction | None
+    robot: Robot,
+    target: model.TargetResult,
+    results: model.InverseResults,
+    rules: list[str],
+    correction: Correction | None,
 ) -> TargetSection:
     rows = results.solutions.take(results.solutions.target == target.name)
     branches = best_of_branches(rows)
@@ -471,7 +460,7 @@ def _section(
     )
 
 
-def best_of_branches(rows: SolutionRows) -> SolutionRows:
+def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:
     """The best row of each branch of a target, by number of the branch."""
     best = rows.take(rows.first_of_branch)
     return best.take(np.argsort(best.branch, kind="stable"))
@@ -486,7 +475,7 @@ def _rule_heading(rule: str) -> str:
     return bracketed(_rule(rule), "" if unit == "1" else tr(unit)) + ">"
 
 
-def _rule_rows(ranked: RankingRows, rules: list[str]) -> list[list[str]]:
+def _rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
     """One row for each branch: the measure of each rule, with its place; a dash for a rule that this target lacks."""
     rows, collides = [], tr("collides")
     for branch in np.unique(ranked.branch):
@@ -504,7 +493,7 @@ def _no_noise(measure: float) -> float:
     return 0.0 if abs(measure) < 1e-9 else float(measure)
 
 
-def _self_motions(robot: Robot, families: tuple[SelfMotion, ...]) -> list[str]:
+def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:
     """The nearest self-motions, and how many more there are."""
     texts = [_self_motion(robot, family) for family in families[:MOST_SELF_MOTIONS]]
     if len(families) > MOST_SELF_MOTIONS:
@@ -512,7 +501,7 @@ def _self_motions(robot: Robot, families: tuple[SelfMotion, ...]) -> list[str]:
     return texts
 
 
-def _self_motion(robot: Robot, family: SelfMotion) -> str:
+def _self_motion(robot: Robot, family: model.SelfMotion) -> str:
     text = _curve(robot, family)
     if family.dimension > 1:
         return tr(
@@ -524,7 +513,7 @@ def _self_motion(robot: Robot, family: SelfMotion) -> str:
     return text
 
 
-def _curve(robot: Robot, family: SelfMotion) -> str:
+def _curve(robot: Robot, family: model.SelfMotion) -> str:
     of_slide = f"{NO_BREAK_SPACE}mm/°"
     moving = [
         f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}{of_slide if robot.slides[j] else ''}"
@@ -552,24 +541,24 @@ def _curve(robot: Robot, family: SelfMotion) -> str:
     )
 
 
-def _move_rule(sequence: VisitOrder | None) -> tuple[str, str]:
+def _move_rule(sequence: model.VisitOrder | None) -> tuple[str, str]:
     """Unit and title of the rule that moves in the sequence are ranked by."""
     return (tr(RULES[sequence.rule].unit), word("rule.title", RULE_TITLES, sequence.rule)) if sequence else ("", "")
 
 
-def _outcomes(targets: Iterable[TargetResult]) -> str:
+def _outcomes(targets: Iterable[model.TargetResult]) -> str:
     """How many targets came to what."""
     counts = Counter(target.outcome for target in targets)
     return tr(", ").join(f"{outcome_word(outcome)} {number(count)}" for outcome, count in counts.most_common())
 
 
-def _not_advised(targets: Iterable[TargetResult]) -> int:
+def _not_advised(targets: Iterable[model.TargetResult]) -> int:
     """How many targets without solution were not looked at for what would help, where others were."""
     without = [target.neighbours for target in targets if target.obstacle]
     return without.count(None) if any(without) else 0
 
 
-def _stops(sequence: VisitOrder | None, named: set[str]) -> list[list[str]]:
+def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]]:
     return [
         [
             stop.target,
@@ -582,7 +571,7 @@ def _stops(sequence: VisitOrder | None, named: set[str]) -> list[list[str]]:
     ]
 
 
-def _overview_row(target: TargetResult) -> list[str]:
+def _overview_row(target: model.TargetResult) -> list[str]:
     unreached = target.obstacle if not target.solutions else None
     return [
         Markup('<a href="#{0}">{0}</a>').format(target.name),
@@ -593,7 +582,7 @@ def _overview_row(target: TargetResult) -> list[str]:
     ]
 
 
-def _branch_rows(rows: SolutionRows, branches: SolutionRows) -> list[list[str]]:
+def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list[list[str]]:
     inside = rows.branch[rows.within_limits]
     ranks = branches.rank[branches.rank > 0]
     cells = []
@@ -612,14 +601,14 @@ def _branch_rows(rows: SolutionRows, branches: SolutionRows) -> list[list[str]]:
     return cells
 
 
-def _outcome(branches: SolutionRows, k: int, place: int, turns: int) -> str:
+def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> str:
     refusal = branches.refusal[k]
     if refusal is not None:
         return limits_in_short(refusal) if isinstance(refusal, LimitsExceeded) else say(refusal)
     taken = tr("chosen") if branches.rank[k] == 1 else tr("place {place}", place=place)
     if turns > 1:
         taken = tr("{taken}, {turns} turns", taken=taken, turns=turns)
-    kinds = [kind for kind, on in zip(SINGULAR_PARTS, branches.singular[k]) if on]
+    kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, branches.singular[k]) if on]
     if not kinds:
         return taken
     if kinds == ["rank"]:

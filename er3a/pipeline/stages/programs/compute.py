@@ -11,27 +11,14 @@ from er3a.collision.along import bodies_of
 from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
+from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
-from er3a.pipeline.stages.programs.model import (
-    AllProgramsPass,
-    FindingAt,
-    Instructions,
-    Lines,
-    NoPrograms,
-    ProgramMotion,
-    ProgramsResults,
-    ProgramsSummary,
-    ProgramSummary,
-    SomeProgramsCaution,
-    SomeProgramsFail,
-)
 from er3a.pipeline.stages.trajectory.motion import assumed_speeds, near_singular
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramCheck, check_program
@@ -56,19 +43,18 @@ MOST_MOTIONS = 20_000
 MOST_POINTS = 20_000  # of a program's motion that are kept
 
 
-def compute(study: Study, name: str) -> ProgramsResults:
+def compute(study: Study, name: str) -> model.ProgramsResults:
     """Compute the stage of programs of a robot."""
     robot = study.robot(name)
     file = study.entry(name).programs
     listed = load_programs(file) if file else ProgramsFile(kind="programs")
-    scene_file = study.scene(name, "trajectory")
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, "trajectory")
     options = replace(_options(study, listed, robot), scene=scene)
-    summaries: list[ProgramSummary] = []
-    lines: list[Lines] = []
-    instructions: list[Instructions] = []
+    summaries: list[model.ProgramSummary] = []
+    lines: list[model.Lines] = []
+    instructions: list[model.Instructions] = []
     unknown_starts: list[str] = []
-    motions: list[ProgramMotion] = []
+    motions: list[model.ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
         motion, starts = _motion(entry.name, check, len(robot.lower))
@@ -84,8 +70,8 @@ def compute(study: Study, name: str) -> ProgramsResults:
         if each.expect in (None, "pass")
     }
     assumed = shapes_assumed(robot, options.assumed_margin, least)
-    return ProgramsResults(
-        summary=ProgramsSummary(
+    return model.ProgramsResults(
+        summary=model.ProgramsSummary(
             verdict=_verdict(summaries).without(bodies_of(robot, scene).unexamined).resting_on(assumed),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
@@ -97,13 +83,13 @@ def compute(study: Study, name: str) -> ProgramsResults:
                 *_left_out(summaries, unknown_starts),
             ),
         ),
-        lines=Lines.stacked(lines) if lines else Lines.empty(),
-        instructions=Instructions.stacked(instructions) if instructions else Instructions.empty(),
-        motion=ProgramMotion.stacked(motions) if motions else ProgramMotion.empty(),
+        lines=model.Lines.stacked(lines),
+        instructions=model.Instructions.stacked(instructions),
+        motion=model.ProgramMotion.stacked(motions),
     )
 
 
-def _left_out(programs: Sequence[ProgramSummary], unknown_starts: Sequence[str]) -> Iterator[LeftOut]:
+def _left_out(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence[str]) -> Iterator[LeftOut]:
     """Lines that were not examined, ways from where the arm is not known to stand, and what no check sees."""
     lines = tuple(f"{each.name}: {', '.join(map(str, each.not_examined))}" for each in programs if each.not_examined)
     if lines:
@@ -122,7 +108,7 @@ def _left_out(programs: Sequence[ProgramSummary], unknown_starts: Sequence[str])
     yield LeftOut("torques")
 
 
-def _loads(program: ProgramSummary) -> Iterator[str]:
+def _loads(program: model.ProgramSummary) -> Iterator[str]:
     """The loads that a program names, as kg or as its text has them."""
     for at in program.findings:
         if isinstance(at.finding, (LoadAbovePayload, LoadNotExamined)):
@@ -150,11 +136,11 @@ def _options(study: Study, listed: ProgramsFile, robot: Robot) -> CheckOptions:
     )
 
 
-def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> ProgramSummary:
+def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> model.ProgramSummary:
     levels = [OUTCOMES[verdict.level] for verdict in check.verdicts]
     clear = [verdict.least_clearance_mm for verdict in check.verdicts if verdict.least_clearance_mm is not None]
     found = [each for each in check.findings if not isinstance(each.finding, PairsUnexamined)]  # the verdict says it
-    return ProgramSummary(
+    return model.ProgramSummary(
         name=entry.name,
         title=entry.title,
         file=entry.file,
@@ -174,11 +160,11 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
     )
 
 
-def _finding_at(each: LocatedFinding, starts: Mapping[int, float]) -> FindingAt:
+def _finding_at(each: LocatedFinding, starts: Mapping[int, float]) -> model.FindingAt:
     """``starts``: when (s) steps of the way that is kept begin."""
     own = None if each.moment is None else float(each.moment)
     start = None if each.step is None else starts.get(each.step)
-    return FindingAt(
+    return model.FindingAt(
         each.place.file.name if each.place.file else "",
         each.place.line,
         each.place.element,
@@ -198,12 +184,12 @@ def _without_path(finding: CheckFinding) -> CheckFinding:
     return finding
 
 
-def _lines(name: str, check: ProgramCheck) -> Lines:
+def _lines(name: str, check: ProgramCheck) -> model.Lines:
     text = check.execution.program.lines
-    return Lines(np.full(len(text), name, object), np.arange(1, len(text) + 1), np.array([*text], object))
+    return model.Lines(np.full(len(text), name, object), np.arange(1, len(text) + 1), np.array([*text], object))
 
 
-def _instructions(name: str, check: ProgramCheck, joints: int) -> Instructions:
+def _instructions(name: str, check: ProgramCheck, joints: int) -> model.Instructions:
     ends: dict[Place, Reals] = {}
     for number, motion in check.motions.items():
         if motion.end is not None:
@@ -214,7 +200,7 @@ def _instructions(name: str, check: ProgramCheck, joints: int) -> Instructions:
     def reals(values: list[float | None]) -> Reals:
         return np.array([np.nan if value is None else value for value in values], float)
 
-    return Instructions(
+    return model.Instructions(
         program=np.full(len(verdicts), name, object),
         line=np.array([each.line for each in verdicts], int),
         element=np.array([each.place.element for each in verdicts], object),
@@ -227,7 +213,7 @@ def _instructions(name: str, check: ProgramCheck, joints: int) -> Instructions:
     )
 
 
-def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[ProgramMotion, dict[int, float]]:
+def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[model.ProgramMotion, dict[int, float]]:
     """The main way over time, with a stop at each target, and when (s) each of its steps begins; what is not known is
     left out."""
     starts: dict[int, float] = {}
@@ -260,7 +246,7 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[ProgramMotion,
         lines += [check.execution.own_line(step)] * len(t)
         step_levels += [levels[step.place]] * len(t)
         now += motion.way.law.duration if motion.way else 0.0
-    kept = ProgramMotion(
+    kept = model.ProgramMotion(
         program=np.full(len(lines), name, object),
         t_s=np.concatenate(times),
         line=np.array(lines, int),
@@ -272,22 +258,24 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[ProgramMotion,
 
 
 def _verdict(
-    programs: list[ProgramSummary],
-) -> Verdict[AllProgramsPass | SomeProgramsCaution | SomeProgramsFail | NoPrograms | ExpectationsUnmet]:
+    programs: list[model.ProgramSummary],
+) -> Verdict[
+    model.AllProgramsPass | model.SomeProgramsCaution | model.SomeProgramsFail | model.NoPrograms | ExpectationsUnmet
+]:
     if not programs:
-        return Verdict("no_reference", NoPrograms())
+        return Verdict("no_reference", model.NoPrograms())
     if unmet := unmet_expectations(programs):
         return Verdict("fail", unmet)
     asked = [each for each in programs if each.expect in (None, "pass")]
     caution, failed = (tuple(each.name for each in asked if each.outcome == outcome) for outcome in ("caution", "fail"))
-    finding = SomeProgramsFail if failed else SomeProgramsCaution if caution else AllProgramsPass
+    finding = model.SomeProgramsFail if failed else model.SomeProgramsCaution if caution else model.AllProgramsPass
     status: Status = "fail" if failed else "caution" if caution else "pass"
     passed = len(asked) - len(caution) - len(failed)
     missed = tuple(each.name for each in asked if each.not_examined)
     return Verdict(status, finding(len(asked), passed, caution, failed, demonstrations(programs, "pass"), missed))
 
 
-def _figures(programs: list[ProgramSummary]) -> tuple[Figure, ...]:
+def _figures(programs: list[model.ProgramSummary]) -> tuple[Figure, ...]:
     asked = [each for each in programs if each.expect in (None, "pass")]
     instructions = sum(each.motions for each in asked)
     clear = [each.least_clearance_mm for each in asked if each.least_clearance_mm is not None]

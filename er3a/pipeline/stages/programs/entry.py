@@ -36,16 +36,12 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     return [Path(file), *programs, *study.scenes(robot, "trajectory")]
 
 
-def _wanted(study: StudyFiles, robot: str) -> bool:
-    return study.entry(robot).programs is not None
-
-
 STAGE = Stage(
     name="programs",
     title=N_("programs"),
     question=N_("Can the robot carry out its programs?"),
     settings={"programs": ProgramsSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
-    wanted=_wanted,
+    wanted=lambda study, robot: study.entry(robot).programs is not None,
     rests_on=("validation",),
 )

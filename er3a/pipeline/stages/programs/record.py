@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.programs import cycle_text, level_word
 from er3a.pipeline.messages.say import say, say_all
@@ -23,8 +22,6 @@ from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escap
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.languages import LANGUAGES
 
-STAGE = "programs"
-SCENE_OF = "trajectory"  # the stage whose scene counts here too
 AROUND = 4  # lines of the listing before and behind the one that is carried out
 COLOURS: dict[str, str] = {**VERDICTS, "note": VERDICTS["pass"]}
 NOTE = """# {title}: programs
@@ -41,15 +38,15 @@ the text beside it shows the line that it is at.
 
 def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     """Write the recording of a robot's programs."""
-    robot, results, scene = study.robot(stored.robot), stored.results, study.scene(stored.robot, SCENE_OF)
+    robot, results = study.robot(stored.robot), stored.results
     shown = Recorded(
         robot=robot,
         name=stored.robot,
-        stage=STAGE,
+        stage=stored.stage,
         note=NOTE.format(title=escaped(robot.title), findings=say_all(results.summary.verdict.findings)),
         runs=[_run(results, program) for program in results.summary.programs],
         curves=[Curves("angle", "Joint angle (deg)")],
-        scene=load_scene(scene) if scene else None,
+        scene=study.scene(stored.robot, "trajectory"),  # the stage whose scene counts here too
         views={"Arm and tool": ["**"]},
         points=[results.motion.xyz_mm / 1000],
         now="This line",

@@ -9,20 +9,12 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup, escape
 
-from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.programs import FIGURES, cycle_text, level_word, remedies, remedy_at
+from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.programs.model import (
-    FindingAt,
-    Instructions,
-    Lines,
-    ProgramMotion,
-    ProgramsResults,
-    ProgramSummary,
-)
+from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.played import (
     line_id,
     motions,
@@ -34,7 +26,7 @@ from er3a.pipeline.stages.programs.played import (
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
-from er3a.pipeline.viewing.page import head_of, render, run_command
+from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
 
@@ -68,7 +60,7 @@ class ProgramSection:
     """A program on the page, and what it says in the page's language; ``worst``: the finding that weighs most, and
     ``to_do`` about it."""
 
-    program: ProgramSummary
+    program: model.ProgramSummary
     status: str
     language: str
     cycle: str
@@ -78,30 +70,26 @@ class ProgramSection:
     elsewhere: list[list[str]]
 
 
-def report(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
     """Write the page of a robot's programs."""
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
-    solids = load_scene(scene) if scene else None
     sections = [_section(results, program) for program in worst_first(summary.programs)]
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES, {each.name: f"#{each.name}" for each in summary.programs}),
-        command=run_command(study, f"{stored.robot}/programs.html"),
-        robot=robot,
-        robot_pages=study.pages(stored.robot),
+        head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
-        player=player(robot, motions(robot, results), solids),
-        bodies=[each.name for each in solids.solids] if solids else [],
+        player=player(robot, motions(robot, results), scene),
+        bodies=[each.name for each in scene.solids] if scene else [],
         drawing_head=drawing_head(),
     )
 
 
-def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSection:
+def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> ProgramSection:
     own = Path(program.file).name
-    found: dict[int, list[FindingAt]] = defaultdict(list)
+    found: dict[int, list[model.FindingAt]] = defaultdict(list)
     elsewhere = []
     for each in sorted(program.findings, key=when):
         if each.file == own and each.line:
@@ -119,7 +107,7 @@ def _section(results: ProgramsResults, program: ProgramSummary) -> ProgramSectio
     return ProgramSection(program, status, *texts, lines, elsewhere)
 
 
-def _worst(program: ProgramSummary) -> tuple[Markup, str]:
+def _worst(program: model.ProgramSummary) -> tuple[Markup, str]:
     """The first of the findings that weigh most, with its line, and what to do there; empty where a program passes."""
     found = worst_finding(program)
     if found is None or program.outcome == "pass":
@@ -128,7 +116,7 @@ def _worst(program: ProgramSummary) -> tuple[Markup, str]:
     return Markup(tr("line {line}: {text}", line=found.line, text=remark)) if found.line else remark, to_do
 
 
-def _remark(name: str, each: FindingAt) -> Markup:
+def _remark(name: str, each: model.FindingAt) -> Markup:
     """What was found, after the moment at which it begins: a link to it where the player shows it."""
     often = tr("{times} times that the line is carried out", times=each.times) if each.times > 1 else ""
     text = escape(bracketed(say(each.finding), often))
@@ -142,7 +130,11 @@ def _remark(name: str, each: FindingAt) -> Markup:
 
 
 def _listing(
-    program: ProgramSummary, text: Lines, rows: Instructions, motion: ProgramMotion, found: dict[int, list[FindingAt]]
+    program: model.ProgramSummary,
+    text: model.Lines,
+    rows: model.Instructions,
+    motion: model.ProgramMotion,
+    found: dict[int, list[model.FindingAt]],
 ) -> list[ListingLine]:
     name = program.name
     moves: dict[int, list[int]] = defaultdict(list)
@@ -188,7 +180,7 @@ def _listing(
     return lines
 
 
-def _facts(rows: Instructions, here: list[int]) -> str:
+def _facts(rows: model.Instructions, here: list[int]) -> str:
     """Duration and clearance of the motions of a line."""
     times = rows.duration_s[here] if here else np.empty(0)
     clear = rows.clearance_mm[here] if here else np.empty(0)

@@ -13,7 +13,6 @@ from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps, PairTooNear
 from er3a.collision.shapes import arm_shapes, shapes_assumed
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, factors_where_defined
@@ -25,41 +24,7 @@ from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates, left_out_without_tool
-from er3a.pipeline.stages.trajectory.judgement import (
-    Judgement,
-    Surroundings,
-    clear_until,
-    clearance_rows,
-    collisions,
-    judge,
-    measured,
-    min_clearance,
-    verdict_of,
-)
-from er3a.pipeline.stages.trajectory.model import (
-    FASTEST,
-    AllSafe,
-    AvoidanceRows,
-    CauseT,
-    Clearances,
-    HalfTurn,
-    Jump,
-    LimitsUsed,
-    NearThresholds,
-    NoneSafe,
-    PathChecks,
-    PathNotFollowed,
-    PathSummary,
-    ProgramFiles,
-    Samples,
-    Singularity,
-    SomeUnsafe,
-    StrategyMotion,
-    Stretch,
-    TrajectoryResults,
-    TrajectorySummary,
-    TriedStrategy,
-)
+from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, proof_requirements
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
@@ -88,10 +53,10 @@ class Avoided:
     fastest_s : duration of the path itself as fast as the joints can; None where no motion follows it
     """
 
-    tried: tuple[TriedStrategy, ...]
+    tried: tuple[model.TriedStrategy, ...]
     chosen: StrategyName | None
     fastest_s: float | None
-    rows: AvoidanceRows
+    rows: model.AvoidanceRows
 
 
 @dataclass(frozen=True)
@@ -108,11 +73,11 @@ class AvoidanceTask:
     near: NearSingular
     limits: JointLimits
     only: StrategyName | None
-    surroundings: Surroundings
+    surroundings: judgement.Surroundings
     planning: PlanningTask
     margin: float
 
-    def avoid(self, motion: Motion, found: Judgement, along: ClearanceAlong) -> Avoided:
+    def avoid(self, motion: Motion, found: judgement.Judgement, along: ClearanceAlong) -> Avoided:
         """Compare the strategies where a path is not safe; find its fastest time law where it can be run as it is.
 
         A strategy on whose motion the arm meets its surroundings or itself is not usable. Where the path keeps the
@@ -141,10 +106,10 @@ class AvoidanceTask:
             tried=tried,
             chosen=chosen.name if chosen else None,
             fastest_s=quickest.duration if quickest else None,
-            rows=AvoidanceRows.stacked(self._tables(motion, results, quickest)),
+            rows=model.AvoidanceRows.stacked(self._tables(motion, results, quickest)),
         )
 
-    def _no_more_than(self, found: Judgement) -> JointLimits:
+    def _no_more_than(self, found: judgement.Judgement) -> JointLimits:
         """The limits, or what of them the path needs if that is less."""
         if found.fast or found.max_speed is None or found.max_acceleration is None:
             return self.limits
@@ -175,7 +140,7 @@ class AvoidanceTask:
         solved = inverse(self.robot, T, self_motion_rows=True)
         return solved.q[solved.within_limits]
 
-    def _joint_move(self, motion: Motion, found: Judgement) -> tuple[Timed | None, list[StrategyResult]]:
+    def _joint_move(self, motion: Motion, found: judgement.Judgement) -> tuple[Timed | None, list[StrategyResult]]:
         """Fastest time law; slowing down is the only strategy that a joint move can need."""
         t, q = nodes_along(motion.joints, motion.t, motion.q, self.limits)
         try:
@@ -199,7 +164,7 @@ class AvoidanceTask:
         along = clearance_along(
             self.surroundings.bodies, curve.joints, curve.rate_bounds, grid, grid, self.surroundings.tolerance
         )
-        least = min_clearance(along)
+        least = judgement.min_clearance(along)
         if least is None:
             return None, None
         if along.contacts:
@@ -212,15 +177,19 @@ class AvoidanceTask:
         ends = along.distance[[0, -1]]
         return float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))
 
-    def _tables(self, motion: Motion, results: list[StrategyResult], quickest: Timed | None) -> Iterator[AvoidanceRows]:
+    def _tables(
+        self, motion: Motion, results: list[StrategyResult], quickest: Timed | None
+    ) -> Iterator[model.AvoidanceRows]:
         for result in results:
             if result.cost:
                 deviations = (result.cost.distance, result.cost.angle)
                 yield self._rows(motion.entry.name, result.name, result.cost.motion, deviations)
         if quickest:
-            yield self._rows(motion.entry.name, FASTEST, quickest, None)
+            yield self._rows(motion.entry.name, model.FASTEST, quickest, None)
 
-    def _rows(self, path: str, strategy: str, timed: Timed, deviations: tuple[Reals, Reals] | None) -> AvoidanceRows:
+    def _rows(
+        self, path: str, strategy: str, timed: Timed, deviations: tuple[Reals, Reals] | None
+    ) -> model.AvoidanceRows:
         """At most ROWS rows of a motion, and those of its maximum speed and deviation."""
         kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))
         kept = kept if deviations is None else np.union1d(kept, [np.argmax(deviations[0])])
@@ -228,7 +197,7 @@ class AvoidanceTask:
         q, velocity, acceleration = timed.curve.rates(times)
         distance, angle = (np.interp(times, timed.t, part) for part in deviations or (np.zeros(len(timed.t)),) * 2)
         measures = conditioning(self.robot, q, characteristic_length(self.robot))
-        return AvoidanceRows(
+        return model.AvoidanceRows(
             path=np.full(len(times), path, object),
             strategy=np.full(len(times), strategy, object),
             t_s=times,
@@ -278,15 +247,15 @@ def _quickest(segment: SingularSegment) -> Timed | None:
 
 def _tried(
     robot: Robot, result: StrategyResult, meets: PairOverlaps | PairTooNear | None, clearance_mm: float | None
-) -> TriedStrategy:
+) -> model.TriedStrategy:
     reasons = (*result.reasons, meets) if meets else result.reasons
     motion = _motion(robot, result.cost, clearance_mm) if result.cost else None
-    return TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
+    return model.TriedStrategy(result.name, motion is not None and not reasons, reasons, motion)
 
 
-def _motion(robot: Robot, cost: StrategyCost, clearance_mm: float | None) -> StrategyMotion:
+def _motion(robot: Robot, cost: StrategyCost, clearance_mm: float | None) -> model.StrategyMotion:
     return stated(
-        StrategyMotion,
+        model.StrategyMotion,
         cost,
         done_ratio=cost.done,
         max_deviation_mm=from_si("mm", cost.distance.max()),
@@ -302,21 +271,21 @@ def _motion(robot: Robot, cost: StrategyCost, clearance_mm: float | None) -> Str
 def path_summary(
     robot: Robot,
     motion: Motion,
-    found: Judgement,
+    found: judgement.Judgement,
     along: ClearanceAlong,
     avoided: Avoided,
     limits: JointLimits,
-) -> PathSummary:
+) -> model.PathSummary:
     """All that is known of a path; its verdict is the gravest of its own and "collides"."""
     followed, entry = motion.followed, motion.entry
     labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
-    contacts = collisions(along)
-    return PathSummary(
+    contacts = judgement.collisions(along)
+    return model.PathSummary(
         name=entry.name,
         title=entry.title,
         kind=entry.kind,
-        verdict=verdict_of(found, along),
+        verdict=judgement.verdict_of(found, along),
         expect=entry.expect,
         in_joint_space=followed is None,
         duration_s=float(motion.built.duration),
@@ -335,7 +304,8 @@ def path_summary(
         too_fast=_stretches(motion, found.fast),
         undecided=_stretches(motion, found.undecided),
         jumps=tuple(
-            Jump(jump.t, jump.joint, float(np.degrees(jump.angle))) for jump in (followed.jumps if followed else ())
+            model.Jump(jump.t, jump.joint, float(np.degrees(jump.angle)))
+            for jump in (followed.jumps if followed else ())
         ),
         max_joint_speed_deg_s=None if found.max_speed is None else tuple(shown(robot, found.max_speed).tolist()),
         max_joint_speed_ratio=_ratio(found.max_speed, limits.speed),
@@ -343,7 +313,7 @@ def path_summary(
         joint_speed_bounded=found.speed_bounded,
         velocity_check_deg_s=float(np.degrees(found.velocity_check)),
         collisions=_stretches(motion, contacts),
-        clearance=min_clearance(along),
+        clearance=judgement.min_clearance(along),
         no_way=motion.no_way,
         fastest_s=avoided.fastest_s,
         avoidance=avoided.tried,
@@ -355,15 +325,15 @@ def _ratio(greatest: Reals | None, most: Reals) -> float | None:
     return None if greatest is None else float((greatest / most).max())
 
 
-def _half_turns(motion: Motion) -> tuple[HalfTurn, ...]:
+def _half_turns(motion: Motion) -> tuple[model.HalfTurn, ...]:
     turns = motion.built.tool.half_turns() if motion.built.tool else []
-    return tuple(HalfTurn(k, tuple(float(x) for x in np.round(axis, 12) + 0.0)) for k, axis in turns)
+    return tuple(model.HalfTurn(k, tuple(float(x) for x in np.round(axis, 12) + 0.0)) for k, axis in turns)
 
 
-def _singularity(event: SingularEvent) -> Singularity:
+def _singularity(event: SingularEvent) -> model.Singularity:
     shoulder = event.type == "shoulder"
     return stated(
-        Singularity,
+        model.Singularity,
         event,
         distance_deg=None if shoulder or event.axes else from_si("deg", event.distance),
         distance_mm=from_si("mm", event.distance) if shoulder else None,
@@ -371,12 +341,12 @@ def _singularity(event: SingularEvent) -> Singularity:
     )
 
 
-def _stretches(motion: Motion, intervals: Iterable[Interval[CauseT]]) -> tuple[Stretch[CauseT], ...]:
+def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> tuple[model.Stretch[model.CauseT], ...]:
     """Intervals in time and on the tool point's way."""
     found = []
     for interval in intervals:
         s0, s1 = (float(value) for value in motion.way(np.array([interval.start, interval.end])))
-        found.append(Stretch(interval.start, interval.end, s0, s1, interval.cause))
+        found.append(model.Stretch(interval.start, interval.end, s0, s1, interval.cause))
     return tuple(found)
 
 
@@ -388,49 +358,48 @@ def _degrees(values: Reals) -> tuple[float, ...]:
     return tuple(float(value) for value in np.degrees(values))
 
 
-def compute(study: Study, name: str) -> TrajectoryResults:
+def compute(study: Study, name: str) -> model.TrajectoryResults:
     """Compute the trajectory stage of a robot."""
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
-    thresholds = NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
+    thresholds = model.NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm)
     required, limits = proof_requirements(robot, settings), limits_of(robot, settings)
-    near, scene_file = required.near, study.scene(name, "trajectory")
-    scene = load_scene(scene_file) if scene_file else None
-    surroundings = Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
+    near, scene = required.near, study.scene(name, "trajectory")
+    surroundings = judgement.Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, surroundings.bodies, study.seed)
     assumed_margin = settings.assumed_margin_mm / 1000
     margin = (assumed_margin if arm_shapes(robot).assumed else surroundings.tolerance) + ROUNDED
     avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning, margin)
-    tables: list[PathChecks] = []
-    clearances: list[Clearances] = []
-    strategies: list[AvoidanceRows] = []
-    paths: list[PathSummary] = []
-    programs: list[ProgramFiles] = []
-    skipped: list[PathNotFollowed] = []
+    tables: list[model.PathChecks] = []
+    clearances: list[model.Clearances] = []
+    strategies: list[model.AvoidanceRows] = []
+    paths: list[model.PathSummary] = []
+    programs: list[model.ProgramFiles] = []
+    skipped: list[model.PathNotFollowed] = []
     for each in listed_motions(file, planning, required, settings.checks_per_sample):
         motion = each.motion
         if motion is None:
             stops = each.ends.t if each.ends else None
             lacking, outcome = closed_form_missing(robot), each.outcome_unfollowed
-            skipped.append(PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
+            skipped.append(model.PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
             continue
-        found = judge(robot, motion, near, limits)
-        along = measured(surroundings, motion)
+        found = judgement.judge(robot, motion, near, limits)
+        along = judgement.measured(surroundings, motion)
         avoided = avoidance.avoid(motion, found, along)
         tables.append(_checks(robot, motion, found, near, limits))
-        clearances.append(clearance_rows(each.name, along))
+        clearances.append(judgement.clearance_rows(each.name, along))
         strategies.append(avoided.rows)
-        last = clear_until(surroundings, motion, found, along, margin)
+        last = judgement.clear_until(surroundings, motion, found, along, margin)
         paths.append(replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
         asked = settings.programs, settings.write_unsafe
         programs.append(program_files(robot, motion, paths[-1].verdict, *asked, repair))
-    checks = PathChecks.stacked(tables).of_joints(robot.slides)
+    checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
     assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
-    used = LimitsUsed(
+    used = model.LimitsUsed(
         speed_deg_s=_shown(robot, limits.speed),
         speed_assumed=assumed,
         acceleration_deg_s2=_shown(robot, limits.acceleration),
@@ -442,7 +411,7 @@ def compute(study: Study, name: str) -> TrajectoryResults:
         path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
     }
     assumed_shapes = shapes_assumed(robot, assumed_margin, least)
-    summary = TrajectorySummary(
+    summary = model.TrajectorySummary(
         verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined).resting_on(assumed_shapes),
         figures=_figures(paths, length, used),
         characteristic_length_m=length,
@@ -460,17 +429,19 @@ def compute(study: Study, name: str) -> TrajectoryResults:
             LeftOut("torques"),
         ),
     )
-    return TrajectoryResults(
+    return model.TrajectoryResults(
         summary=summary,
-        samples=Samples(**{name: getattr(own, name) for name in Samples.columns()}).of_joints(robot.slides),
+        samples=model.Samples(**{name: getattr(own, name) for name in model.Samples.columns()}).of_joints(robot.slides),
         checks=checks,
-        clearance=Clearances.stacked(clearances),
-        avoidance=AvoidanceRows.stacked(strategies).of_joints(robot.slides),
-        programs=ProgramFiles.stacked(programs),
+        clearance=model.Clearances.stacked(clearances),
+        avoidance=model.AvoidanceRows.stacked(strategies).of_joints(robot.slides),
+        programs=model.ProgramFiles.stacked(programs),
     )
 
 
-def _left_out(paths: list[PathSummary], skipped: list[PathNotFollowed], only: StrategyName | None) -> Iterator[LeftOut]:
+def _left_out(
+    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], only: StrategyName | None
+) -> Iterator[LeftOut]:
     """Paths that were not followed or planned, stretches that bounds leave open, strategies not asked for."""
     if skipped:
         yield LeftOut("paths", tuple(path.name for path in skipped))
@@ -482,14 +453,16 @@ def _left_out(paths: list[PathSummary], skipped: list[PathNotFollowed], only: St
         yield LeftOut("strategies", tuple(name for name in get_args(StrategyName) if name != only))
 
 
-def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, limits: JointLimits) -> PathChecks:
+def _checks(
+    robot: Robot, motion: Motion, found: judgement.Judgement, near: NearSingular, limits: JointLimits
+) -> model.PathChecks:
     """One row per check point; joint columns are NaN where the path can't be reached."""
     reached = np.isfinite(found.q[:, 0])
     measures = np.full((len(found.q), 3), np.nan)
     part = conditioning(robot, found.q[reached], characteristic_length(robot))
     measures[reached] = np.stack([part.manipulability, part.condition_number, part.smallest_singular_value], axis=1)
     factors = factors_where_defined(robot, found.q)
-    return PathChecks(
+    return model.PathChecks(
         path=np.full(len(found.times), motion.entry.name, object),
         t_s=found.times,
         s_m=motion.way(found.times),
@@ -512,8 +485,8 @@ def _checks(robot: Robot, motion: Motion, found: Judgement, near: NearSingular, 
 
 
 def _verdict(
-    paths: list[PathSummary], skipped: list[PathNotFollowed]
-) -> Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]:
+    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed]
+) -> Verdict[model.AllSafe | model.SomeUnsafe | model.NoneSafe | ExpectationsUnmet]:
     if unmet := unmet_expectations([*paths, *skipped]):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.expect in (None, "safe")]
@@ -523,7 +496,7 @@ def _verdict(
         return tuple(path.name for path in asked if path.verdict == verdict)
 
     safe, count = len(named("safe")), len(asked) + len(unfollowed)
-    finding = AllSafe if safe == count else SomeUnsafe if safe else NoneSafe
+    finding = model.AllSafe if safe == count else model.SomeUnsafe if safe else model.NoneSafe
     failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
     status: Status = "pass" if safe == count else "fail" if failed or not safe else "caution"
     counts = finding(
@@ -544,12 +517,12 @@ def _verdict(
     return Verdict(status, counts)
 
 
-def _fails(path: PathSummary) -> bool:
+def _fails(path: model.PathSummary) -> bool:
     """Whether a path can't be run as it is: it collides, leaves limits, or no joints follow it."""
     return path.verdict in FAULTS or (path.verdict == "singular" and (bool(path.jumps) or not path.joint_speed_bounded))
 
 
-def _figures(paths: list[PathSummary], length: float, limits: LimitsUsed) -> tuple[Figure, ...]:
+def _figures(paths: list[model.PathSummary], length: float, limits: model.LimitsUsed) -> tuple[Figure, ...]:
     asked = [path for path in paths if path.expect in (None, "safe")]  # demonstrations are counted apart
     events = [event for path in asked for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]

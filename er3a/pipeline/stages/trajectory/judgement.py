@@ -15,32 +15,9 @@ from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.stages.trajectory.model import (
-    BodiesOverlap,
-    Clearances,
-    ClearUntil,
-    MinClearance,
-    PairTouches,
-)
+from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion
-from er3a.planning.motion_faults import (
-    AccelerationTooGreatIfAssumed,
-    Interval,
-    LimitCause,
-    LimitCheck,
-    MaxRates,
-    PathOutOfReach,
-    RateCause,
-    RateCheck,
-    SingularCheck,
-    SingularEvent,
-    TooFastIfAssumed,
-    jerk_exceeded,
-    out_of_limits,
-    rates_exceeded,
-    singular_events,
-    unreachable,
-)
+from er3a.planning import motion_faults
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.piecewise import Polynomials
 from er3a.planning.timing import JointLimits
@@ -48,7 +25,7 @@ from er3a.planning.tool_proof import Undecided
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
-ASSUMED = (TooFastIfAssumed, AccelerationTooGreatIfAssumed)
+ASSUMED = (motion_faults.TooFastIfAssumed, motion_faults.AccelerationTooGreatIfAssumed)
 STEPS_TO_CONTACT, ATTEMPTS = 1000, 5
 BEFORE_STOP = 0.99  # of the time until limits or reach are left
 SPEED_STEP = 1e-5  # share of the duration
@@ -69,11 +46,11 @@ class Judgement:
     """
 
     verdict: PathVerdict
-    events: list[SingularEvent]
-    limits: list[Interval[LimitCause]]
-    beyond: list[Interval[PathOutOfReach]]
-    fast: list[Interval[RateCause]]
-    undecided: list[Interval[Undecided]]
+    events: list[motion_faults.SingularEvent]
+    limits: list[motion_faults.Interval[motion_faults.LimitCause]]
+    beyond: list[motion_faults.Interval[motion_faults.PathOutOfReach]]
+    fast: list[motion_faults.Interval[motion_faults.RateCause]]
+    undecided: list[motion_faults.Interval[Undecided]]
     times: Reals
     q: Reals
     velocity: Reals
@@ -88,10 +65,10 @@ class Judgement:
 class _Found:
     """Faults of a motion, and its maximum speeds and accelerations (n,), if any are known."""
 
-    events: list[SingularEvent]
-    limits: list[Interval[LimitCause]]
-    fast: list[Interval[RateCause]]
-    undecided: list[Interval[Undecided]]
+    events: list[motion_faults.SingularEvent]
+    limits: list[motion_faults.Interval[motion_faults.LimitCause]]
+    fast: list[motion_faults.Interval[motion_faults.RateCause]]
+    undecided: list[motion_faults.Interval[Undecided]]
     greatest: tuple[Reals, Reals] | None
 
 
@@ -108,7 +85,7 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
         found = _tool_faults(robot, motion, near, limits)
     times = np.unique(np.concatenate([motion.checks, [event.t for event in found.events]]))
     q, velocity, acceleration = motion.rates(times)
-    beyond = unreachable(robot, motion.followed) if motion.followed else []
+    beyond = motion_faults.unreachable(robot, motion.followed) if motion.followed else []
     jumps = motion.followed.jumps if motion.followed else ()
     edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
     bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
@@ -148,9 +125,9 @@ def _verdict(found: _Found, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
 
 def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSingular, limits: JointLimits) -> _Found:
     """Faults found in one run through the motion, whose parts are made while they are wanted."""
-    singular = SingularCheck(robot, near) if closed_form_missing(robot) is None else None
-    within, greatest = LimitCheck(robot), MaxRates(robot.joints)
-    rates = [RateCheck(limit) for limit in limits.rates]
+    singular = motion_faults.SingularCheck(robot, near) if closed_form_missing(robot) is None else None
+    within, greatest = motion_faults.LimitCheck(robot), motion_faults.MaxRates(robot.joints)
+    rates = [motion_faults.RateCheck(limit) for limit in limits.rates]
     for part in motion.parts():
         within.add(part)
         greatest.add(part)
@@ -162,7 +139,7 @@ def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSi
         events = singular.events()
     else:  # sampled: a move of the joints takes no harm from singular poses
         t = np.union1d(checks, motion.times)
-        events = singular_events(robot, t, motion.joints(t), motion.joints, near)
+        events = motion_faults.singular_events(robot, t, motion.joints(t), motion.joints, near)
     return _Found(
         events=events,
         limits=within.intervals(),
@@ -178,19 +155,19 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
     assert proof is not None
     t, kept = np.unique(np.concatenate([motion.t, proof.t]), return_index=True)
     q = np.concatenate([motion.q, proof.q])[kept]
-    events = singular_events(robot, t, q, motion.joints, near)
+    events = motion_faults.singular_events(robot, t, q, motion.joints, near)
     more = np.unique(np.concatenate([motion.t, [event.t for event in events]]))
     more = more[~np.isin(more, proof.middles)]
     rates = np.concatenate([np.stack(motion.rates(more)[1:], axis=1), proof.rates])
     at = np.concatenate([more, proof.middles])
     order = np.argsort(at)
     at, rates = at[order], rates[order]
-    fast: list[Interval[RateCause]] = []
+    fast: list[motion_faults.Interval[motion_faults.RateCause]] = []
     for limit in limits.rates:
         if limit.order == 3:
-            fast += jerk_exceeded(proof.times, proof.jerk, proof.steps, limit)
+            fast += motion_faults.jerk_exceeded(proof.times, proof.jerk, proof.steps, limit)
             continue
-        fast += rates_exceeded(at, rates[:, limit.order - 1], limit, partial(_rate, motion, limit.order))
+        fast += motion_faults.rates_exceeded(at, rates[:, limit.order - 1], limit, partial(_rate, motion, limit.order))
     known = rates[np.isfinite(rates).all(axis=(1, 2))]
     greatest = np.abs(known).max(axis=0) if len(known) else None
     followed = motion.followed
@@ -198,7 +175,7 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
     ends = followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events)
     return _Found(
         events=events,
-        limits=out_of_limits(robot, t, q, motion.joints),
+        limits=motion_faults.out_of_limits(robot, t, q, motion.joints),
         fast=fast,
         undecided=[*proof.undecided, *(() if ends else proof.beside)],
         greatest=None if greatest is None else (greatest[0], greatest[1]),
@@ -235,14 +212,14 @@ def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
     )
 
 
-def collisions(along: ClearanceAlong) -> list[Interval[BodiesOverlap]]:
+def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[model.BodiesOverlap]]:
     """Stretches of overlap."""
     return [
-        Interval(
+        motion_faults.Interval(
             contact.start,
             contact.end,
-            BodiesOverlap(
-                tuple(PairTouches(each.pair, each.start, each.depth * 1000, each.at) for each in contact.touches)
+            model.BodiesOverlap(
+                tuple(model.PairTouches(each.pair, each.start, each.depth * 1000, each.at) for each in contact.touches)
             ),
         )
         for contact in along.contacts
@@ -255,17 +232,17 @@ def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
     return min(verdicts, key=PATH_VERDICTS.index)
 
 
-def min_clearance(along: ClearanceAlong) -> MinClearance | None:
+def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     """Where the arm comes nearest to anything; None where nothing could be measured."""
     least = along.least
     if least < 0 or (pair := along.pair[least]) is None:
         return None
-    return MinClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
+    return model.MinClearance(float(along.distance[least] * 1000), float(along.t[least]), pair, along.measured)
 
 
 def clear_until(
     surroundings: Surroundings, motion: Motion, found: Judgement, along: ClearanceAlong, margin: float
-) -> ClearUntil | None:
+) -> model.ClearUntil | None:
     """The last point of a motion up to which it keeps a margin (m); None if it meets nothing, or keeps it nowhere.
 
     The point is looked for on a grid up to the first contact, or to where the motion leaves limits or reach, and
@@ -311,7 +288,7 @@ def clear_until(
         return None
     pose, q = motion.tool(np.array([end]))[0], motion.joints(np.array([end, first]))
     touching = bodies.surface_points(q[1], int(bodies.min_distance(q[1:])[1][0])).mean(axis=0)
-    return ClearUntil(
+    return model.ClearUntil(
         1000 * margin,
         end,
         float(motion.way(np.array([end]))[0]),
@@ -322,9 +299,9 @@ def clear_until(
     )
 
 
-def clearance_rows(name: str, along: ClearanceAlong) -> Clearances:
+def clearance_rows(name: str, along: ClearanceAlong) -> model.Clearances:
     """One row per time at which the clearance was measured in full; NaN where the path can't be reached."""
-    return Clearances(
+    return model.Clearances(
         path=np.full(len(along.t), name, object),
         t_s=along.t,
         clearance_mm=along.distance * 1000,

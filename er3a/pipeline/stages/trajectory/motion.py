@@ -14,7 +14,6 @@ from er3a.collision.along import RateBounds
 from er3a.collision.bodies import Bodies
 from er3a.errors import InputError, NotWristPartitionedError, PoseError
 from er3a.files.path_file import PathEntry, ProgramPath, load_paths
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular
@@ -326,8 +325,8 @@ class ListedMotion:
 
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
     """The motions of a robot of the study, in the scene of its trajectory stage; see :func:`listed_motions`."""
-    robot, settings, scene = study.robot(name), study.section(TrajectorySettings), study.scene(name, "trajectory")
-    bodies = Bodies(robot, load_scene(scene) if scene else None)
+    robot, settings = study.robot(name), study.section(TrajectorySettings)
+    bodies = Bodies(robot, study.scene(name, "trajectory"))
     task = planning_of(robot, settings, bodies, study.seed)
     return listed_motions(Path(study.entry(name).paths), task, proof_requirements(robot, settings), checks_per_sample)
 

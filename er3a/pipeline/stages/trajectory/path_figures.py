@@ -23,36 +23,16 @@ from er3a.collision.scene import Scene
 from er3a.kinematics.forward import skeleton
 from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
+from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined, say
-from er3a.pipeline.messages.trajectory import event_word, type_word
+from er3a.pipeline.messages.trajectory import event_word
 from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
-from er3a.pipeline.stages.trajectory.model import (
-    FASTEST,
-    AvoidanceRows,
-    MinClearance,
-    NearThresholds,
-    PathChecks,
-    PathSummary,
-    Stretch,
-    TrajectoryResults,
-)
+from er3a.pipeline.stages.trajectory import model
+from er3a.pipeline.viewing import palette
 from er3a.pipeline.viewing.figures import axis_label, new_figure, svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import (
-    BODY,
-    GRID,
-    HIGHLIGHT,
-    INK,
-    JOINT_NAMES,
-    LINK,
-    MODEL,
-    MUTED,
-    REFERENCE,
-    VERDICTS,
-)
-from er3a.pipeline.viewing.palette import JOINTS as COLOURS
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
@@ -62,7 +42,9 @@ AZIMUTH, ELEVATION = np.radians(-55.0), np.radians(24.0)
 MOST_SINGULAR_ARMS = 3  # at singular poses
 
 
-def draw_path(ax: Axes, robot: Robot, path: PathSummary, rows: PathChecks, repaired: AvoidanceRows) -> None:
+def draw_path(
+    ax: Axes, robot: Robot, path: model.PathSummary, rows: model.PathChecks, repaired: model.AvoidanceRows
+) -> None:
     """Draw the path, the repaired path, and the arm at the start, the end and the singular poses."""
     ax.set_axis_off()
     ax.set_aspect("equal")
@@ -70,24 +52,24 @@ def draw_path(ax: Axes, robot: Robot, path: PathSummary, rows: PathChecks, repai
     reached = np.flatnonzero(rows.reachable)
     nearest = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
     at_events = [i for i in nearest if i in reached][:MOST_SINGULAR_ARMS]
-    arms = [(i, LINK, "-") for i in reached[:1]] + [(i, LINK, "--") for i in reached[-1:]]
-    for i, colour, style in arms + [(i, HIGHLIGHT, "-") for i in at_events]:
+    arms = [(i, palette.LINK, "-") for i in reached[:1]] + [(i, palette.LINK, "--") for i in reached[-1:]]
+    for i, colour, style in arms + [(i, palette.HIGHLIGHT, "-") for i in at_events]:
         links = project(skeleton(robot, meant(robot, rows.q_deg[i])) * 1000)
-        width, alpha = (1.6, 0.5) if colour == HIGHLIGHT else (3.5, 1.0)
+        width, alpha = (1.6, 0.5) if colour == palette.HIGHLIGHT else (3.5, 1.0)
         ax.plot(*links.T, color=colour, linewidth=width, alpha=alpha, linestyle=style, solid_capstyle="round", zorder=2)
     _floor(ax, points)
     if len(repaired):
-        ax.plot(*project(repaired.xyz_mm).T, color=MODEL, linewidth=1.2, linestyle="--", zorder=5)
+        ax.plot(*project(repaired.xyz_mm).T, color=palette.MODEL, linewidth=1.2, linestyle="--", zorder=5)
     _coloured(ax, project(points), rows.condition_number)
     flat = project(points)
     for part in path.collisions:
         during = (rows.t_s >= part.t0_s) & (rows.t_s <= part.t1_s)
-        ax.plot(*flat[during].T, color=VERDICTS["fail"], linewidth=3.5, zorder=5)
-    ax.plot(*flat[0], "o", color=INK, markersize=5, zorder=6)
-    ax.plot(*flat[-1], "s", color=INK, markersize=5, zorder=6)
+        ax.plot(*flat[during].T, color=palette.VERDICTS["fail"], linewidth=3.5, zorder=5)
+    ax.plot(*flat[0], "o", color=palette.INK, markersize=5, zorder=6)
+    ax.plot(*flat[-1], "s", color=palette.INK, markersize=5, zorder=6)
     for i, event in zip(nearest, path.singularities):
         marker = "X" if event.crossing else "D"
-        ax.plot(*flat[i], marker, color=HIGHLIGHT, markersize=8, markeredgecolor="white", zorder=7)
+        ax.plot(*flat[i], marker, color=palette.HIGHLIGHT, markersize=8, markeredgecolor="white", zorder=7)
     ax.margins(0.04)
 
 
@@ -105,20 +87,24 @@ def _floor(ax: Axes, points: Reals) -> None:
     high = np.ceil(np.maximum(points.max(axis=0), 200) / 200) * 200
     lines = [[(x, low[1], 0), (x, high[1], 0)] for x in np.arange(low[0], high[0] + 1, 200)]
     lines += [[(low[0], y, 0), (high[0], y, 0)] for y in np.arange(low[1], high[1] + 1, 200)]
-    ax.add_collection(LineCollection(list(project(np.array(lines, float))), colors=GRID, linewidths=0.7, zorder=0))
+    ax.add_collection(
+        LineCollection(list(project(np.array(lines, float))), colors=palette.GRID, linewidths=0.7, zorder=0)
+    )
     corner = np.array([low[0], low[1], 0.0])
     for k, name in enumerate("xyz"):
         tip = corner + 200.0 * np.eye(3)[k]
-        ax.plot(*project(np.stack([corner, tip])).T, color=BODY, linewidth=1.6, zorder=1)
+        ax.plot(*project(np.stack([corner, tip])).T, color=palette.BODY, linewidth=1.6, zorder=1)
         label = name if k else tr("x (squares: 200 mm)")
         x, y = project(corner + 235.0 * np.eye(3)[k])
-        ax.text(x, y, label, fontsize=8, color=MUTED, ha="center", va="center")
+        ax.text(x, y, label, fontsize=8, color=palette.MUTED, ha="center", va="center")
 
 
 def _coloured(ax: Axes, points: Reals, condition: Reals) -> None:
     segments = np.stack([points[:-1], points[1:]], axis=1)
     known = ~np.isnan(condition[:-1])
-    ax.add_collection(LineCollection(list(segments[~known]), colors=MUTED, linewidths=2, linestyles=":", zorder=3))
+    ax.add_collection(
+        LineCollection(list(segments[~known]), colors=palette.MUTED, linewidths=2, linestyles=":", zorder=3)
+    )
     lines = LineCollection(list(segments[known]), cmap=PATH_COLOURS, norm=CONDITION_SCALE, linewidths=4, zorder=4)
     lines.set_array(np.minimum(condition[:-1][known], 1e12))
     lines.set_rasterized(True)
@@ -128,7 +114,7 @@ def _coloured(ax: Axes, points: Reals, condition: Reals) -> None:
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
-TYPE_COLOURS = {"wrist": COLOURS[4], "elbow": COLOURS[2], "shoulder": COLOURS[3]}
+TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
 LEFT, BOTTOM, TOP = 0.055, 0.07, 0.925
 COLUMNS, GAP = (0.275, 0.275, 0.265), 0.06
 FONT = 9.0
@@ -155,7 +141,12 @@ class PathFigure:
             column[-1].set_xlabel(tr("time (s)"), fontsize=FONT)
 
     def draw(
-        self, robot: Robot, path: PathSummary, rows: PathChecks, motions: AvoidanceRows, near: NearThresholds
+        self,
+        robot: Robot,
+        path: model.PathSummary,
+        rows: model.PathChecks,
+        motions: model.AvoidanceRows,
+        near: model.NearThresholds,
     ) -> str:
         """The figure of a path as the data address of an image."""
         for ax in self.figure.axes:
@@ -204,11 +195,11 @@ def _clear(ax: Axes) -> None:
     ax.autoscale(True)
 
 
-def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: PathChecks) -> None:
+def _joint_curves(axes: list[Axes], robot: Robot, path: model.PathSummary, rows: model.PathChecks) -> None:
     for ax, name in zip(axes, ("q_deg", "q_deg_s", "q_deg_s2")):
         values = getattr(rows, name)
         for j in range(values.shape[1]):
-            ax.plot(rows.t_s, values[:, j], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j])
+            ax.plot(rows.t_s, values[:, j], color=palette.JOINTS[j], linewidth=WIDTHS[j], label=palette.JOINT_NAMES[j])
         ax.set_ylabel(axis_label(rows, name), fontsize=FONT)
         if name == "q_deg":
             _limits(ax, robot, values)
@@ -216,7 +207,7 @@ def _joint_curves(axes: list[Axes], robot: Robot, path: PathSummary, rows: PathC
             _cut(ax, values)
 
 
-def _distances(ax: Axes, rows: PathChecks, near: NearThresholds) -> None:
+def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> None:
     """Distance from each singular set, in parts of the distance below which a pass counts as near."""
     curves: tuple[tuple[SingularityType, Reals, float], ...] = (
         ("wrist", rows.wrist_deg, near.wrist_deg),
@@ -225,16 +216,16 @@ def _distances(ax: Axes, rows: PathChecks, near: NearThresholds) -> None:
     )
     for kind, distance, threshold in curves:
         ratio = np.maximum(np.abs(distance) / threshold, 1e-4)
-        ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=type_word(kind))
-    ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
+        ax.plot(rows.t_s, ratio, color=TYPE_COLOURS[kind], label=singularity_word(kind))
+    ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
     _logarithmic(ax, 0.01, 100.0)
     ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
     _key(ax, "lower left")
 
 
-def _condition(ax: Axes, rows: PathChecks) -> None:
+def _condition(ax: Axes, rows: model.PathChecks) -> None:
     values = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
-    ax.plot(rows.t_s, values, color=MODEL)
+    ax.plot(rows.t_s, values, color=palette.MODEL)
     _logarithmic(ax, 1.0, min(1e6, 2 * np.nanmax(np.append(values, 50.0))))
     ax.set_ylabel(tr("condition number"), fontsize=FONT)
 
@@ -250,25 +241,28 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
 
 
-def _small_measures(ax: Axes, rows: PathChecks) -> None:
-    ax.plot(rows.t_s, rows.smallest_singular_value, color=REFERENCE, label=tr("smallest singular value"))
-    ax.plot(rows.t_s, rows.manipulability, color=MODEL, label=tr("manipulability"))
+def _small_measures(ax: Axes, rows: model.PathChecks) -> None:
+    ax.plot(rows.t_s, rows.smallest_singular_value, color=palette.REFERENCE, label=tr("smallest singular value"))
+    ax.plot(rows.t_s, rows.manipulability, color=palette.MODEL, label=tr("manipulability"))
     most = np.nanmax([*rows.smallest_singular_value, *rows.manipulability, 0.0])
     ax.set_ylim(0, 1.35 * most if most > 0 else 1)
     ax.set_ylabel(tr("measure"), fontsize=FONT)
     _key(ax, "upper left")
 
 
-def _effort(ax: Axes, path: PathSummary, rows: PathChecks, motions: AvoidanceRows) -> None:
+def _effort(ax: Axes, path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> None:
     """The joints' largest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
-    ax.plot(rows.t_s / rows.t_s[-1], rows.speed_ratio, color=HIGHLIGHT, label=tr("as programmed"))
+    ax.plot(rows.t_s / rows.t_s[-1], rows.speed_ratio, color=palette.HIGHLIGHT, label=tr("as programmed"))
     shown = [rows.speed_ratio]
-    for name, colour, label in ((path.strategy, MODEL, tr("repaired")), (FASTEST, MUTED, tr("at its fastest"))):
+    for name, colour, label in (
+        (path.strategy, palette.MODEL, tr("repaired")),
+        (model.FASTEST, palette.MUTED, tr("at its fastest")),
+    ):
         part = motions.take(motions.strategy == name)
         if len(part):
             ax.plot(part.t_s / (part.t_s[-1] or np.nan), part.speed_ratio, color=colour, label=label, linewidth=1.3)
             shown.append(part.speed_ratio)
-    ax.axhline(1.0, color=INK, linewidth=1, linestyle="--")
+    ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
     size = np.concatenate(shown)
     most = np.nanmax(size) if np.isfinite(size).any() else 1.0
     ax.set_ylim(0, 1.35 * max(1.0, most) if path.joint_speed_bounded else 3.0)
@@ -291,9 +285,11 @@ def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:
     for j in np.flatnonzero(~robot.continuous):
         for limit, gap, side in ((lower[j], low[j] - lower[j], "top"), (upper[j], upper[j] - high[j], "bottom")):
             if gap < NEAR_LIMIT_DEG:
-                ax.axhline(limit, color=COLOURS[j], linestyle="--", linewidth=1)
-                text = tr("limit of {joint}", joint=JOINT_NAMES[j])
-                ax.text(0.01, limit, text, transform=ax.get_yaxis_transform(), va=side, fontsize=8, color=COLOURS[j])
+                ax.axhline(limit, color=palette.JOINTS[j], linestyle="--", linewidth=1)
+                text = tr("limit of {joint}", joint=palette.JOINT_NAMES[j])
+                ax.text(
+                    0.01, limit, text, transform=ax.get_yaxis_transform(), va=side, fontsize=8, color=palette.JOINTS[j]
+                )
                 ax.margins(y=0.18)
 
 
@@ -306,35 +302,39 @@ def _cut(ax: Axes, values: Reals) -> None:
         ax.text(0.99, 0.04, tr("cut: grows without bound"), transform=ax.transAxes, ha="right", fontsize=8)
 
 
-def _shades(path: PathSummary) -> list[tuple[tuple[Stretch[Any], ...], str, float, str]]:
+def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch[Any], ...], str, float, str]]:
     """Stretches that are wrong, with the colour, opacity and name of their shade."""
-    shades: list[tuple[tuple[Stretch[Any], ...], str, float, str]] = [
-        (path.out_of_limits, VERDICTS["caution"], 0.16, tr("outside a joint limit")),
-        (path.too_fast, VERDICTS["fail"], 0.14, tr("joint too fast")),
-        (path.unreachable, INK, 0.14, tr("not reachable")),
-        (path.collisions, VERDICTS["fail"], 0.3, tr("collision")),
+    shades: list[tuple[tuple[model.Stretch[Any], ...], str, float, str]] = [
+        (path.out_of_limits, palette.VERDICTS["caution"], 0.16, tr("outside a joint limit")),
+        (path.too_fast, palette.VERDICTS["fail"], 0.14, tr("joint too fast")),
+        (path.unreachable, palette.INK, 0.14, tr("not reachable")),
+        (path.collisions, palette.VERDICTS["fail"], 0.3, tr("collision")),
     ]
     return [shade for shade in shades if shade[0]]
 
 
-def _mark(ax: Axes, path: PathSummary) -> None:
+def _mark(ax: Axes, path: model.PathSummary) -> None:
     for stretches, colour, alpha, _ in _shades(path):
         for part in stretches:
             ax.axvspan(part.t0_s, part.t1_s, color=colour, alpha=alpha, linewidth=0)
     for event in path.singularities:
-        ax.axvline(event.t_s, color=HIGHLIGHT, linestyle=EVENT_STYLES[event.crossing], linewidth=1.4)
+        ax.axvline(event.t_s, color=palette.HIGHLIGHT, linestyle=EVENT_STYLES[event.crossing], linewidth=1.4)
         at = (event.t_s, 1.0)
-        ax.plot(*at, "v", color=HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5)
+        ax.plot(
+            *at, "v", color=palette.HIGHLIGHT, markersize=6, transform=ax.get_xaxis_transform(), clip_on=False, zorder=5
+        )
 
 
-def _legend(path: PathSummary) -> list[Line2D | Patch]:
+def _legend(path: model.PathSummary) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=COLOURS[j], linewidth=WIDTHS[j], label=JOINT_NAMES[j])
-        for j in range(len(path.max_joint_speed_deg_s or JOINT_NAMES[:6]))
+        Line2D([], [], color=palette.JOINTS[j], linewidth=WIDTHS[j], label=palette.JOINT_NAMES[j])
+        for j in range(len(path.max_joint_speed_deg_s or palette.JOINT_NAMES[:6]))
     ]
     for crossing, label in ((True, tr("singular")), (False, tr("near-singular"))):
         if any(event.crossing == crossing for event in path.singularities):
-            handles.append(Line2D([], [], color=HIGHLIGHT, label=label, linestyle=EVENT_STYLES[crossing], marker="v"))
+            handles.append(
+                Line2D([], [], color=palette.HIGHLIGHT, label=label, linestyle=EVENT_STYLES[crossing], marker="v")
+            )
     handles += [Patch(color=colour, alpha=2 * alpha, label=label) for _, colour, alpha, label in _shades(path)]
     return handles
 
@@ -342,7 +342,7 @@ def _legend(path: PathSummary) -> list[Line2D | Patch]:
 CLEARANCE_COLUMNS = 4
 ROW_HEIGHT = 1.5
 
-Measured = tuple[PathSummary, MinClearance]
+Measured = tuple[model.PathSummary, model.MinClearance]
 
 
 @dataclass(frozen=True)
@@ -353,7 +353,7 @@ class ClearanceSection:
     rows: list[list[str]]
 
 
-def clearance_section(results: TrajectoryResults, most: int) -> ClearanceSection:
+def clearance_section(results: model.TrajectoryResults, most: int) -> ClearanceSection:
     """What the section needs; at most so many paths, those with the smallest clearance, are drawn."""
     paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
     if not paths:
@@ -373,11 +373,11 @@ def clearance_section(results: TrajectoryResults, most: int) -> ClearanceSection
     return ClearanceSection(Picture(_curves(drawn, results), alt, caption), [_row(*measured) for measured in paths])
 
 
-def _row(path: PathSummary, least: MinClearance) -> list[str]:
+def _row(path: model.PathSummary, least: model.MinClearance) -> list[str]:
     return [path.name, fixed(least.least_mm, 1), fixed(least.t_s, 3), say(least.between), str(least.poses_measured)]
 
 
-def _curves(paths: list[Measured], results: TrajectoryResults) -> Figure:
+def _curves(paths: list[Measured], results: model.TrajectoryResults) -> Figure:
     rows = results.clearance
     count = -(-len(paths) // CLEARANCE_COLUMNS)
     figure, axes = new_figure(
@@ -386,13 +386,15 @@ def _curves(paths: list[Measured], results: TrajectoryResults) -> Figure:
     for ax, (path, least) in zip(axes.flat, paths):
         part = rows.take(rows.path == path.name)
         t, clearance = part.t_s, part.clearance_mm
-        ax.plot(t, clearance, color=MODEL)
-        ax.fill_between(t, clearance, 0, where=clearance < 0, color=VERDICTS["fail"], alpha=0.5, interpolate=True)
-        ax.axhline(0, color=INK, linewidth=0.8)
-        colour = VERDICTS["fail"] if least.least_mm <= 0 else INK
+        ax.plot(t, clearance, color=palette.MODEL)
+        ax.fill_between(
+            t, clearance, 0, where=clearance < 0, color=palette.VERDICTS["fail"], alpha=0.5, interpolate=True
+        )
+        ax.axhline(0, color=palette.INK, linewidth=0.8)
+        colour = palette.VERDICTS["fail"] if least.least_mm <= 0 else palette.INK
         ax.plot(least.t_s, least.least_mm, "o", color=colour, markersize=4)
         for gap in path.unreachable:
-            ax.axvspan(gap.t0_s, gap.t1_s, color=MUTED, alpha=0.25, linewidth=0)
+            ax.axvspan(gap.t0_s, gap.t1_s, color=palette.MUTED, alpha=0.25, linewidth=0)
         ax.set_title(path.name, fontsize=9)
         ax.set_xlim(0, path.duration_s)
     for ax in axes.flat[len(paths) :]:
@@ -413,7 +415,7 @@ MOST_ARMS = 3
 
 
 def in_space(
-    robot: Robot, results: TrajectoryResults, paths: Sequence[PathSummary], scene: Scene | None = None
+    robot: Robot, results: model.TrajectoryResults, paths: Sequence[model.PathSummary], scene: Scene | None = None
 ) -> Markup:
     """Paths in their scene, the arm at their ends and at singular poses, in a figure that turns; a list has all."""
     checks, motions, groups = results.checks, results.avoidance, {}
@@ -427,7 +429,9 @@ def in_space(
     return turning_figure(groups, ColourScale("viridis_r", tr("condition number"), ticks), first)
 
 
-def _layers(robot: Robot, path: PathSummary, rows: PathChecks, repaired: AvoidanceRows) -> Iterator[Layer]:
+def _layers(
+    robot: Robot, path: model.PathSummary, rows: model.PathChecks, repaired: model.AvoidanceRows
+) -> Iterator[Layer]:
     events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
     kept = np.unique(np.concatenate([np.linspace(0, len(rows) - 1, POINTS).astype(int), events]).astype(int))
     condition = np.nan_to_num(np.log10(np.minimum(rows.condition_number[kept], 1e6)), nan=LOG_RANGE[0])
@@ -437,22 +441,22 @@ def _layers(robot: Robot, path: PathSummary, rows: PathChecks, repaired: Avoidan
     if not reached.all():
         out = np.where(reached[:, None], np.nan, rows.xyz_mm)[kept]
         yield Layer(tr("not reachable"), "line", out, "#888888", 6.0)
-    faults: list[tuple[Stretch[Any], str, str]] = [(part, "fail", tr("collision")) for part in path.collisions]
+    faults: list[tuple[model.Stretch[Any], str, str]] = [(part, "fail", tr("collision")) for part in path.collisions]
     faults += [(part, "caution", tr("outside a joint limit")) for part in path.out_of_limits]
     for part, status, name in faults:
         during = kept[(rows.t_s[kept] >= part.t0_s) & (rows.t_s[kept] <= part.t1_s)]
         if len(during):
-            yield Layer(name, "line", rows.xyz_mm[during], VERDICTS[status], 6.0)
+            yield Layer(name, "line", rows.xyz_mm[during], palette.VERDICTS[status], 6.0)
     if len(repaired):
-        yield Layer(tr("repaired"), "line", repaired.xyz_mm, MODEL, 2.5)
+        yield Layer(tr("repaired"), "line", repaired.xyz_mm, palette.MODEL, 2.5)
     q = meant(robot, rows.q_deg)
     index = np.flatnonzero(reached)
     last = tr("arm at the end") if reached.all() else tr("arm at the last point reached")
-    for k, name, colour in ((index[:1], tr("arm at the start"), ""), (index[-1:], last, LINK)):
+    for k, name, colour in ((index[:1], tr("arm at the start"), ""), (index[-1:], last, palette.LINK)):
         for i in k:
             yield Layer(name, "line", 1000 * skeleton(robot, q[i]), colour, 5.0)
     for event, i in list(zip(path.singularities, events))[:MOST_ARMS]:
         if reached[i]:
             singular = tr("{type}, t = {t:.3f} s", type=event_word(event), t=event.t_s)
             name = singular if event.crossing else tr("near {singular}", singular=singular)
-            yield Layer(name, "line", 1000 * skeleton(robot, q[i]), HIGHLIGHT, 3.0)
+            yield Layer(name, "line", 1000 * skeleton(robot, q[i]), palette.HIGHLIGHT, 3.0)

@@ -11,7 +11,6 @@ import rerun as rr
 from matplotlib import colormaps
 from matplotlib.colors import LogNorm
 
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.expectations import outcome_word
@@ -27,7 +26,6 @@ from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escap
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
-STAGE = "trajectory"
 FRAMES_PER_SECOND = 50
 TRAIL_POINTS = 60
 GHOST_ALPHA = 110
@@ -56,15 +54,15 @@ Press play: the arm runs along one path after another.
 
 def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
     """Write the trajectory recording of a robot."""
-    robot, results, scene = study.robot(stored.robot), stored.results, study.scene(stored.robot, STAGE)
+    robot, results = study.robot(stored.robot), stored.results
     shown = Recorded(
         robot=robot,
         name=stored.robot,
-        stage=STAGE,
+        stage=stored.stage,
         note=NOTE.format(title=escaped(robot.title), findings=say_all(results.summary.verdict.findings)),
         runs=[run for path in results.summary.paths for run in _runs(robot, results, path)],
         curves=CURVES,
-        scene=load_scene(scene) if scene else None,
+        scene=study.scene(stored.robot, stored.stage),
         views={"Arm and path": ["**"]},
         points=[results.checks.xyz_mm / 1000],
         now="This path",

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import (
-    FIGURES,
     cause_text,
     event_distance,
     event_word,
@@ -26,26 +24,14 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.trajectory.model import (
-    AvoidanceRows,
-    LimitsUsed,
-    NearThresholds,
-    PathChecks,
-    PathSummary,
-    ProgramFiles,
-    Singularity,
-    StrategyMotion,
-    TrajectoryResults,
-    TrajectorySummary,
-    TriedStrategy,
-)
+from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
 from er3a.pipeline.stages.trajectory.played import WEIGHTS, kinds, motions, near_assumed, path_advice, worst_first
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import head_of, packed_text, render, run_command
+from er3a.pipeline.viewing.page import packed_text, render_stage
 from er3a.programs.languages import titles_unwritten
 from er3a.robots.robot import Robot
 
@@ -80,7 +66,7 @@ class ProgramLink:
 class PathSection:
     """A path on the page: the record, and what it says in the page's language."""
 
-    path: PathSummary
+    path: model.PathSummary
     status: str
     verdict: str
     kind: str
@@ -97,12 +83,11 @@ class PathSection:
     figure: PathDrawing | None
 
 
-def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) -> None:
     """Write the trajectory page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
     summary, checks, avoidance = results.summary, results.checks, results.avoidance
     scene = study.scene(stored.robot, stored.stage)
-    solids = load_scene(scene) if scene else None
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
     paths = worst_first(summary.paths)
@@ -112,36 +97,33 @@ def report(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
         sections.append(_section(path, rows, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES, {path.name: f"#{path.name}" for path in summary.paths}),
-        command=run_command(study, f"{stored.robot}/trajectory.html"),
-        robot=robot,
-        robot_pages=study.pages(stored.robot),
+        head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results, count),
         assumed=assumed,
         drawn_paths=count,
-        turning=in_space(robot, results, paths[:count], solids),
-        player=player(robot, motions(robot, results), solids),
+        turning=in_space(robot, results, paths[:count], scene),
+        player=player(robot, motions(robot, results), scene),
         drawing_head=drawing_head(),
     )
 
 
-def _programs(rows: ProgramFiles) -> list[ProgramLink]:
+def _programs(rows: model.ProgramFiles) -> list[ProgramLink]:
     texts = zip(rows.file.tolist(), rows.text.tolist())
     return [ProgramLink(file, packed_text(text), not text) for file, text in texts]
 
 
 def _section(
-    path: PathSummary,
-    rows: PathChecks,
+    path: model.PathSummary,
+    rows: model.PathChecks,
     figure: PathDrawing | None,
     programs: list[ProgramLink],
-    summary: TrajectorySummary,
+    summary: model.TrajectorySummary,
 ) -> PathSection:
     near = near_assumed(path, summary)
     only_assumed = WEIGHTS[path.verdict] == "plain" and near
@@ -164,12 +146,17 @@ def _section(
     )
 
 
-def _repairs(path: PathSummary, program: ProgramLink) -> bool:
+def _repairs(path: model.PathSummary, program: ProgramLink) -> bool:
     return program.file.rpartition(".")[0] == repair_name(path.name)
 
 
 def _figure(
-    figure: PathFigure, robot: Robot, path: PathSummary, rows: PathChecks, motions: AvoidanceRows, near: NearThresholds
+    figure: PathFigure,
+    robot: Robot,
+    path: model.PathSummary,
+    rows: model.PathChecks,
+    motions: model.AvoidanceRows,
+    near: model.NearThresholds,
 ) -> PathDrawing:
     alt = tr(
         "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
@@ -182,7 +169,7 @@ def _figure(
     return PathDrawing(uri, alt, _conclusion(path, rows), width, figure.panels(), readings(figure.figure))
 
 
-def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
+def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
     """The rows that a curve needs: evenly spread ones, those at singular poses, and the maximum speeds."""
     even = np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round()
     events = [int(np.argmin(np.abs(rows.t_s - event.t_s))) for event in path.singularities]
@@ -191,7 +178,7 @@ def _drawn(path: PathSummary, rows: PathChecks) -> PathChecks:
     return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def _faults(path: PathSummary) -> list[list[str]]:
+def _faults(path: model.PathSummary) -> list[list[str]]:
     return [
         [
             word,
@@ -207,7 +194,7 @@ def _faults(path: PathSummary) -> list[list[str]]:
     ]
 
 
-def _strategies(path: PathSummary) -> list[list[str]]:
+def _strategies(path: model.PathSummary) -> list[list[str]]:
     """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
     if not path.avoidance:
         return []
@@ -227,7 +214,7 @@ def _strategies(path: PathSummary) -> list[list[str]]:
     return rows
 
 
-def _costs(motion: StrategyMotion) -> list[str]:
+def _costs(motion: model.StrategyMotion) -> list[str]:
     return [
         _small(motion.max_deviation_mm),
         _small(motion.max_deviation_deg),
@@ -242,7 +229,7 @@ def _clearance(value: float | None) -> str:
     return "–" if value is None else fixed(value, 0)
 
 
-def _remark(tried: TriedStrategy, motion: StrategyMotion) -> str:
+def _remark(tried: model.TriedStrategy, motion: model.StrategyMotion) -> str:
     if tried.reasons:
         return tr("not usable: {reason}", reason=reasons(tried))
     if tried.name == "detour":
@@ -258,7 +245,7 @@ def _small(value: float) -> str:
     return "0" if value < 5e-4 else number(value, 3)
 
 
-def _conclusion(path: PathSummary, rows: PathChecks) -> str:
+def _conclusion(path: model.PathSummary, rows: model.PathChecks) -> str:
     """What the curves show, in one or two sentences."""
     condition, parts = rows.condition_number, []
     joint = path.fastest_joint
@@ -277,7 +264,7 @@ def _conclusion(path: PathSummary, rows: PathChecks) -> str:
     return " ".join(parts)
 
 
-def _speed(path: PathSummary, limits: LimitsUsed) -> str:
+def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
     """The speed of the joint that comes nearest to its limit."""
     speeds = path.max_joint_speed_deg_s
     if not speeds:
@@ -287,7 +274,7 @@ def _speed(path: PathSummary, limits: LimitsUsed) -> str:
     return f"{number(speeds[joint], 3)}{unit} (J{joint + 1})"
 
 
-def _event_row(path: str, event: Singularity) -> list[str]:
+def _event_row(path: str, event: model.Singularity) -> list[str]:
     until = f" – {fixed(event.until_s, 6)}" if event.until_s > event.t_s else ""
     when = moment(path, event.t_s, fixed(event.t_s, 6) + until)
     if event.crossing:

@@ -25,57 +25,11 @@ from er3a.identifiability.statements import (
     is_unexplained,
     not_the_robot_described,
 )
-from er3a.kinematics.round_trips import (
-    MOST_BY_CLASS,
-    NEAR_ELBOW_DEG,
-    NEAR_SHOULDER_MM,
-    NEAR_WRIST_DEG,
-    batch_round_trips,
-    has_class,
-    slot_round_trips,
-)
+from er3a.kinematics import round_trips
 from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
-from er3a.pipeline.stages.validation.model import (
-    AnotherArm,
-    Axes,
-    Check,
-    Claims,
-    Confirmed,
-    Conflict,
-    Contradicted,
-    Contradiction,
-    DefinedOtherwise,
-    KeyPoses,
-    LeftOpen,
-    LikelyFault,
-    Margins,
-    ModelCheck,
-    ModelGroup,
-    ModelUnsound,
-    NearSingularLeftOut,
-    NoClosedForm,
-    Note,
-    NothingToCompare,
-    NotInRobotFile,
-    NotOfThisArm,
-    NumbersMissing,
-    PartFound,
-    ReferenceCheck,
-    RoundTripErrors,
-    SelfCheck,
-    SelfChecked,
-    SetDiagnosis,
-    SetHasNoData,
-    SetSummary,
-    SourceGivesNone,
-    Statement,
-    TableEvidence,
-    Unjudged,
-    Validated,
-    WholeGroup,
-)
+from er3a.pipeline.stages.validation import model
 from er3a.references.quantities import Limit, Quantity, Speed
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow
@@ -87,21 +41,21 @@ SIX_TURN = (False,) * 6
 
 
 def against_itself(
-    quantity: SelfChecked,
-    group: ModelGroup,
+    quantity: model.SelfChecked,
+    group: model.ModelGroup,
     measured: float,
     tolerance: float,
     unit: str = "",
-    note: NearSingularLeftOut | None = None,
-) -> ModelCheck:
+    note: model.NearSingularLeftOut | None = None,
+) -> model.ModelCheck:
     """A check that needs no document: ``measured`` should be 0."""
     status: Literal["pass", "fail"] = "pass" if abs(measured) <= tolerance else "fail"
-    return ModelCheck(measured, 0.0, measured, tolerance, unit, SelfCheck(quantity), group, status, note)
+    return model.ModelCheck(measured, 0.0, measured, tolerance, unit, model.SelfCheck(quantity), group, status, note)
 
 
 def checks_of_set(
     references: ReferenceSet, values: Reals, bases: Sequence[CheckBasis], slides: Sequence[bool] | Flags = SIX_TURN
-) -> tuple[list[Check], list[Conflict]]:
+) -> tuple[list[model.Check], list[model.Conflict]]:
     """Judge a model's values (n,) of the set's checkable references, and list what was set aside and what the set says
     nothing about.
 
@@ -110,7 +64,7 @@ def checks_of_set(
     stated = _Stated(references.name, references.checkable, values, bases)
     checks = [stated.check(i) for i in range(len(values))]
     aside = [
-        _without_value(references.name, reference, NotOfThisArm(why, len(slides)))
+        _without_value(references.name, reference, model.NotOfThisArm(why, len(slides)))
         for row, why in references.set_aside
         for reference in row.references()
     ]
@@ -132,12 +86,12 @@ class _Stated:
         self.met = np.abs(values - self.expected) <= self.tolerance + ROUNDING
         self.pairs = conflicts(references)
 
-    def check(self, i: int) -> Check:
+    def check(self, i: int) -> model.Check:
         """The check of a reference; not judged where the robot's file gives no value."""
         reference, value, expected = self.references[i], float(self.values[i]), float(self.expected[i])
         if math.isnan(value):
-            return _without_value(self.set_name, reference, NotInRobotFile())
-        return ReferenceCheck(
+            return _without_value(self.set_name, reference, model.NotInRobotFile())
+        return model.ReferenceCheck(
             measured=value,
             expected=expected,
             difference=value - expected,
@@ -153,17 +107,17 @@ class _Stated:
             independent_of=self.bases[i].independent_of,
         )
 
-    def conflicts(self) -> list[Conflict]:
+    def conflicts(self) -> list[model.Conflict]:
         """What the references contradict each other about."""
         members: dict[Quantity, set[int]] = {}
         for pair in self.pairs:
             members.setdefault(self.references[pair[0]].quantity, set()).update(pair)
         return [self._conflict(sorted(rows)) for rows in members.values()]
 
-    def _conflict(self, rows: list[int]) -> Conflict:
+    def _conflict(self, rows: list[int]) -> model.Conflict:
         first = self.references[rows[0]]
         statements = tuple(
-            Statement(
+            model.Statement(
                 expected=float(self.expected[i]),
                 tolerance=self.references[i].uncertainty,
                 difference=float(self.values[i] - self.expected[i]),
@@ -173,7 +127,7 @@ class _Stated:
             )
             for i in rows
         )
-        return Conflict(self.set_name, first.subject, first.unit, float(self.values[rows[0]]), statements)
+        return model.Conflict(self.set_name, first.subject, first.unit, float(self.values[rows[0]]), statements)
 
     def _status(self, i: int) -> Literal["pass", "fail", "conflict"]:
         if self.met[i]:
@@ -184,8 +138,8 @@ class _Stated:
         return "conflict" if excused else "fail"
 
 
-def _without_value(set_name: str, reference: Reference, note: Note) -> Unjudged:
-    return Unjudged(
+def _without_value(set_name: str, reference: Reference, note: model.Note) -> model.Unjudged:
+    return model.Unjudged(
         reference.subject,
         reference.group,
         reference.unit,
@@ -196,25 +150,27 @@ def _without_value(set_name: str, reference: Reference, note: Note) -> Unjudged:
     )
 
 
-def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[Unjudged]:
+def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[model.Unjudged]:
     """What the set says nothing about."""
-    name, note = references.name, SetHasNoData(references.name)
+    name, note = references.name, model.SetHasNoData(references.name)
     stated = {reference.quantity for reference in references.checkable}
     gaps = [
-        _without_value(name, reference, SourceGivesNone())
+        _without_value(name, reference, model.SourceGivesNone())
         for reference in references.references
         if reference.expected is None and reference.quantity not in stated
     ]
     present = {reference.group for reference in references.references}
     gaps += [
-        Unjudged(WholeGroup(group), group, "", note, reference_set=name) for group in GROUPS if group not in present
+        model.Unjudged(model.WholeGroup(group), group, "", note, reference_set=name)
+        for group in GROUPS
+        if group not in present
     ]
     subjects = {each.subject for each in references.references}
     subjects |= {each.subject for row, _ in references.set_aside for each in row.references()}
     with_axis = {row.joint for row in references.of(AxisRow)}
     for joint in range(1, len(slides) + 1):
         if "axes" in present and joint not in with_axis:
-            gaps.append(Unjudged(AxisPosition(joint, None), "axes", "mm", note, reference_set=name))
+            gaps.append(model.Unjudged(AxisPosition(joint, None), "axes", "mm", note, reference_set=name))
         wanted: list[tuple[str, ReferenceSubject]] = [
             ("limits", JointLimit(joint, "lower")),
             ("limits", JointLimit(joint, "upper")),
@@ -222,7 +178,7 @@ def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[Unju
         ]
         units = ("mm", "mm/s") if slides[joint - 1] else (Limit.unit, Speed.unit)
         gaps += [
-            Unjudged(subject, group, units[group == "speeds"], note, reference_set=name)
+            model.Unjudged(subject, group, units[group == "speeds"], note, reference_set=name)
             for group, subject in wanted
             if group in present and subject not in subjects
         ]
@@ -237,13 +193,13 @@ WIDEST_IN_RADIANS = 2.01 * np.pi
 GROUP: Literal["round_trips"] = "round_trips"
 
 
-def table_checks(robot: Robot) -> list[Check]:
+def table_checks(robot: Robot) -> list[model.Check]:
     """Checks of the table alone: sound numbers in plausible units, and whether a closed-form inverse applies to it."""
     parts = [robot.a, robot.alpha, robot.d, robot.offset, robot.lower, robot.upper, robot.base]
     limits = np.abs([robot.lower, robot.upper])
     lengths = np.concatenate([np.abs([robot.a, robot.d]).ravel(), limits[:, robot.slides].ravel()])
     turning = limits[:, ~robot.slides & ~robot.continuous]
-    faults: dict[SelfChecked, int] = {
+    faults: dict[model.SelfChecked, int] = {
         "numbers_not_finite": sum(int((~np.isfinite(part)).sum()) for part in parts),
         "crossed_limits": int((robot.lower > robot.upper).sum()),
         "odd_directions": int((np.abs(robot.direction) != 1).sum()),
@@ -251,18 +207,18 @@ def table_checks(robot: Robot) -> list[Check]:
         "limit_unit": int(turning.shape[1] > 1 and 0 < np.degrees(np.nanmax(turning)) < WIDEST_IN_RADIANS),
     }
     checks = [against_itself(name, "table_sanity", float(count), 0.5) for name, count in faults.items()]
-    missing = NumbersMissing() if checks[0].status == "fail" else closed_form_missing(robot)
+    missing = model.NumbersMissing() if checks[0].status == "fail" else closed_form_missing(robot)
     if missing:
-        return [*checks, Unjudged(SelfCheck("closed_form"), "table_sanity", "", missing)]
+        return [*checks, model.Unjudged(model.SelfCheck("closed_form"), "table_sanity", "", missing)]
     return [*checks, against_itself("closed_form", "table_sanity", 0.0, 0.5)]
 
 
-def _class_checks(robot: Robot, poses: int, seed: int) -> list[Check]:
+def _class_checks(robot: Robot, poses: int, seed: int) -> list[model.Check]:
     """Round trips of an arm without the closed form of spherical wrists, by its class."""
     missing = closed_form_missing(robot)
-    if missing and not has_class(robot):
-        return [Unjudged(SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", NoClosedForm(missing))]
-    found = batch_round_trips(robot, np.random.default_rng(seed), poses)
+    if missing and not round_trips.has_class(robot):
+        return [model.Unjudged(model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", model.NoClosedForm(missing))]
+    found = round_trips.batch_round_trips(robot, np.random.default_rng(seed), poses)
     return [
         against_itself("unsolved_poses", GROUP, float(found.poses - found.own_found), 0.5),
         against_itself("position_error", GROUP, found.worst_position * 1000, POSITION_TOLERANCE_MM, "mm"),
@@ -272,27 +228,29 @@ def _class_checks(robot: Robot, poses: int, seed: int) -> list[Check]:
     ]
 
 
-def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[Check], RoundTripErrors | None]:
+def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.Check], model.RoundTripErrors | None]:
     """Round trips as checks, and their errors; None if the arm has no closed form."""
     missing = closed_form_missing(robot)
     if missing or robot.coupling is not None:
-        return _class_checks(robot, min(poses, MOST_BY_CLASS), seed), None
-    found = slot_round_trips(robot, poses, seed)
-    note = NearSingularLeftOut(poses - found.near_singular, poses, NEAR_WRIST_DEG, NEAR_SHOULDER_MM)
-    checks: list[Check] = [
+        return _class_checks(robot, min(poses, round_trips.MOST_BY_CLASS), seed), None
+    found = round_trips.slot_round_trips(robot, poses, seed)
+    note = model.NearSingularLeftOut(
+        poses - found.near_singular, poses, round_trips.NEAR_WRIST_DEG, round_trips.NEAR_SHOULDER_MM
+    )
+    checks: list[model.Check] = [
         against_itself("unsolved_poses", GROUP, float(found.unsolved), 0.5),
         against_itself("joint_error", GROUP, found.joint_error_deg, JOINT_TOLERANCE_DEG, "deg", note),
         against_itself("position_error", GROUP, found.position_error_mm, POSITION_TOLERANCE_MM, "mm"),
         against_itself("orientation_error", GROUP, found.orientation_error_deg, ORIENTATION_TOLERANCE_DEG, "deg"),
     ]
-    margins = Margins(NEAR_WRIST_DEG, NEAR_ELBOW_DEG, NEAR_SHOULDER_MM)
-    return checks, RoundTripErrors(**asdict(found), margins=margins)
+    margins = model.Margins(round_trips.NEAR_WRIST_DEG, round_trips.NEAR_ELBOW_DEG, round_trips.NEAR_SHOULDER_MM)
+    return checks, model.RoundTripErrors(**asdict(found), margins=margins)
 
 
 OF_THE_TOOL: tuple[PartName, ...] = ("geometry", "zero_and_directions")
 
 
-def parts_found(evidence: Evidence) -> tuple[PartFound, ...]:
+def parts_found(evidence: Evidence) -> tuple[model.PartFound, ...]:
     """The parts of a table that its file gives."""
     statuses = {part.code: part.status for part in parts_of(evidence)}
     by_part: dict[PartName, list[EntryEvidence]] = {part: [] for part in PART_OF_GROUP.values()}
@@ -305,14 +263,14 @@ def parts_found(evidence: Evidence) -> tuple[PartFound, ...]:
     return tuple(_part(evidence, part, statuses[part], own) for part, own in by_part.items() if own)
 
 
-def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[EntryEvidence]) -> PartFound:
+def _part(evidence: Evidence, part: PartName, status: PartStatus, own: Sequence[EntryEvidence]) -> model.PartFound:
     def named(wanted: Status) -> tuple[str, ...]:
         return tuple(each.entry for each in own if each.status == wanted)
 
     off = reduce(ToolOff.worse, (each.off for each in own if each.status in ("weak", "open")), NOT_OFF)
     if part == "zero_and_directions" and named("open"):
         off = off.worse(together(evidence, list(named("open"))))
-    return PartFound(
+    return model.PartFound(
         part=part,
         status=status,
         entries=sum(each.status != "gauge" for each in own),
@@ -329,8 +287,12 @@ SHOWN_DECIMALS = 9
 
 
 def set_summaries(
-    robot: Robot, sets: list[ReferenceSet], checks: list[Check], poses: KeyPoses, diagnoses: Mapping[str, SetDiagnosis]
-) -> tuple[SetSummary, ...]:
+    robot: Robot,
+    sets: list[ReferenceSet],
+    checks: list[model.Check],
+    poses: model.KeyPoses,
+    diagnoses: Mapping[str, model.SetDiagnosis],
+) -> tuple[model.SetSummary, ...]:
     """What was found against each reference set; diagnoses by its name, as far as there are any."""
     found = []
     for references in sets:
@@ -340,7 +302,7 @@ def set_summaries(
         diagnosis = diagnoses.get(references.name)  # none of arms with prismatic or coupled joints
         conclusion = diagnosis.conclusion if diagnosis else None
         found.append(
-            SetSummary(
+            model.SetSummary(
                 name=references.name,
                 grades=tuple(sorted({reference.grade for reference in references.references})),
                 counts=counts,
@@ -354,19 +316,19 @@ def set_summaries(
 
 
 def verdict_of(
-    checks: list[Check],
-    conflicts: list[Conflict],
-    sets: tuple[SetSummary, ...],
-    diagnoses: Mapping[str, SetDiagnosis],
-    evidence: TableEvidence | None,
-) -> Verdict[Validated]:
+    checks: list[model.Check],
+    conflicts: list[model.Conflict],
+    sets: tuple[model.SetSummary, ...],
+    diagnoses: Mapping[str, model.SetDiagnosis],
+    evidence: model.TableEvidence | None,
+) -> Verdict[model.Validated]:
     """The stage's answer."""
-    documented = [check for check in checks if isinstance(check, ReferenceCheck) and check.is_authoritative]
+    documented = [check for check in checks if isinstance(check, model.ReferenceCheck) and check.is_authoritative]
     failed = [check for check in documented if check.status == "fail"]
     named = {
         name: diagnosis.conclusion
         for name, diagnosis in diagnoses.items()
-        if isinstance(diagnosis.conclusion, LikelyFault)
+        if isinstance(diagnosis.conclusion, model.LikelyFault)
     }
     common: dict[str, Any] = {
         "counts": counts_of(checks),
@@ -376,8 +338,8 @@ def verdict_of(
         "own_text": tuple(each.own_text for each in sets if each.own_text),
     }
     for check in checks:
-        if isinstance(check, ModelCheck) and check.status == "fail":
-            found = ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
+        if isinstance(check, model.ModelCheck) and check.status == "fail":
+            found = model.ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
             return Verdict("fail", found)
     if failed:
         every = evidence.entries if evidence else ()
@@ -385,7 +347,7 @@ def verdict_of(
         common |= {"grades": _grades(documented), "contradicted": tuple(each.entry for each in excluded)}
         return Verdict("fail", _missed(common, failed, sets, named))
     if not documented:
-        return Verdict("no_reference", NothingToCompare(**common))
+        return Verdict("no_reference", model.NothingToCompare(**common))
     contradiction = _contradiction(conflicts) if conflicts else None
     common |= {"contradiction": contradiction}
     parts = evidence.parts if evidence else ()
@@ -393,7 +355,7 @@ def verdict_of(
     if not moving or any(part.status != "settled" for part in moving):
         off = reduce(ToolOff.worse, (part.off for part in moving), NOT_OFF)
         entries = (*evidence.entries, *evidence.combinations) if evidence else ()
-        left = LeftOpen(
+        left = model.LeftOpen(
             **common,
             parts=parts,
             tolerance=evidence.tolerance if evidence else None,
@@ -403,10 +365,10 @@ def verdict_of(
             next_measurement=_next_measurement(evidence),
         )
         return Verdict("caution", left)
-    return Verdict("pass", Confirmed(**common, grades=_grades(documented)))
+    return Verdict("pass", model.Confirmed(**common, grades=_grades(documented)))
 
 
-def _next_measurement(evidence: TableEvidence | None) -> Proposal | None:
+def _next_measurement(evidence: model.TableEvidence | None) -> Proposal | None:
     """What would settle the entry for which the tool could be off farthest; of equals, what documents leave open."""
     if evidence is None:
         return None
@@ -419,13 +381,13 @@ def _next_measurement(evidence: TableEvidence | None) -> Proposal | None:
     return max(evidence.proposals, key=gravity, default=None)
 
 
-def counts_of(checks: Iterable[Check]) -> CheckCounts:
+def counts_of(checks: Iterable[model.Check]) -> CheckCounts:
     """Checks against references by what they rest on."""
-    referenced = [check for check in checks if isinstance(check, ReferenceCheck)]
+    referenced = [check for check in checks if isinstance(check, model.ReferenceCheck)]
     return count_checks([check.kind for check in referenced], [check.status for check in referenced])
 
 
-def most_telling(failed: list[ReferenceCheck]) -> ReferenceCheck:
+def most_telling(failed: list[model.ReferenceCheck]) -> model.ReferenceCheck:
     """The failed check to quote: of those not far behind the largest difference in mm, the first of the group that
     tells most."""
     lengths = [check for check in failed if check.unit == "mm"]
@@ -435,11 +397,11 @@ def most_telling(failed: list[ReferenceCheck]) -> ReferenceCheck:
 
 
 def key_figures(
-    checks: list[Check],
-    axes: Axes,
-    sets: tuple[SetSummary, ...],
+    checks: list[model.Check],
+    axes: model.Axes,
+    sets: tuple[model.SetSummary, ...],
     reach: Mapping[str, float],
-    trips: RoundTripErrors | None,
+    trips: model.RoundTripErrors | None,
 ) -> tuple[Figure, ...]:
     """The stage's key figures; ``reach`` in mm by the figure's name."""
     counts = counts_of(checks)
@@ -460,7 +422,9 @@ def key_figures(
         figures.append(_figure("farthest_axis", float(trusted.distance_mm.max())))
         figures.append(_figure("most_tilted_axis", float(trusted.angle_deg.max()), "deg"))
     labels = [
-        abs(check.difference) for check in checks if isinstance(check, ReferenceCheck) and check.group == "envelope"
+        abs(check.difference)
+        for check in checks
+        if isinstance(check, model.ReferenceCheck) and check.group == "envelope"
     ]
     if labels:
         figures.append(_figure("worst_drawing_label", max(labels)))
@@ -476,10 +440,10 @@ def _figure(name: str, value: float, unit: str = "mm") -> Figure:
 
 def _missed(
     common: dict[str, Any],
-    failed: list[ReferenceCheck],
-    sets: tuple[SetSummary, ...],
-    named: Mapping[str, LikelyFault],
-) -> Contradicted | AnotherArm | DefinedOtherwise:
+    failed: list[model.ReferenceCheck],
+    sets: tuple[model.SetSummary, ...],
+    named: Mapping[str, model.LikelyFault],
+) -> model.Contradicted | model.AnotherArm | model.DefinedOtherwise:
     quoted = most_telling(failed)
     common |= {
         "reference_set": quoted.reference_set,
@@ -491,31 +455,31 @@ def _missed(
     }
     own = next(each for each in sets if each.name == quoted.reference_set)
     if own.another_arm:
-        return AnotherArm(**common, described=own.described)
+        return model.AnotherArm(**common, described=own.described)
     found = named.get(quoted.reference_set)
     faults = () if found is None or isinstance(found, TooSmallToTell) else found.faults
     chosen = any(isinstance(fault, CONVENTIONS) for fault in faults)
     chosen &= all(isinstance(fault, (*CONVENTIONS, WrongLimit)) for fault in faults)
-    return DefinedOtherwise(**common) if chosen else Contradicted(**common)
+    return model.DefinedOtherwise(**common) if chosen else model.Contradicted(**common)
 
 
-def _zero_pose_error(poses: KeyPoses, set_name: str) -> float | None:
+def _zero_pose_error(poses: model.KeyPoses, set_name: str) -> float | None:
     own = (poses.reference_set == set_name) & (poses.group == "zero_pose") & (poses.point == "flange")
     own &= np.isfinite(poses.deviation_mm)
     return float(poses.deviation_mm[own].max()) if own.any() else None
 
 
-def _claims(sets: tuple[SetSummary, ...]) -> tuple[Claims, ...]:
+def _claims(sets: tuple[model.SetSummary, ...]) -> tuple[model.Claims, ...]:
     found = [(each.name, each.counts.claims) for each in sets if not each.is_authoritative]
-    return tuple(Claims(name, claims.total, claims.failed) for name, claims in found if claims.total)
+    return tuple(model.Claims(name, claims.total, claims.failed) for name, claims in found if claims.total)
 
 
-def _contradiction(conflicts: list[Conflict]) -> Contradiction:
+def _contradiction(conflicts: list[model.Conflict]) -> model.Contradiction:
     first = conflicts[0]
     stated = tuple(statement.expected for statement in first.statements)
-    return Contradiction(first.subject, first.unit, stated, len(conflicts) - 1)
+    return model.Contradiction(first.subject, first.unit, stated, len(conflicts) - 1)
 
 
-def _grades(checks: list[ReferenceCheck]) -> tuple[Grade, ...]:
+def _grades(checks: list[model.ReferenceCheck]) -> tuple[Grade, ...]:
     present = {check.grade for check in checks}
     return tuple(grade for grade in AUTHORITATIVE_GRADES if grade in present)

@@ -25,6 +25,7 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import LeftOut
+from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.checks import GROUP as ROUND_TRIPS
 from er3a.pipeline.stages.validation.checks import (
     SHOWN_DECIMALS,
@@ -38,54 +39,10 @@ from er3a.pipeline.stages.validation.checks import (
     verdict_of,
 )
 from er3a.pipeline.stages.validation.entry import ValidationSettings
-from er3a.pipeline.stages.validation.model import (
-    Axes,
-    Calibrated,
-    Check,
-    Checks,
-    Circles,
-    Conflict,
-    CorrectedTable,
-    Corrections,
-    InNoSet,
-    KeyPose,
-    KeyPoses,
-    NamedPose,
-    OtherTableFound,
-    RankedHypothesis,
-    ReferenceCheck,
-    Residuals,
-    RoundTripErrors,
-    Section,
-    SetCalibration,
-    SetDiagnosis,
-    TableEvidence,
-    TableFacts,
-    Unjudged,
-    ValidationResults,
-    ValidationSummary,
-    WholeGroup,
-    model_of,
-)
 from er3a.pipeline.study import Study
+from er3a.references import quantities
 from er3a.references.circle_points import CirclePoints, circle_points
 from er3a.references.predict import read, search, state_of
-from er3a.references.quantities import (
-    MM,
-    ZERO_POSE,
-    AxisDistance,
-    Extreme,
-    Extremity,
-    Point,
-    Pose,
-    Quantity,
-    SectionExtent,
-    angle_between,
-    nearest_on_axis,
-    nearest_on_line,
-    point_of,
-    section_of,
-)
 from er3a.references.reference import Documents, ReferenceSet, expected_of, quantities_of, vectors_of
 from er3a.references.rows import GROUPS, AxisRow, EnvelopeRow, PositionRow
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
@@ -93,56 +50,58 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Grade, Robot
 
 
-def calibrate_from_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[SetCalibration, ...], Corrections]:
+def calibrate_from_sets(
+    robot: Robot, sets: list[ReferenceSet]
+) -> tuple[tuple[model.SetCalibration, ...], model.Corrections]:
     """Estimate corrections to the table from each reference set's positions."""
     found, tables = [], []
     for references in sets:
         try:
             calibration = calibrate(robot, references)
         except CalibrationError as error:
-            found.append(SetCalibration(references.name, error.finding))
+            found.append(model.SetCalibration(references.name, error.finding))
             continue
-        found.append(SetCalibration(references.name, stated(Calibrated, calibration)))
+        found.append(model.SetCalibration(references.name, stated(model.Calibrated, calibration)))
         if calibration.fits:
             tables.append(_corrections(references.name, calibration))
-    return tuple(found), Corrections.stacked(tables)
+    return tuple(found), model.Corrections.stacked(tables)
 
 
-def _corrections(reference_set: str, found: Calibration) -> Corrections:
-    return Corrections.of_rows(
+def _corrections(reference_set: str, found: Calibration) -> model.Corrections:
+    return model.Corrections.of_rows(
         (reference_set, each.name, each.unit, each.nominal, each.correction, each.standard_error, each.half_width)
         for each in found.estimates
     )
 
 
-def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[SetDiagnosis, ...], Residuals]:
+def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[model.SetDiagnosis, ...], model.Residuals]:
     """Diagnose a table against each reference set."""
     found = [(references.name, diagnosis_of(robot, references)) for references in sets]
     tables = [_residuals(name, diagnosis.ranking, diagnosis.left) for name, diagnosis in found if diagnosis.ranking]
     records = [_set_diagnosis(robot, references, diagnosis) for references, (_, diagnosis) in zip(sets, found)]
-    return tuple(records), Residuals.stacked(tables)
+    return tuple(records), model.Residuals.stacked(tables)
 
 
-def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis) -> SetDiagnosis:
+def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis) -> model.SetDiagnosis:
     documents = dict.fromkeys(reference.document for reference in usable(references))
     own = [name for name in documents if made_from_table(robot, name, references.documents)]
-    return SetDiagnosis(
+    return model.SetDiagnosis(
         reference_set=references.name,
         conclusion=diagnosis.conclusion,
         against=tuple(title_of(name, references.documents) for name in documents),
         from_table=tuple(title_of(name, references.documents) for name in own),
         references=diagnosis.references,
         hypotheses_tried=diagnosis.tried,
-        hypotheses=tuple(stated(RankedHypothesis, each) for each in diagnosis.hypotheses),
-        corrected=stated(CorrectedTable, diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
+        hypotheses=tuple(stated(model.RankedHypothesis, each) for each in diagnosis.hypotheses),
+        corrected=stated(model.CorrectedTable, diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
     )
 
 
-def _residuals(reference_set: str, ranking: Ranking, left: Reals | None) -> Residuals:
+def _residuals(reference_set: str, ranking: Ranking, left: Reals | None) -> model.Residuals:
     before, bound, units = residuals(ranking, ranking.before)
     after, _, _ = residuals(ranking, ranking.before if left is None else left)
     vectors = [[ranking.references[place] for place in places] for places in vectors_of(ranking.references)]
-    return Residuals.of_rows(
+    return model.Residuals.of_rows(
         (
             reference_set,
             vectors[i][0].source,
@@ -158,13 +117,13 @@ def _residuals(reference_set: str, ranking: Ranking, left: Reals | None) -> Resi
 
 
 SECTION_STEPS = 60
-EXTREMITIES: tuple[Extremity, ...] = ("greatest", "least")
+EXTREMITIES: tuple[quantities.Extremity, ...] = ("greatest", "least")
 
 Vector = NDArray[np.float64]
-Extremes = Mapping[Extreme, tuple[float, Vector]]
+Extremes = Mapping[quantities.Extreme, tuple[float, Vector]]
 
 
-def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> Axes:
+def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> model.Axes:
     """Each stated axis line beside the model's, as its circles show it."""
     rows = []
     for references in sets:
@@ -172,12 +131,12 @@ def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> Axes:
             found = circles.axes.point_mm[row.joint - 1]
             stated = found if row.point_mm is None else np.array(row.point_mm)
             direction = circles.axes.direction[row.joint - 1]
-            nearest = nearest_on_line(direction, found, stated)
-            angle = float(angle_between(direction, np.array(row.direction), row.signed))
+            nearest = quantities.nearest_on_line(direction, found, stated)
+            angle = float(quantities.angle_between(direction, np.array(row.direction), row.signed))
             distance = float(np.linalg.norm(nearest - stated))
             head = (references.name, row.source, row.grade, row.joint, row.direction, stated)
             rows.append((*head, direction, nearest, angle, distance, row.uncertainty_deg, row.uncertainty_mm))
-    return Axes.of_rows(rows)
+    return model.Axes.of_rows(rows)
 
 
 @dataclass(frozen=True)
@@ -187,38 +146,38 @@ class _Look:
     source: str
     grade: Grade
     group: str
-    name: KeyPose
-    point: Point
-    pose: Pose
+    name: model.KeyPose
+    point: quantities.Point
+    pose: quantities.Pose
     stated: Callable[[Vector, Vector], Vector]
 
 
-def key_poses_table(robot: Robot, sets: list[ReferenceSet], extremes: Extremes) -> KeyPoses:
+def key_poses_table(robot: Robot, sets: list[ReferenceSet], extremes: Extremes) -> model.KeyPoses:
     """The poses at which references look at the arm, with their point and the model's; the zero pose comes first."""
     rows = []
     for references in sets:
         for look in (*_positions(references), *_corners(references), *_extremes(references, extremes)):
-            pose = (*look.pose, *ZERO_POSE)[: robot.joints]
+            pose = (*look.pose, *quantities.ZERO_POSE)[: robot.joints]
             T = frames(robot, meant(robot, np.array(pose)))
-            model = point_of(T, look.point)
-            stated = look.stated(model, T)
+            modelled = quantities.point_of(T, look.point)
+            stated = look.stated(modelled, T)
             head = (references.name, look.source, look.grade, look.group, look.name, look.point, pose)
-            rows.append((*head, stated, model, float(np.linalg.norm(model - stated))))
-    table = KeyPoses.of_rows(rows)
+            rows.append((*head, stated, modelled, float(np.linalg.norm(modelled - stated))))
+    table = model.KeyPoses.of_rows(rows)
     return table.take(np.argsort((table.q_deg != 0).any(axis=1), kind="stable"))
 
 
-def section_table(robot: Robot, extremes: Extremes) -> Section:
+def section_table(robot: Robot, extremes: Extremes) -> model.Section:
     """The wrist centre in the side view over a grid of joints 2 and 3 within their limits, and which points lie where
     the region can end: at a limit, or with the elbow straight or folded."""
-    elbow = [extremes[AxisDistance("wrist_centre", extreme, 2)][1][2] for extreme in EXTREMITIES]
+    elbow = [extremes[quantities.AxisDistance("wrist_centre", extreme, 2)][1][2] for extreme in EXTREMITIES]
     q2 = np.linspace(robot.lower[1], robot.upper[1], SECTION_STEPS + 1)
     q3 = np.unique(np.concatenate([np.linspace(robot.lower[2], robot.upper[2], SECTION_STEPS + 1), elbow]))
     grid2, grid3 = np.meshgrid(q2, q3, indexing="ij")
     q = np.zeros((*grid2.shape, 6))
     q[..., 1], q[..., 2] = grid2, grid3
-    points = section_of(frames(robot, q))
-    return Section(
+    points = quantities.section_of(frames(robot, q))
+    return model.Section(
         q2_deg=np.degrees(grid2).ravel(),
         q3_deg=np.degrees(grid3).ravel(),
         x_mm=points[..., 0].ravel(),
@@ -232,10 +191,10 @@ def _positions(references: ReferenceSet) -> Iterator[_Look]:
     for row in references.of(PositionRow):
         given = np.array([np.nan if value is None else value for value in row.xyz_mm])
 
-        def stated(model: Vector, T: Vector, given: Vector = given) -> Vector:
-            return given if np.isnan(given).all() else np.where(np.isnan(given), model, given)
+        def stated(modelled: Vector, T: Vector, given: Vector = given) -> Vector:
+            return given if np.isnan(given).all() else np.where(np.isnan(given), modelled, given)
 
-        yield _Look(row.source, row.grade, row.group, NamedPose(row.name), row.point, row.pose, stated)
+        yield _Look(row.source, row.grade, row.group, model.NamedPose(row.name), row.point, row.pose, stated)
 
 
 def _corners(references: ReferenceSet) -> Iterator[_Look]:
@@ -246,12 +205,12 @@ def _corners(references: ReferenceSet) -> Iterator[_Look]:
     for (source, (q2, q3)), rows in corners.items():
         labels = {row.quantity[-1]: (row.value_mm, row.quantity == "abs_x") for row in rows}
 
-        def stated(model: Vector, T: Vector, labels: dict[str, tuple[float, bool]] = labels) -> Vector:
-            origin = np.array([T[0, 0, 3], 0.0, T[1, 2, 3]]) * MM
-            point = model.copy()
+        def stated(modelled: Vector, T: Vector, labels: dict[str, tuple[float, bool]] = labels) -> Vector:
+            origin = np.array([T[0, 0, 3], 0.0, T[1, 2, 3]]) * quantities.MM
+            point = modelled.copy()
             for coordinate, (value, unsigned) in labels.items():
                 k = "xyz".index(coordinate)
-                sign = np.sign(model[k] - origin[k]) if unsigned else 1.0
+                sign = np.sign(modelled[k] - origin[k]) if unsigned else 1.0
                 point[k] = origin[k] + sign * value
             return point
 
@@ -262,7 +221,9 @@ def _corners(references: ReferenceSet) -> Iterator[_Look]:
 def _extremes(references: ReferenceSet, extremes: Extremes) -> Iterator[_Look]:
     for reference, expected in zip(references.checkable, expected_of(references.checkable)[0]):
         subject, quantity = reference.subject, reference.quantity
-        if isinstance(subject, Reach | DrawingExtent) and isinstance(quantity, AxisDistance | SectionExtent):
+        if isinstance(subject, Reach | DrawingExtent) and isinstance(
+            quantity, quantities.AxisDistance | quantities.SectionExtent
+        ):
             value, q = extremes[quantity]
             stated = partial(_extreme_as_stated, quantity, float(expected), value)
             pose = tuple(np.degrees(q).tolist())
@@ -270,55 +231,59 @@ def _extremes(references: ReferenceSet, extremes: Extremes) -> Iterator[_Look]:
 
 
 def _extreme_as_stated(
-    quantity: AxisDistance | SectionExtent, expected: float, value: float, model: Vector, T: Vector
+    quantity: quantities.AxisDistance | quantities.SectionExtent,
+    expected: float,
+    value: float,
+    modelled: Vector,
+    T: Vector,
 ) -> Vector:
     """The model's point shifted to where its extreme would be the stated one."""
-    if isinstance(quantity, SectionExtent):
+    if isinstance(quantity, quantities.SectionExtent):
         shift = np.zeros(3)
         shift["xyz".index(quantity.coordinate)] = 1.0
-        return model + shift * (expected - value)
-    foot = nearest_on_axis(T, quantity.axis, model)
-    return foot + (model - foot) * (expected / value) if value > 0 else model
+        return modelled + shift * (expected - value)
+    foot = quantities.nearest_on_axis(T, quantity.axis, modelled)
+    return foot + (modelled - foot) * (expected / value) if value > 0 else modelled
 
 
 SIX = 6
-WRIST_REACH = AxisDistance("wrist_centre", "greatest", 1)
-FLANGE_REACH = AxisDistance("flange", "greatest", 1)
+WRIST_REACH = quantities.AxisDistance("wrist_centre", "greatest", 1)
+FLANGE_REACH = quantities.AxisDistance("flange", "greatest", 1)
 ALWAYS_SEARCHED = (
     WRIST_REACH,
-    AxisDistance("wrist_centre", "least", 1),
-    AxisDistance("wrist_centre", "greatest", 2),
-    AxisDistance("wrist_centre", "least", 2),
+    quantities.AxisDistance("wrist_centre", "least", 1),
+    quantities.AxisDistance("wrist_centre", "greatest", 2),
+    quantities.AxisDistance("wrist_centre", "least", 2),
     FLANGE_REACH,
-    AxisDistance("flange", "least", 1),
+    quantities.AxisDistance("flange", "least", 1),
 )
 
 
-def compute(study: Study, name: str) -> ValidationResults:
+def compute(study: Study, name: str) -> model.ValidationResults:
     """Check a robot's model, and say what is most likely wrong with it."""
-    robot = model_of(study, name)
+    robot = model.model_of(study, name)
     settings = study.section(ValidationSettings)
     sets = [load_references(reference, robot) for reference in robot.references]
     check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
 
     turning, six = is_turning(robot), is_six_turning(robot)
     stated = [quantity for references in sets for quantity in quantities_of(references.checkable)]
-    sought = [quantity for quantity in stated if isinstance(quantity, Extreme)]
+    sought = [quantity for quantity in stated if isinstance(quantity, quantities.Extreme)]
     wanted = dict.fromkeys([*always_searched(robot), *sought])
     extremes = {quantity: search(robot, quantity, settings.reach_starts) for quantity in wanted}
-    values: dict[Quantity, float] = {quantity: value for quantity, (value, _) in extremes.items()}
+    values: dict[quantities.Quantity, float] = {quantity: value for quantity, (value, _) in extremes.items()}
 
     circles = circle_points(robot)
-    checks, conflicts = table_checks(robot), list[Conflict]()
+    checks, conflicts = table_checks(robot), list[model.Conflict]()
     for references in sets:
-        quantities = quantities_of(references.checkable)
-        state = state_of(robot, quantities, extremes=values, axes=circles.axes)
+        asked = quantities_of(references.checkable)
+        state = state_of(robot, asked, extremes=values, axes=circles.axes)
         bases = (
             bases_of(robot, references.checkable, references.documents)
             if turning
             else undeclared_bases(references.checkable)
         )
-        judged, contradictions = checks_of_set(references, read(quantities, state), bases, robot.slides)
+        judged, contradictions = checks_of_set(references, read(asked, state), bases, robot.slides)
         checks += judged
         conflicts += contradictions
     checks += _without_reference(robot, values, checks)
@@ -334,7 +299,7 @@ def compute(study: Study, name: str) -> ValidationResults:
     reach = {name: values[quantity] for name, quantity in reaches.items() if quantity in values}
     evidence = evidence_of_table(robot, sets) if turning else None
     counts = counts_of(checks)
-    summary = ValidationSummary(
+    summary = model.ValidationSummary(
         verdict=verdict_of(checks, conflicts, summaries, found, evidence),
         figures=key_figures(checks, axes, summaries, reach, trips),
         checks=tuple(checks),
@@ -343,19 +308,19 @@ def compute(study: Study, name: str) -> ValidationResults:
         diagnoses=diagnoses,
         calibrations=calibrations,
         circle_points=_rounded(circles),
-        table=TableFacts(robot.convention, closed_form_missing(robot)),
+        table=model.TableFacts(robot.convention, closed_form_missing(robot)),
         round_trips=trips,
         section_origin_mm=_section_origin_mm(robot),
         counts=counts,
         evidence=evidence,
         not_examined=tuple(_left_out(settings, checks, diagnoses if turning else None, calibrations, trips, evidence)),
     )
-    return ValidationResults(
+    return model.ValidationResults(
         summary=summary,
-        checks=Checks.of_records(checks),
+        checks=model.Checks.of_records(checks),
         axes=axes,
         key_poses=poses,
-        section=section_table(robot, extremes) if six else Section.empty(),
+        section=section_table(robot, extremes) if six else model.Section.empty(),
         residuals=residuals,
         corrections=corrections,
     )
@@ -363,21 +328,21 @@ def compute(study: Study, name: str) -> ValidationResults:
 
 def _left_out(
     settings: ValidationSettings,
-    checks: list[Check],
-    diagnoses: tuple[SetDiagnosis, ...] | None,
-    calibrations: tuple[SetCalibration, ...],
-    trips: RoundTripErrors | None,
-    evidence: TableEvidence | None,
+    checks: list[model.Check],
+    diagnoses: tuple[model.SetDiagnosis, ...] | None,
+    calibrations: tuple[model.SetCalibration, ...],
+    trips: model.RoundTripErrors | None,
+    evidence: model.TableEvidence | None,
 ) -> Iterator[LeftOut]:
     """What references, settings and the kind of arm leave out; ``diagnoses``: None where none are made."""
-    judged = {check.subject for check in checks if isinstance(check, ReferenceCheck)}
-    groups = {check.group for check in checks if isinstance(check, ReferenceCheck)}
+    judged = {check.subject for check in checks if isinstance(check, model.ReferenceCheck)}
+    groups = {check.group for check in checks if isinstance(check, model.ReferenceCheck)}
     missing = {
         check.group
         for check in checks
-        if isinstance(check, Unjudged)
+        if isinstance(check, model.Unjudged)
         and check.group in GROUPS
-        and (check.group not in groups if isinstance(check.subject, WholeGroup) else check.subject not in judged)
+        and (check.group not in groups if isinstance(check.subject, model.WholeGroup) else check.subject not in judged)
     }
     if unstated := tuple(group for group in GROUPS if group in missing or group not in groups):
         yield LeftOut("references", unstated)
@@ -389,9 +354,11 @@ def _left_out(
         yield LeftOut("diagnosis")
     else:
         yield LeftOut("more_faults")
-    if uncalibrated := tuple(each.reference_set for each in calibrations if not isinstance(each.result, Calibrated)):
+    if uncalibrated := tuple(
+        each.reference_set for each in calibrations if not isinstance(each.result, model.Calibrated)
+    ):
         yield LeftOut("calibration", uncalibrated)
-    unsolved = [check for check in checks if isinstance(check, Unjudged) and check.group == ROUND_TRIPS]
+    unsolved = [check for check in checks if isinstance(check, model.Unjudged) and check.group == ROUND_TRIPS]
     if unsolved:
         yield LeftOut("all_solutions")
     else:
@@ -402,7 +369,7 @@ def _left_out(
     yield LeftOut("the_arm_itself")
 
 
-def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEvidence | None:
+def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> model.TableEvidence | None:
     """What independent documents settle of the table; None where no reference states a value."""
     references = [reference for own in sets for reference in own.references]
     if not any(reference.expected is not None for reference in references):
@@ -410,11 +377,13 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> TableEviden
     documents = Documents({name: each for own in sets for name, each in own.documents.by_name.items()})
     found = evidence_of(robot, references, documents)
     return stated(
-        TableEvidence,
+        model.TableEvidence,
         found,
         parts=parts_found(found),
         proposals=tuple(proposals_of(found).values()),
-        other=OtherTableFound(stated(CorrectedTable, robot_of(found.other.table, 0, robot)), found.other.code)
+        other=model.OtherTableFound(
+            stated(model.CorrectedTable, robot_of(found.other.table, 0, robot)), found.other.code
+        )
         if found.other
         else None,
     )
@@ -430,29 +399,31 @@ def is_six_turning(robot: Robot) -> bool:
     return robot.rows == SIX and is_turning(robot)
 
 
-def always_searched(robot: Robot) -> tuple[AxisDistance, ...]:
+def always_searched(robot: Robot) -> tuple[quantities.AxisDistance, ...]:
     """The reaches that are searched for whatever the references say; an arm with other joints has no wrist centre."""
     six = robot.rows == SIX and not robot.sliding.any()
     return ALWAYS_SEARCHED if six else tuple(each for each in ALWAYS_SEARCHED if each.point == "flange")
 
 
-def _without_reference(robot: Robot, values: dict[Quantity, float], checks: list[Check]) -> list[Unjudged]:
+def _without_reference(
+    robot: Robot, values: dict[quantities.Quantity, float], checks: list[model.Check]
+) -> list[model.Unjudged]:
     """Reach that no reference gives, as measured."""
     stated = {check.subject for check in checks}
     subjects = {Reach(distance.extreme, distance.point, distance.axis): distance for distance in always_searched(robot)}
     return [
-        Unjudged(subject, "reach", "mm", InNoSet(), measured=values[distance])
+        model.Unjudged(subject, "reach", "mm", model.InNoSet(), measured=values[distance])
         for subject, distance in subjects.items()
         if subject not in stated
     ]
 
 
-def _rounded(circles: CirclePoints) -> Circles:
+def _rounded(circles: CirclePoints) -> model.Circles:
     radius, roundness = circles.radius_mm.round(SHOWN_DECIMALS), circles.roundness_mm.round(SHOWN_DECIMALS)
-    return stated(Circles, circles, radius_mm=radius, roundness_mm=roundness)
+    return stated(model.Circles, circles, radius_mm=radius, roundness_mm=roundness)
 
 
 def _section_origin_mm(robot: Robot) -> tuple[float, float]:
     """Where axis 1 (x) and axis 2 (z) are in the base frame, which is the workspace drawing's origin."""
-    zero = state_of(robot, ()).at(ZERO_POSE)
-    return float(zero[0, 0, 3] * MM), float(zero[1, 2, 3] * MM)
+    zero = state_of(robot, ()).at(quantities.ZERO_POSE)
+    return float(zero[0, 0, 3] * quantities.MM), float(zero[1, 2, 3] * quantities.MM)

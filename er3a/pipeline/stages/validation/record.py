@@ -20,7 +20,6 @@ from er3a.pipeline.viewing.recording import BRIEFLY_S, GONE, Curves, Logged, Rec
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
-STAGE = "validation"
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
 LEAST_ARROW_MM = 0.1
 NOTE = """# Key poses of {title}
@@ -50,7 +49,7 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
     shown = Recorded(
         robot=robot,
         name=stored.robot,
-        stage=STAGE,
+        stage=stored.stage,
         note=note,
         runs=[_with_axes(runs[0], axes, size_of(robot), last=len(runs) == 1), *runs[1:]],
         curves=[Curves("deviation", "Largest deviation (mm)", ["largest deviation"], [REFERENCE], whole=True)],

@@ -19,35 +19,12 @@ from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
 from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.validation import model, validation_figures
 from er3a.pipeline.stages.validation.evidence_section import (
     OTHER_TITLES,
     evidence_section,
     other_robot,
     table_to_use,
-)
-from er3a.pipeline.stages.validation.model import (
-    Axes,
-    Check,
-    DefinedOtherwise,
-    KeyPoses,
-    ModelCheck,
-    ReferenceCheck,
-    Section,
-    SetSummary,
-    Unjudged,
-    ValidationResults,
-    ValidationSummary,
-    model_of,
-)
-from er3a.pipeline.stages.validation.validation_figures import (
-    axis_deviation,
-    corrected_robot,
-    correction_stories,
-    diagnosis_stories,
-    link_frames,
-    side_view,
-    typographic,
-    workspace_drawing,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
@@ -56,8 +33,7 @@ from er3a.pipeline.viewing.page import (
     Picture,
     alternative_table,
     head_of,
-    render,
-    run_command,
+    render_stage,
     text_address,
 )
 from er3a.references.subjects import SegmentInclination
@@ -74,7 +50,7 @@ COLUMNS = (
     N_("Source"),
 )
 
-Judged = ModelCheck | ReferenceCheck
+Judged = model.ModelCheck | model.ReferenceCheck
 
 
 @dataclass(frozen=True)
@@ -132,7 +108,7 @@ def group_rows(checks: Iterable[Judged]) -> list[GroupRow]:
 def check_row(check: Judged) -> list[str]:
     """A check in the columns of ``COLUMNS``."""
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
-    if isinstance(check, ReferenceCheck):
+    if isinstance(check, model.ReferenceCheck):
         grade = word("grade", GRADE_NAMES, check.grade)
         source = sentence("graded", own_source=own_title(check.source), grade=grade)
     else:
@@ -140,14 +116,14 @@ def check_row(check: Judged) -> list[str]:
     return [say(check.subject), *values, f"{check.tolerance:g}", tr(check.unit), source]
 
 
-def _value(value: float, check: Check) -> str:
+def _value(value: float, check: model.Check) -> str:
     """A value in its unit's decimals; errors of round trips, which are far smaller, with one digit."""
     if check.group == "round_trips" and 0 < abs(value) < 1e-3:
         return number(value, 1)
     return fixed(value, DECIMALS[check.unit])
 
 
-def blank_row(check: Unjudged) -> list[str]:
+def blank_row(check: model.Unjudged) -> list[str]:
     """What is not judged: its name, the model's value, the set, and why."""
     measured = with_unit(_value(check.measured, check), check.unit) if check.measured is not None else "–"
     return [say(check.subject), measured, check.reference_set or "–", say(check.note)]
@@ -278,7 +254,7 @@ SEGMENTS = {
 class SetStory:
     """What the page says about one reference set; counts, groups, segments, points and statements in words."""
 
-    found: SetSummary
+    found: model.SetSummary
     counted: str
     is_authoritative: bool
     conflicting: int
@@ -292,38 +268,36 @@ class SetStory:
     segments_hold: bool
 
 
-def report(study: Study, stored: Stored[ValidationResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.ValidationResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
-    robot, checks = model_of(study, name), summary.checks
-    judged = [check for check in checks if not isinstance(check, Unjudged)]
+    robot, checks = model.model_of(study, name), summary.checks
+    judged = [check for check in checks if not isinstance(check, model.Unjudged)]
     failed = [check for check in judged if check.status == "fail"]
     failed.sort(key=lambda check: check.tolerances_off, reverse=True)
     labels = results.key_poses.take(results.key_poses.group == "envelope")
     drawn = _drawn_axes(results.axes)
     source = robot.sources.get("dh")
     contradicted = summary.verdict.status == "fail"
-    corrected, _ = corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
+    corrected, _ = validation_figures.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
     text = yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True)) if corrected else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
         head=_head(stored, instead),
-        command=run_command(study, f"{name}/validation.html"),
         robot=robot,
-        robot_pages=study.pages(name),
         fold=contradicted,
         to_use=table_to_use(robot, study.robot(instead)) if instead else None,
         table_evidence=evidence_section(summary.evidence),
         frames=_frames_picture(robot, summary),
         formulas=formulas(robot),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
-        diagnoses=diagnosis_stories(summary, results.residuals),
+        diagnoses=validation_figures.diagnosis_stories(summary, results.residuals),
         corrected=text,
         corrected_address=text_address(text),
-        corrections=correction_stories(summary, results.corrections),
+        corrections=validation_figures.correction_stories(summary, results.corrections),
         groups=group_rows(judged),
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
         more_failed=[check_row(check) for check in failed[SHOWN_FAILURES:]],
@@ -333,7 +307,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         },
         columns=[tr(label) for label in COLUMNS],
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
-        blanks=[blank_row(check) for check in checks if isinstance(check, Unjudged)],
+        blanks=[blank_row(check) for check in checks if isinstance(check, model.Unjudged)],
         side=_side_picture(robot, drawn, summary),
         deviation=_deviation_picture(drawn) if len(drawn) else None,
         drawing=_drawing_picture(results.section, labels, summary) if len(labels) else None,
@@ -344,7 +318,7 @@ def report(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
     )
 
 
-def _head(stored: Stored[ValidationResults], instead: str | None) -> Head:
+def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:
     """The head; the verdict on a table that evidence contradicts begins with what to do.
 
     Parameters
@@ -354,13 +328,13 @@ def _head(stored: Stored[ValidationResults], instead: str | None) -> Head:
     head = head_of(stored, FIGURES)
     if head.status != "fail":
         return head
-    same_arm = isinstance(head.finding, DefinedOtherwise)
+    same_arm = isinstance(head.finding, model.DefinedOtherwise)
     text = joined([decision(head.status, (), instead, same_arm=same_arm), head.text], " ")
     return replace(head, text=text, links={instead: f"../{instead}/validation.html"} if instead else {})
 
 
-def _set_story(found: SetSummary, checks: Iterable[Judged], poses: KeyPoses) -> SetStory:
-    own = [check for check in checks if isinstance(check, ReferenceCheck) and check.reference_set == found.name]
+def _set_story(found: model.SetSummary, checks: Iterable[Judged], poses: model.KeyPoses) -> SetStory:
+    own = [check for check in checks if isinstance(check, model.ReferenceCheck) and check.reference_set == found.name]
     failed = {check.group for check in own if check.status == "fail"}
     held = {check.group for check in own if check.status == "pass"} - failed
     segments = [(check.subject, check) for check in own if isinstance(check.subject, SegmentInclination)]
@@ -374,7 +348,7 @@ def _set_story(found: SetSummary, checks: Iterable[Judged], poses: KeyPoses) -> 
         else tr("{passed} of {total} claims hold", passed=claims.passed, total=claims.total),
         is_authoritative=found.is_authoritative,
         conflicting=sum(each.conflicting for each in weighing),
-        statements=[typographic(say(each)) for each in (found.described, found.own_text) if each],
+        statements=[validation_figures.typographic(say(each)) for each in (found.described, found.own_text) if each],
         telling=[check_row(check) for check in _telling(own)],
         failed_groups=_group_words(failed),
         held_groups=_group_words(held),
@@ -389,15 +363,15 @@ def _group_words(groups: Iterable[str]) -> str:
     return joined((word("group", GROUPS, group) for group in sorted(groups)), ", ")
 
 
-def _segment(subject: SegmentInclination, check: ReferenceCheck) -> str:
+def _segment(subject: SegmentInclination, check: model.ReferenceCheck) -> str:
     """How a segment of the arm stands, and how it is stated to."""
     template = SEGMENTS[subject.segment]
     return tr(template, measured=fixed(check.measured, 0), expected=fixed(check.expected, 0))
 
 
-def _telling(own: list[ReferenceCheck]) -> list[ReferenceCheck]:
+def _telling(own: list[model.ReferenceCheck]) -> list[model.ReferenceCheck]:
     """One failed length per group, the farthest off."""
-    worst: dict[str, ReferenceCheck] = {}
+    worst: dict[str, model.ReferenceCheck] = {}
     for check in own:
         if check.status != "fail" or check.unit != "mm":
             continue
@@ -410,13 +384,13 @@ def _point(points_mm: np.ndarray) -> str:
     return ", ".join(fixed(value, 1) for value in points_mm[0]) if len(points_mm) else ""
 
 
-def _drawn_axes(axes: Axes) -> Axes:
+def _drawn_axes(axes: model.Axes) -> model.Axes:
     """Axes to draw: those from authoritative sources, or else the claims."""
     authoritative = np.isin(axes.grade, AUTHORITATIVE_GRADES)
     return axes.take(authoritative) if authoritative.any() else axes
 
 
-def _frames_picture(robot: Robot, summary: ValidationSummary) -> Picture:
+def _frames_picture(robot: Robot, summary: model.ValidationSummary) -> Picture:
     other = other_robot(robot, summary.evidence)
     code = summary.evidence.other.code if summary.evidence and summary.evidence.other else ""
     label = word(code, OTHER_TITLES, code) if code == "described" else ""
@@ -426,11 +400,11 @@ def _frames_picture(robot: Robot, summary: ValidationSummary) -> Picture:
     if code == "described":
         caption = joined([caption, tr("Dashed: the arm that independent documents describe.")], " ")
     alt = tr("The arm in its zero pose, seen from a corner, with its link frames.")
-    return Picture(link_frames(robot, other if label else None, label), alt, caption)
+    return Picture(validation_figures.link_frames(robot, other if label else None, label), alt, caption)
 
 
-def _side_picture(robot: Robot, drawn: Axes, summary: ValidationSummary) -> Picture:
-    corrected, label = corrected_robot(robot, summary.diagnoses)
+def _side_picture(robot: Robot, drawn: model.Axes, summary: model.ValidationSummary) -> Picture:
+    corrected, label = validation_figures.corrected_robot(robot, summary.diagnoses)
     if not len(drawn):
         caption = tr("No reference states any axis: there is nothing to compare the model's with.")
     elif not drawn.is_off.any():
@@ -455,10 +429,10 @@ def _side_picture(robot: Robot, drawn: Axes, summary: ValidationSummary) -> Pict
             )
             caption = joined([caption, correction], " ")
     alt = tr("Side view of the zero pose: links and joint axes of the model, and the axes that references state.")
-    return Picture(side_view(robot, drawn, corrected, label), alt, caption)
+    return Picture(validation_figures.side_view(robot, drawn, corrected, label), alt, caption)
 
 
-def _deviation_picture(axes: Axes) -> Picture:
+def _deviation_picture(axes: model.Axes) -> Picture:
     off = axes.take(axes.is_off)
     if len(off):
         caption = tr("Outside the source's uncertainty: {joints}.", joints=_joints(off))
@@ -468,14 +442,14 @@ def _deviation_picture(axes: Axes) -> Picture:
     else:
         caption = tr("No axis is outside its source's uncertainty (outlined boxes).")
     alt = tr("Bars per joint and source: distance and angle between the model's axis and the stated one.")
-    return Picture(axis_deviation(axes), alt, caption)
+    return Picture(validation_figures.axis_deviation(axes), alt, caption)
 
 
-def _joints(axes: Axes) -> str:
+def _joints(axes: model.Axes) -> str:
     return joined((f"J{joint}" for joint in np.unique(axes.joint)), ", ")
 
 
-def _label_rows(labels: KeyPoses, checks: Iterable[Judged]) -> list[list[str]]:
+def _label_rows(labels: model.KeyPoses, checks: Iterable[Judged]) -> list[list[str]]:
     """The drawing's labels with the numbers that they have in the figure."""
     numbers = {pose: place for place, pose in reversed(list(enumerate(labels.pose, 1)))}
     rows = []
@@ -487,7 +461,7 @@ def _label_rows(labels: KeyPoses, checks: Iterable[Judged]) -> list[list[str]]:
     return [row for _, row in sorted(rows, key=lambda row: row[0])]
 
 
-def _drawing_picture(section: Section, labels: KeyPoses, summary: ValidationSummary) -> Picture:
+def _drawing_picture(section: model.Section, labels: model.KeyPoses, summary: model.ValidationSummary) -> Picture:
     missed = [check for check in summary.checks if check.group == "envelope" and check.status == "fail"]
     worst = fixed(labels.deviation_mm.max(), 2)
     caption = (
@@ -500,4 +474,4 @@ def _drawing_picture(section: Section, labels: KeyPoses, summary: ValidationSumm
         else sentence("labels_missed", count=len(missed), worst=worst)
     )
     alt = tr("Region that the wrist centre sweeps with joints 2 and 3, and the drawing's labels, numbered.")
-    return Picture(workspace_drawing(section, labels, summary.section_origin_mm), alt, caption)
+    return Picture(validation_figures.workspace_drawing(section, labels, summary.section_origin_mm), alt, caption)

@@ -17,18 +17,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.diagnosis import both, level
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
-from er3a.pipeline.stages.validation.model import (
-    Axes,
-    Calibrated,
-    Corrections,
-    KeyPoses,
-    RankedHypothesis,
-    Residuals,
-    Section,
-    SetCalibration,
-    SetDiagnosis,
-    ValidationSummary,
-)
+from er3a.pipeline.stages.validation import model
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
@@ -46,7 +35,7 @@ HAIR = 0.9
 SIX = 6
 
 
-def side_view(robot: Robot, stated: Axes, corrected: Robot | None, corrected_label: str) -> Figure:
+def side_view(robot: Robot, stated: model.Axes, corrected: Robot | None, corrected_label: str) -> Figure:
     """The arm in its zero pose from the side, to scale, with its joint axes over those that the references state."""
     figure, axes = new_figure(width=7, height=7.4)
     corners = skeleton(robot, np.zeros(robot.joints)) * 1000
@@ -77,7 +66,7 @@ def side_view(robot: Robot, stated: Axes, corrected: Robot | None, corrected_lab
     return figure
 
 
-def axis_deviation(stated: Axes) -> Figure:
+def axis_deviation(stated: model.Axes) -> Figure:
     """Per joint and source: how far the model's axis is off the stated one, in mm and in degrees."""
     figure, panels = new_figure(1, 2, width=9, height=4)
     sources = _by_source(stated)
@@ -113,7 +102,7 @@ def axis_deviation(stated: Axes) -> Figure:
     return figure
 
 
-def workspace_drawing(section: Section, labels: KeyPoses, origin_mm: Sequence[float]) -> Figure:
+def workspace_drawing(section: model.Section, labels: model.KeyPoses, origin_mm: Sequence[float]) -> Figure:
     """The side view of the wrist centre's region from the model, with the drawing's labels, numbered from 1."""
     figure, axes = new_figure(width=9, height=8)
     shape = (len(np.unique(section.q2_deg)), len(np.unique(section.q3_deg)))
@@ -126,7 +115,7 @@ def workspace_drawing(section: Section, labels: KeyPoses, origin_mm: Sequence[fl
     axes.axvline(0, color=GRID, linewidth=1.5, zorder=0)
     axes.axhline(0, color=GRID, linewidth=1.5, zorder=0)
     extent = max(np.ptp(x), np.ptp(z))
-    stated, model = (points[:, [0, 2]] - origin_mm for points in (labels.point_mm, labels.model_point_mm))
+    stated, modelled = (points[:, [0, 2]] - origin_mm for points in (labels.point_mm, labels.model_point_mm))
     for number, at in enumerate(stated, 1):
         outward = at / max(float(np.linalg.norm(at)), 1.0) * 0.07 * extent
         axes.annotate(
@@ -135,14 +124,14 @@ def workspace_drawing(section: Section, labels: KeyPoses, origin_mm: Sequence[fl
             arrowprops={"arrowstyle": "-", "color": REFERENCE},
         )  # fmt: skip
         axes.plot(*at, "o", markersize=9, markerfacecolor="none", markeredgecolor=REFERENCE, zorder=4)
-        axes.plot(*model[number - 1], ".", color=MODEL, markersize=5, zorder=4)
+        axes.plot(*modelled[number - 1], ".", color=MODEL, markersize=5, zorder=4)
     margin = 0.12 * extent
     axes.plot([x.min() - margin, x.max() + margin], [z.min() - margin, z.max() + margin], alpha=0)
     equal_scale(axes, tr("x from axis 1 (mm)"), tr("z from axis 2 (mm)"))
     return figure
 
 
-def _by_source(stated: Axes) -> list[tuple[str, Axes]]:
+def _by_source(stated: model.Axes) -> list[tuple[str, model.Axes]]:
     return [(source, stated.take(stated.source == source)) for source in dict.fromkeys(stated.source)]
 
 
@@ -293,7 +282,7 @@ class CalibrationStory:
     """What the page says about a reference set's calibration; ``found`` is None where there is none."""
 
     reference_set: str
-    found: Calibrated | None
+    found: model.Calibrated | None
     text: str
     level: str
     held: list[str]
@@ -303,18 +292,18 @@ class CalibrationStory:
     rows: list[list[str]]
 
 
-def diagnosis_stories(summary: ValidationSummary, residuals: Residuals) -> list[DiagnosisStory]:
+def diagnosis_stories(summary: model.ValidationSummary, residuals: model.Residuals) -> list[DiagnosisStory]:
     """Per reference set: what the diagnosis says, the next-best hypotheses, and the residuals as a figure."""
     claims = {found.name for found in summary.sets if not found.is_authoritative}
     return [_diagnosis_story(each, residuals, each.reference_set in claims) for each in summary.diagnoses]
 
 
-def correction_stories(summary: ValidationSummary, corrections: Corrections) -> list[CalibrationStory]:
+def correction_stories(summary: model.ValidationSummary, corrections: model.Corrections) -> list[CalibrationStory]:
     """Per reference set: what its positions say about the table's entries, with the figure."""
     return [_calibration_story(calibration, corrections) for calibration in summary.calibrations]
 
 
-def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals, own_claims: bool) -> DiagnosisStory:
+def _diagnosis_story(diagnosis: model.SetDiagnosis, residuals: model.Residuals, own_claims: bool) -> DiagnosisStory:
     named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault | TooSmallToTell)
     best = diagnosis.hypotheses[0] if named else None
     return DiagnosisStory(
@@ -332,7 +321,7 @@ def _diagnosis_story(diagnosis: SetDiagnosis, residuals: Residuals, own_claims: 
     )
 
 
-def _measured_against(diagnosis: SetDiagnosis) -> str:
+def _measured_against(diagnosis: model.SetDiagnosis) -> str:
     """What residuals are measured against, and what of that is no evidence."""
     own = [own_title(title) for title in diagnosis.against if title in diagnosis.from_table]
     others = [own_title(title) for title in diagnosis.against if title not in diagnosis.from_table]
@@ -350,8 +339,8 @@ def _measured_against(diagnosis: SetDiagnosis) -> str:
     return text
 
 
-def _calibration_story(calibration: SetCalibration, corrections: Corrections) -> CalibrationStory:
-    found = calibration.result if isinstance(calibration.result, Calibrated) else None
+def _calibration_story(calibration: model.SetCalibration, corrections: model.Corrections) -> CalibrationStory:
+    found = calibration.result if isinstance(calibration.result, model.Calibrated) else None
     text = typographic(say(found.conclusion if found else calibration.result))
     own = corrections.take(corrections.reference_set == calibration.reference_set)
     alt = tr("Correction of each estimated entry of the table with its 95 % interval, lengths and angles apart.")
@@ -381,7 +370,7 @@ def _calibration_story(calibration: SetCalibration, corrections: Corrections) ->
     )
 
 
-def residual_figure(rows: Residuals) -> Figure:
+def residual_figure(rows: model.Residuals) -> Figure:
     """Residuals before and after the best hypothesis, with each reference's uncertainty; worst on top."""
     figure, axes = new_figure(width=9, height=1.5 + 0.32 * len(rows))
     at = np.arange(len(rows))[::-1]
@@ -400,7 +389,7 @@ def residual_figure(rows: Residuals) -> Figure:
     return figure
 
 
-def corrections_figure(rows: Corrections) -> Figure:
+def corrections_figure(rows: model.Corrections) -> Figure:
     """Corrections with their 95 % intervals, lengths and angles in panels of their own."""
     parts = [rows.take(rows.unit == unit) for unit in ("mm", "deg") if (rows.unit == unit).any()]
     counts = [len(own) for own in parts]
@@ -416,7 +405,7 @@ def corrections_figure(rows: Corrections) -> Figure:
     return figure
 
 
-def _residual_picture(rows: Residuals, diagnosis: SetDiagnosis) -> Picture | None:
+def _residual_picture(rows: model.Residuals, diagnosis: model.SetDiagnosis) -> Picture | None:
     missed = rows.take((rows.before > rows.uncertainty) | (rows.after > rows.uncertainty))
     if not len(missed):
         return None
@@ -435,7 +424,7 @@ def _residual_picture(rows: Residuals, diagnosis: SetDiagnosis) -> Picture | Non
     return Picture(residual_figure(shown), alt, caption)
 
 
-def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
+def _hypothesis_row(hypothesis: model.RankedHypothesis) -> list[str]:
     words = both(hypothesis.faults)
     if alike := hypothesis.indistinguishable_from:
         words = sentence(
@@ -447,7 +436,7 @@ def _hypothesis_row(hypothesis: RankedHypothesis) -> list[str]:
     return [typographic(words), *numbers, tr(hypothesis.unit), fixed(hypothesis.score, 1)]
 
 
-def corrected_robot(robot: Robot, diagnoses: Iterable[SetDiagnosis]) -> tuple[Robot | None, str]:
+def corrected_robot(robot: Robot, diagnoses: Iterable[model.SetDiagnosis]) -> tuple[Robot | None, str]:
     """The robot with the first named fault corrected, and its label; None if no fault is named."""
     for diagnosis in diagnoses:
         if diagnosis.corrected and isinstance(diagnosis.conclusion, MostLikelyFault | MainFault):

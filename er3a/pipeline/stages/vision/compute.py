@@ -16,7 +16,6 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
-from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import ObjectEntry, VisionFile, load_vision
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import rpy_of
@@ -29,49 +28,13 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.trajectory.motion import limits_of
+from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.entry import VisionSettings
-from er3a.pipeline.stages.vision.model import (
-    CalibrationDoubtful,
-    CalibrationImpossible,
-    CalibrationResult,
-    CornerRows,
-    DirectionContradicted,
-    EntryCorrection,
-    ErrorMapRows,
-    ErrorParts,
-    GraspCounts,
-    GraspPrograms,
-    GraspResult,
-    MethodResult,
-    NotGraspedObject,
-    ObjectResult,
-    OffsetResult,
-    PathRows,
-    PoseEstimate,
-    SampleRows,
-    TableResult,
-    TouchContradicts,
-    TouchedPoint,
-    TouchResult,
-    ViewToAdd,
-    VisionResults,
-    VisionSummary,
-)
 from er3a.pipeline.study import Study
 from er3a.planning.timing import JointLimits
+from er3a.programs import instructions
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import TO_START
-from er3a.programs.instructions import (
-    ArmMotion,
-    Instruction,
-    JointTarget,
-    Listing,
-    NamedFrame,
-    Pause,
-    PoseTarget,
-    Rate,
-    Remark,
-)
 from er3a.programs.languages import not_written, write_program
 from er3a.programs.syntax import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
@@ -115,7 +78,7 @@ class MapTask:
     cells: int
 
 
-def error_map(found: HandEye, task: MapTask) -> ErrorMapRows:
+def error_map(found: HandEye, task: MapTask) -> model.ErrorMapRows:
     """Errors on a square around the objects, of the first object's grasp held at each cell."""
     middle = task.places[:, :3, 3].mean(axis=0)
     half = max(LEAST_HALF, (1 + MARGIN) * float(np.abs(task.places[:, :2, 3] - middle[:2]).max()))
@@ -128,7 +91,7 @@ def error_map(found: HandEye, task: MapTask) -> ErrorMapRows:
     covariance = np.broadcast_to(task.camera_covariance, (len(x), 6, 6))
     parts = seen_pose_error(found, seen, covariance, task.accuracy, (task.robot, q, task.picture))
     together = np.where(reached, np.stack(error_sizes(parts.whole)), np.nan)
-    return ErrorMapRows(
+    return model.ErrorMapRows(
         x_mm=1000 * x,
         y_mm=1000 * y,
         in_view=in_sight(task.view, seen[:, :3, 3]),
@@ -159,7 +122,7 @@ CSV_POINTS = 41
 
 def grasp_programs(
     robot: Robot, name: str, home: Reals, chosen: ChosenGrasp, languages: Sequence[LanguageName]
-) -> GraspPrograms:
+) -> model.GraspPrograms:
     """A grasp in each language that has this arm's joints."""
     own = program_name(f"grasp_{name}", LONGEST_NAME)
     head = f"grasp {ascii_text(chosen.grasp)} of {ascii_text(name)} by {ascii_text(robot.title)}, from where it waits"
@@ -173,7 +136,7 @@ def grasp_programs(
             options = WriteOptions(robot, home, head=(head,))
             files = dict(write_program(_listing(robot, own, home, chosen), language, options).files)
         rows += [(language, own + suffix, text) for suffix, text in files.items()]
-    return GraspPrograms(
+    return model.GraspPrograms(
         target=np.full(len(rows), name, object),
         language=np.array([row[0] for row in rows], object),
         file=np.array([row[1] for row in rows], object),
@@ -181,19 +144,27 @@ def grasp_programs(
     )
 
 
-def _listing(robot: Robot, name: str, home: Reals, chosen: ChosenGrasp) -> Listing:
-    tool, base, to_robot = NamedFrame("", robot.tool), NamedFrame("", np.eye(4)), np.linalg.inv(robot.base)
-    found: list[Instruction] = [ArmMotion("joint", JointTarget(home), speed=TO_START, tool=tool, base=base)]
+def _listing(robot: Robot, name: str, home: Reals, chosen: ChosenGrasp) -> instructions.Listing:
+    tool, base, to_robot = (
+        instructions.NamedFrame("", robot.tool),
+        instructions.NamedFrame("", np.eye(4)),
+        np.linalg.inv(robot.base),
+    )
+    found: list[instructions.Instruction] = [
+        instructions.ArmMotion("joint", instructions.JointTarget(home), speed=TO_START, tool=tool, base=base)
+    ]
     for before, leg in zip((None, *chosen.legs), chosen.legs):
         if before is not None and _closes(before, leg):
-            found += [Remark(CLOSE), Pause(GRIPPER_S)]
-        rate = Rate(leg.duration, "s")
+            found += [instructions.Remark(CLOSE), instructions.Pause(GRIPPER_S)]
+        rate = instructions.Rate(leg.duration, "s")
         if leg.T_end is None:
-            found.append(ArmMotion("joint", JointTarget(leg.q_end), speed=rate, tool=tool, base=base))
+            found.append(
+                instructions.ArmMotion("joint", instructions.JointTarget(leg.q_end), speed=rate, tool=tool, base=base)
+            )
         else:
-            target = PoseTarget(to_robot @ leg.T_end, joints=leg.q_end)
-            found.append(ArmMotion("line", target, speed=rate, tool=tool, base=base))
-    return Listing(name, tuple(found))
+            target = instructions.PoseTarget(to_robot @ leg.T_end, joints=leg.q_end)
+            found.append(instructions.ArmMotion("line", target, speed=rate, tool=tool, base=base))
+    return instructions.Listing(name, tuple(found))
 
 
 def _programs_table(robot: Robot, chosen: ChosenGrasp, head: str) -> str:
@@ -225,12 +196,12 @@ def calibration_result(
     offset: TimeOffset | None,
     table: TableCorrections | NoCorrections | None,
     images: SeenImages | None,
-) -> CalibrationResult:
+) -> model.CalibrationResult:
     """All that the summary says of a calibration."""
     spread, turned = spread_of(found)
     moved, tilted = (None, None) if found.without_suspects is None else found.without_suspects
     return stated(
-        CalibrationResult,
+        model.CalibrationResult,
         found,
         title=head.title,
         source=head.source,
@@ -249,8 +220,8 @@ def calibration_result(
         moved_deg=from_si("deg", tilted),
         methods=tuple(map(_method, found.methods)),
         touch=_touch(found),
-        next_view=stated(ViewToAdd, view) if view else None,
-        time_offset=stated(OffsetResult, offset) if offset else None,
+        next_view=stated(model.ViewToAdd, view) if view else None,
+        time_offset=stated(model.OffsetResult, offset) if offset else None,
         table=_table_result(table) if isinstance(table, TableCorrections) else table,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
         boardless=images.boardless if images else (),
@@ -258,13 +229,13 @@ def calibration_result(
     )
 
 
-def _table_result(found: TableCorrections) -> TableResult:
+def _table_result(found: TableCorrections) -> model.TableResult:
     rows = zip(found.estimates, found.entry_half_width.tolist())
     return stated(
-        TableResult,
+        model.TableResult,
         found,
         entries=tuple(
-            EntryCorrection(each.name, each.unit, each.nominal, each.correction, half) for each, half in rows
+            model.EntryCorrection(each.name, each.unit, each.nominal, each.correction, half) for each, half in rows
         ),
         moved_mm=from_si("mm", found.moved[0]),
         moved_deg=from_si("deg", found.moved[1]),
@@ -272,9 +243,9 @@ def _table_result(found: TableCorrections) -> TableResult:
     )
 
 
-def _estimate(T: Reals, half_width: Reals) -> PoseEstimate:
+def _estimate(T: Reals, half_width: Reals) -> model.PoseEstimate:
     position, turn = from_si("mm", half_width[:3]), from_si("deg", half_width[3:])
-    return stated(PoseEstimate, **_pose(T), half_width_mm=position, half_width_deg=turn)
+    return stated(model.PoseEstimate, **_pose(T), half_width_mm=position, half_width_deg=turn)
 
 
 def _pose(T: Reals) -> dict[str, Reals]:
@@ -282,27 +253,27 @@ def _pose(T: Reals) -> dict[str, Reals]:
     return {"xyz": T[:3, 3], "rpy": rpy_of(T), "quaternion_wxyz": quaternion_of(T)}
 
 
-def _method(answer: MethodAnswer) -> MethodResult:
+def _method(answer: MethodAnswer) -> model.MethodResult:
     numbers = (answer.apart_mm, answer.apart_deg, answer.beyond, answer.rms_mm, answer.rms_deg)
-    return MethodResult(answer.name, *(None if answer.X is None else number for number in numbers))
+    return model.MethodResult(answer.name, *(None if answer.X is None else number for number in numbers))
 
 
-def _touch(found: HandEye) -> TouchResult | None:
+def _touch(found: HandEye) -> model.TouchResult | None:
     if found.touch is None:
         return None
     rows = zip(found.touch.difference, found.touch.half_width)
-    points = tuple(stated(TouchedPoint, difference=difference, half_width=half) for difference, half in rows)
-    return TouchResult(points, found.touch.probability)
+    points = tuple(stated(model.TouchedPoint, difference=difference, half_width=half) for difference, half in rows)
+    return model.TouchResult(points, found.touch.probability)
 
 
-def sample_rows(found: HandEye, joints: int) -> SampleRows:
+def sample_rows(found: HandEye, joints: int) -> model.SampleRows:
     """One row for each sample."""
     samples, count = found.samples, len(found.samples)
     in_hand = samples.setup == "eye_in_hand"
     seen = (samples.flange if in_hand else np.eye(4)) @ found.X @ samples.target
     predicted = np.broadcast_to(found.Y, seen.shape) if in_hand else samples.flange @ found.Y
     others = np.where(np.eye(count, dtype=bool) | ~found.used, np.nan, found.mismatch)
-    return SampleRows(
+    return model.SampleRows(
         sample=np.array(samples.names, object),
         used=found.used,
         residual_mm=1000 * found.residual[:, :3],
@@ -315,10 +286,10 @@ def sample_rows(found: HandEye, joints: int) -> SampleRows:
     )
 
 
-def corner_rows(found: HandEye, images: SeenImages | None) -> CornerRows:
+def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
     """One row for each corner in each image."""
     if images is None:
-        return CornerRows.empty()
+        return model.CornerRows.empty()
     predicted = inverted(found.samples.hand @ found.X) @ found.Y
     views, tables = images.views, []
     for k, (name, points, seen, by_board) in enumerate(
@@ -326,7 +297,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> CornerRows:
     ):
         count = len(points)
         tables.append(
-            CornerRows(
+            model.CornerRows(
                 sample=np.full(count, found.samples.names[k], object),
                 image=np.full(count, name, object),
                 used=np.full(count, found.used[k]),
@@ -335,7 +306,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> CornerRows:
                 by_arm_px=projected(points, predicted[k], views.camera),
             )
         )
-    return CornerRows.stacked(tables)
+    return model.CornerRows.stacked(tables)
 
 
 STAGE = "vision"
@@ -344,36 +315,35 @@ CONTRADICTED = 1e-3
 LEG_ROWS = 13
 
 Found = (
-    CalibrationImpossible
-    | CalibrationDoubtful
-    | DirectionContradicted
-    | TouchContradicts
-    | GraspCounts
+    model.CalibrationImpossible
+    | model.CalibrationDoubtful
+    | model.DirectionContradicted
+    | model.TouchContradicts
+    | model.GraspCounts
     | ExpectationsUnmet
 )
 
 
-def compute(study: Study, name: str) -> VisionResults:
+def compute(study: Study, name: str) -> model.VisionResults:
     """Calibrate and plan grasps for a robot of the study."""
     robot, file = study.robot(name), Path(str(study.entry(name).vision))
     task_file = load_vision(file, robot)
     head_path = file.parent / task_file.calibration
     head = load(HandEyeFile, head_path)
-    scene_file = study.scene(name, STAGE)
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, STAGE)
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")
     samples, offset, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
+    settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
     try:
         found = calibrate_hand_eye(samples)
     except HandEyeError as error:
-        verdict: Verdict[Found] = Verdict("fail", CalibrationImpossible(error.finding))
-        level = study.section(VisionSettings).least_success
-        summary = VisionSummary(verdict, (), task_file.title, title, level, None, ())
-        empty = (SampleRows.empty(), ErrorMapRows.empty(), PathRows.empty(), GraspPrograms.empty(), CornerRows.empty())
-        return VisionResults(summary, *empty)
+        verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
+        return _without_calibration(
+            model.VisionSummary(verdict, (), task_file.title, title, settings.least_success, None, ())
+        )
     picture = None if head.setup == "eye_to_hand" else np.radians(task_file.picture_deg or [])
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
@@ -385,8 +355,6 @@ def compute(study: Study, name: str) -> VisionResults:
     table = correct_table(found, robot, head.table_corrections) if head.table_corrections else None
     calibration = calibration_result(head, found, to_add, offset, table, images)
     doubt = _doubt(calibration)
-    settings = study.section(VisionSettings)
-    motions = study.section(TrajectorySettings)
     planned = []
     if not doubt:
         limits = (limits_of(robot, motions), study.seed)
@@ -394,7 +362,7 @@ def compute(study: Study, name: str) -> VisionResults:
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
     judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects)
     bodies = bodies_of(robot, scene)
-    summary = VisionSummary(
+    summary = model.VisionSummary(
         verdict=judged.without(bodies.unexamined).resting_on(_shapes(robot, objects, motions)),
         figures=_figures(calibration, objects),
         title=task_file.title,
@@ -421,12 +389,12 @@ def compute(study: Study, name: str) -> VisionResults:
         camera_covariance=np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0),
         cells=settings.map_cells,
     )
-    return VisionResults(
+    return model.VisionResults(
         summary,
         sample_rows(found, len(robot.lower)),
         error_map(found, map_task),
-        PathRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
-        GraspPrograms.stacked(
+        model.PathRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
+        model.GraspPrograms.stacked(
             grasp_programs(robot, entry.name, np.radians(task_file.home_deg), plan.chosen, motions.programs)
             for entry, plan, _ in planned
             if plan.chosen
@@ -435,7 +403,19 @@ def compute(study: Study, name: str) -> VisionResults:
     )
 
 
-def _left_out(found: CalibrationResult, file: VisionFile) -> Iterator[LeftOut]:
+def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
+    """What is written where the samples allow no calibration: no rows."""
+    return model.VisionResults(
+        summary,
+        model.SampleRows.empty(),
+        model.ErrorMapRows.empty(),
+        model.PathRows.empty(),
+        model.GraspPrograms.empty(),
+        model.CornerRows.empty(),
+    )
+
+
+def _left_out(found: model.CalibrationResult, file: VisionFile) -> Iterator[LeftOut]:
     """What the calibration does not rest on, what nothing checks it against, and what grasps leave open."""
     places = np.array([each.pose()[:3, 3] for each in file.objects])
     seen = in_sight(file.view.view(NO_BOARD), places)
@@ -455,7 +435,7 @@ def _left_out(found: CalibrationResult, file: VisionFile) -> Iterator[LeftOut]:
     yield LeftOut("gripped_parts")
 
 
-def _shapes(robot: Robot, objects: tuple[ObjectResult, ...], motions: TrajectorySettings) -> ShapesAssumed | None:
+def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], motions: TrajectorySettings) -> ShapesAssumed | None:
     """What assumed shapes of the arm leave open of the grasps; None without any grasp."""
     clear = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
     near = {name: None if least is None else least / 1000 for name, least in clear.items()}
@@ -468,19 +448,21 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
     return placed
 
 
-def _doubt(found: CalibrationResult) -> CalibrationDoubtful | DirectionContradicted | TouchContradicts | None:
+def _doubt(
+    found: model.CalibrationResult,
+) -> model.CalibrationDoubtful | model.DirectionContradicted | model.TouchContradicts | None:
     """Why no grasp may rest on a calibration; None if nothing speaks against it."""
     if doubts := grave_warnings(found.warnings):
-        return CalibrationDoubtful(doubts)
+        return model.CalibrationDoubtful(doubts)
     given = found.directions[0]
     best = next(each for each in found.directions if each.status == "best")
     if given.status == "excluded":
-        return DirectionContradicted(
+        return model.DirectionContradicted(
             best.flange_inverted, best.target_inverted, best.rms_mm or np.nan, given.rms_mm or 0.0
         )
     if found.touch is not None and found.touch.probability < CONTRADICTED:
         largest = max(float(np.linalg.norm(point.difference_mm)) for point in found.touch.points)
-        return TouchContradicts(len(found.touch.points), largest, found.touch.probability)
+        return model.TouchContradicts(len(found.touch.points), largest, found.touch.probability)
     return None
 
 
@@ -528,7 +510,7 @@ def _error_at(
     return seen_pose_error(found, target.T_camera_object, target.covariance, accuracy, (arm[0], q, arm[1]))
 
 
-def _object(entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError | None) -> ObjectResult:
+def _object(entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError | None) -> model.ObjectResult:
     parts = (
         None
         if error is None
@@ -540,23 +522,23 @@ def _object(entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError 
         )
     )
     return stated(
-        ObjectResult,
+        model.ObjectResult,
         plan,
         name=entry.name,
         note=entry.note,
         **_pose(T),
         outcome="grasped" if plan.chosen else "not graspable",
         expect=entry.expect,
-        error_mm=None if parts is None else ErrorParts(*(1000 * parts[:, 0]).tolist()),
-        error_deg=None if parts is None else ErrorParts(*np.degrees(parts[:, 1]).tolist()),
+        error_mm=None if parts is None else model.ErrorParts(*(1000 * parts[:, 0]).tolist()),
+        error_deg=None if parts is None else model.ErrorParts(*np.degrees(parts[:, 1]).tolist()),
         grasp=_grasp(plan.chosen) if plan.chosen else None,
     )
 
 
-def _grasp(chosen: ChosenGrasp) -> GraspResult:
+def _grasp(chosen: ChosenGrasp) -> model.GraspResult:
     pose = _pose(chosen.T_base_tool)
     return stated(
-        GraspResult,
+        model.GraspResult,
         chosen,
         tool_xyz=pose["xyz"],
         tool_rpy=pose["rpy"],
@@ -565,22 +547,24 @@ def _grasp(chosen: ChosenGrasp) -> GraspResult:
     )
 
 
-def _verdict(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) -> Verdict[Found]:
+def _verdict(calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...]) -> Verdict[Found]:
     if unmet := unmet_expectations(objects):
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
-    missed = tuple(NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
+    missed = tuple(model.NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
     suspects = tuple(each.sample for each in calibration.suspects if each.code != "repeated_pose")
     left_out = (*suspects, *(each.sample for each in calibration.boardless))
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
-    counts = GraspCounts(len(asked), len(asked) - len(missed), missed, left_out, worst, shown, calibration.simulated)
+    counts = model.GraspCounts(
+        len(asked), len(asked) - len(missed), missed, left_out, worst, shown, calibration.simulated
+    )
     if asked and len(missed) == len(asked):
         return Verdict("fail", counts)
     return Verdict("caution" if missed or calibration.warnings else "pass", counts)
 
 
-def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) -> tuple[Figure, ...]:
+def _figures(calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...]) -> tuple[Figure, ...]:
     asked = [each for each in objects if each.expect in (None, "grasped")]
     least = min((each.grasp.probability for each in asked if each.grasp), default=None)
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
@@ -595,7 +579,7 @@ def _figures(calibration: CalibrationResult, objects: tuple[ObjectResult, ...]) 
     )
 
 
-def _ways(name: str, chosen: ChosenGrasp) -> PathRows:
+def _ways(name: str, chosen: ChosenGrasp) -> model.PathRows:
     """The whole motion, each point once."""
     parts: list[str] = []
     times, rows, now = [], [], 0.0
@@ -607,7 +591,7 @@ def _ways(name: str, chosen: ChosenGrasp) -> PathRows:
         rows.append(q[first:])
         now += leg.duration
     part = np.array(parts, object)
-    return PathRows(
+    return model.PathRows(
         target=np.full(len(part), name, object),
         part=part,
         step=np.concatenate([np.arange((part == each).sum()) for each in PARTS]),

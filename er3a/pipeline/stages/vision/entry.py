@@ -61,16 +61,12 @@ def _inputs(study: StudyFiles, robot: str) -> list[Path]:
     return [*vision_files(file), *study.scenes(robot, STAGE.name)] if file else []
 
 
-def _wanted(study: StudyFiles, robot: str) -> bool:
-    return study.entry(robot).vision is not None
-
-
 STAGE = Stage(
     name="vision",
     title=N_("vision"),
     question=N_("Is the camera calibrated well enough, and which objects can be grasped?"),
     settings={"vision": VisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
-    wanted=_wanted,
+    wanted=lambda study, robot: study.entry(robot).vision is not None,
     rests_on=("validation",),
 )

@@ -8,7 +8,6 @@ import numpy as np
 import rerun as rr
 import scipy
 
-from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -24,7 +23,6 @@ from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 from er3a.vision.calibration_set import posed
 
-STAGE = "vision"
 MAGNIFIED = 50.0
 SIGHT = 0.35  # of the farthest distance, how far the drawn pyramid reaches
 STEP_S, SAMPLE_S = 0.1, 0.5
@@ -46,7 +44,7 @@ Press play: the arm goes through the samples, then to each object that it can gr
 def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     results, summary, robot = stored.results, stored.results.summary, study.robot(stored.robot)
-    scene, size = study.scene(stored.robot, STAGE), size_of(robot)
+    size = size_of(robot)
     task = load_vision(str(study.entry(stored.robot).vision))
     found, home = summary.calibration, np.radians(task.home_deg)
     shapes: dict[str, Logged] = _samples(results.samples, size)
@@ -58,10 +56,10 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     shown = Recorded(
         robot=robot,
         name=stored.robot,
-        stage=STAGE,
+        stage=stored.stage,
         note=NOTE,
         runs=[_sampled(results.samples, home), *(_grasped(results, each, home) for each in summary.objects)],
-        scene=load_scene(scene) if scene else None,
+        scene=study.scene(stored.robot, stored.stage),
         views={"Camera and grasps": ["**"]},
         shapes=shapes,
         points=[np.array([found.hand_eye.xyz_mm]) / 1000] if found is not None and fixed else [],

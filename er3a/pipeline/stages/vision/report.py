@@ -10,7 +10,6 @@ from markupsafe import Markup
 from matplotlib.ticker import MaxNLocator
 
 from er3a.files.hand_eye_file import HandEyeFile, grey_image
-from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
 from er3a.numerics.arrays import Reals
@@ -18,7 +17,6 @@ from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.messages.vision import (
     DIRECTION_STATUS,
-    FIGURES,
     METHODS,
     correction_verdict,
     direction_word,
@@ -28,22 +26,11 @@ from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.vision.model import (
-    CalibrationResult,
-    CornerRows,
-    ErrorMapRows,
-    GraspPrograms,
-    ObjectResult,
-    PoseEstimate,
-    SampleRows,
-    TableResult,
-    TouchResult,
-    VisionResults,
-)
+from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, head_of, panel_link, render, run_command, text_address
+from er3a.pipeline.viewing.page import Picture, panel_link, render_stage, text_address
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
 from er3a.programs.languages import titles_unwritten
 from er3a.vision.table_corrections import NoCorrections
@@ -54,7 +41,7 @@ WIDEST_PX = 480
 ARROW_PX = 30.0
 
 
-def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
+def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> Picture:
     """Length of each sample's residual, position above, rotation below."""
     sizes = np.linalg.norm(rows.residual_mm, axis=1), np.linalg.norm(rows.residual_deg, axis=1)
     usual = [1.6 * found.camera_mm, 1.6 * found.camera_deg]
@@ -79,7 +66,7 @@ def residual_picture(rows: SampleRows, found: CalibrationResult) -> Picture:
     return Picture(figure, tr("Bars of the residual of each sample, in mm and in degrees"), caption)
 
 
-def image_picture(rows: CornerRows, folder: Path) -> Picture:
+def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     """The images with the largest residuals: corners detected, and arrows to where arm and calibration put them."""
     off = rows.by_arm_px - rows.seen_px
     size = {
@@ -128,7 +115,7 @@ def image_picture(rows: CornerRows, folder: Path) -> Picture:
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
 
-def map_picture(rows: ErrorMapRows, objects: tuple[ObjectResult, ...]) -> Picture:
+def map_picture(rows: model.ErrorMapRows, objects: tuple[model.ObjectResult, ...]) -> Picture:
     """Errors around the objects, from above."""
     x, y = np.unique(rows.x_mm), np.unique(rows.y_mm)
     seen = rows.in_view
@@ -196,19 +183,15 @@ PARTS = {
 }
 
 
-def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
     robot = study.robot(name)
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{name}/vision.html"),
-        robot=robot,
-        robot_pages=study.pages(name),
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
@@ -216,9 +199,9 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         methods=_methods(found) if found else [],
         disagreement=_disagreement(found) if found else "",
         directions=_directions(found) if found else [],
-        corrections=_corrections(found.table) if found and isinstance(found.table, TableResult) else [],
+        corrections=_corrections(found.table) if found and isinstance(found.table, model.TableResult) else [],
         held=_held(found.table) if found else [],
-        corrected=_corrected(found.table) if found and isinstance(found.table, TableResult) else "",
+        corrected=_corrected(found.table) if found and isinstance(found.table, model.TableResult) else "",
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
@@ -229,7 +212,7 @@ def report(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
-        player=player(robot, _motions(results), load_scene(scene) if scene else None),
+        player=player(robot, _motions(results), scene),
         drawing_head=drawing_head(),
         next_pose=panel_link(found.next_view.q_deg, _listed(found.next_view.q_deg))
         if found and found.next_view
@@ -244,7 +227,7 @@ def _image_folder(study: Study, name: str) -> Path:
     return (head.parent / str(load(HandEyeFile, head).samples)).parent
 
 
-def _programs(rows: GraspPrograms) -> list[tuple[str, list[tuple[str, str]]]]:
+def _programs(rows: model.GraspPrograms) -> list[tuple[str, list[tuple[str, str]]]]:
     """Of each object its programs: the file's name, and the data address of its text."""
     found: dict[str, list[tuple[str, str]]] = {}
     for target, file, text in zip(rows.target.tolist(), rows.file.tolist(), rows.text.tolist()):
@@ -252,7 +235,7 @@ def _programs(rows: GraspPrograms) -> list[tuple[str, list[tuple[str, str]]]]:
     return list(found.items())
 
 
-def _motions(results: VisionResults) -> list[PlayedMotion]:
+def _motions(results: model.VisionResults) -> list[PlayedMotion]:
     """The way to each object grasped and away from it, with a line that points at the object."""
     motions = []
     for each in results.summary.objects:
@@ -272,13 +255,13 @@ def _listed(values: Iterable[float], digits: int = 1) -> str:
     return ", ".join(fixed(value, digits) for value in values)
 
 
-def _poses(found: CalibrationResult) -> list[tuple[str, str, list[list[str]]]]:
+def _poses(found: model.CalibrationResult) -> list[tuple[str, str, list[list[str]]]]:
     """Title, quaternion and rows of both poses with intervals."""
     both = zip(pose_words(found.setup), (found.hand_eye, found.board))
     return [(title, _listed(pose.quaternion_wxyz, 6), _pose_rows(pose)) for title, pose in both]
 
 
-def _pose_rows(pose: PoseEstimate) -> list[list[str]]:
+def _pose_rows(pose: model.PoseEstimate) -> list[list[str]]:
     shifts = [
         [f"{axis} (mm)", fixed(value, 3), f"± {fixed(half, 3)}"]
         for axis, value, half in zip(AXES, pose.xyz_mm, pose.half_width_mm)
@@ -291,7 +274,7 @@ def _pose_rows(pose: PoseEstimate) -> list[list[str]]:
     return [*shifts, *turns]
 
 
-def _methods(found: CalibrationResult) -> list[list[str]]:
+def _methods(found: model.CalibrationResult) -> list[list[str]]:
     rows = [[tr("maximum likelihood"), "", "", "", fixed(_rms(found), 3)]]
     for each in found.methods:
         numbers = (each.apart_mm, each.apart_deg, each.beyond, each.rms_mm)
@@ -300,11 +283,11 @@ def _methods(found: CalibrationResult) -> list[list[str]]:
     return rows
 
 
-def _rms(found: CalibrationResult) -> float:
+def _rms(found: model.CalibrationResult) -> float:
     return found.directions[0].rms_mm or 0.0
 
 
-def _disagreement(found: CalibrationResult) -> str:
+def _disagreement(found: model.CalibrationResult) -> str:
     off = [METHODS[each.method] for each in found.methods if each.beyond is not None and each.beyond > 1]
     if not off:
         return tr(
@@ -328,7 +311,7 @@ def _disagreement(found: CalibrationResult) -> str:
     return joined([weights, why], " ")
 
 
-def _directions(found: CalibrationResult) -> list[list[str]]:
+def _directions(found: model.CalibrationResult) -> list[list[str]]:
     return [
         [
             direction_word(each),
@@ -340,7 +323,7 @@ def _directions(found: CalibrationResult) -> list[list[str]]:
     ]
 
 
-def _corrections(found: TableResult) -> list[list[str]]:
+def _corrections(found: model.TableResult) -> list[list[str]]:
     return [
         [
             each.entry,
@@ -353,25 +336,25 @@ def _corrections(found: TableResult) -> list[list[str]]:
     ]
 
 
-def _held(found: TableResult | NoCorrections | None) -> list[str]:
+def _held(found: model.TableResult | NoCorrections | None) -> list[str]:
     """Why entries keep their values, or why none is corrected."""
     if found is None:
         return []
     return [say(found)] if isinstance(found, NoCorrections) else listed(found.held)
 
 
-def _corrected(found: TableResult) -> str:
+def _corrected(found: model.TableResult) -> str:
     return correction_verdict(found.probability, found.scatter_before, found.scatter)
 
 
-def _touched(found: TouchResult) -> list[list[str]]:
+def _touched(found: model.TouchResult) -> list[list[str]]:
     return [
         [str(k + 1), *(f"{fixed(d, 2)} ± {fixed(h, 2)}" for d, h in zip(point.difference_mm, point.half_width_mm))]
         for k, point in enumerate(found.points)
     ]
 
 
-def _overview(each: ObjectResult) -> list[str]:
+def _overview(each: model.ObjectResult) -> list[str]:
     if each.grasp:
         parts = {"grasp": each.grasp.grasp, "turn": fixed(each.grasp.turn_deg, 0)}
         outcome = tr("{grasp}, turned by {turn} deg", **parts)
@@ -383,7 +366,7 @@ def _overview(each: ObjectResult) -> list[str]:
     return [name, _listed(each.xyz_mm), outcome, success, counts]
 
 
-def _grasp(each: ObjectResult) -> list[str]:
+def _grasp(each: model.ObjectResult) -> list[str]:
     grasp = each.grasp
     assert grasp is not None
     near = tr("none") if grasp.clearance_mm is None else fixed(grasp.clearance_mm, 0)
@@ -400,7 +383,7 @@ def _grasp(each: ObjectResult) -> list[str]:
     ]
 
 
-def _errors(each: ObjectResult) -> list[str]:
+def _errors(each: model.ObjectResult) -> list[str]:
     mm, deg = each.error_mm, each.error_deg
     assert mm is not None
     assert deg is not None

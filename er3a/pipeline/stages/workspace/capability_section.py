@@ -23,22 +23,7 @@ from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.workspace import STATUS, box_text, millimetres, stand_text
 from er3a.pipeline.player.turning import CIRCLE, solid_pieces
-from er3a.pipeline.stages.workspace.model import (
-    BoxPlaces,
-    CapabilityCells,
-    CapabilityMissing,
-    CapabilitySummary,
-    CellLookup,
-    ClearSummary,
-    Placement,
-    PlacementSummary,
-    PlaceSummary,
-    SectionFrame,
-    Singles,
-    TaskSummary,
-    WorkspaceResults,
-    WorkspaceSummary,
-)
+from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.workspace_figures import slide_names
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
@@ -49,7 +34,7 @@ from er3a.robots.robot import Robot
 ROUNDING = 1e-6  # mm
 
 
-def best_text(summary: WorkspaceSummary, placement: PlacementSummary) -> str:
+def best_text(summary: model.WorkspaceSummary, placement: model.PlacementSummary) -> str:
     """Where to put the box, and what room that place has."""
     if not placement.named_places:
         return box_text(summary)
@@ -65,7 +50,7 @@ def best_text(summary: WorkspaceSummary, placement: PlacementSummary) -> str:
     return joined(texts, " ")
 
 
-def _nearest_limit(place: PlaceSummary) -> str:
+def _nearest_limit(place: model.PlaceSummary) -> str:
     if place.limit_margin_deg is None:
         return ""
     margin = fixed(place.limit_margin_deg, 1)
@@ -74,18 +59,18 @@ def _nearest_limit(place: PlaceSummary) -> str:
     return tr("The joint nearest to its limit is J{joint}: {margin} deg.", joint=place.limit_joint, margin=margin)
 
 
-def _nearest_bodies(place: PlaceSummary) -> str:
+def _nearest_bodies(place: model.PlaceSummary) -> str:
     if place.clearance_mm is None or place.clearance_pair is None:
         return ""
     pair, far = say(place.clearance_pair), fixed(place.clearance_mm, 0)
     return tr("The least clearance is {far} mm, between {pair}.", pair=pair, far=far)
 
 
-def _movable(place: PlaceSummary) -> bool:
+def _movable(place: model.PlaceSummary) -> bool:
     return any((*place.room_down_m, *place.room_up_m))
 
 
-def _room(place: PlaceSummary) -> str:
+def _room(place: model.PlaceSummary) -> str:
     """How far the box can be moved, such as ``x ±25, y -50 to 0``, in whole mm that the room holds."""
     if not _movable(place):
         return fixed(0, 0)
@@ -99,7 +84,7 @@ def _room(place: PlaceSummary) -> str:
     return ", ".join(parts)
 
 
-def place_row(name: str, place: PlaceSummary, capability: CapabilitySummary) -> list[str]:
+def place_row(name: str, place: model.PlaceSummary, capability: model.CapabilitySummary) -> list[str]:
     if place.branch is None and capability.arm_angles > 1:
         branch = tr("with joints {joints} at several values", joints=numbers(capability.held_joints))
         branch = branch if capability.held_joints else tr("at several arm angles")
@@ -163,10 +148,10 @@ _LABEL = 0.035  # height of a label, of the longer side of a drawing
 _PLANE = N_("from axis 1, in the arm's zero plane (mm)")
 
 
-def upright_slices(robot: Robot, capability: CapabilitySummary, cells: CapabilityCells) -> Figure:
+def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: model.CapabilityCells) -> Figure:
     """Three slices through axis 1, or across the slide at the middle of its way: reachability, IK solutions,
     manipulability."""
-    lookup, origin = CellLookup(capability, cells), across_slide(capability)
+    lookup, origin = model.CellLookup(capability, cells), across_slide(capability)
     x, z = lookup.reach * np.linspace(0 if lookup.bars else -1, 1, PIXELS), np.linspace(*lookup.heights, PIXELS)
     grid_x, grid_z = np.meshgrid(x, z, indexing="ij")
     if lookup.bars:
@@ -203,9 +188,11 @@ def upright_slices(robot: Robot, capability: CapabilitySummary, cells: Capabilit
     return figure
 
 
-def level_slices(capability: CapabilitySummary, cells: CapabilityCells, percent: Reals, label: str) -> Figure:
+def level_slices(
+    capability: model.CapabilitySummary, cells: model.CapabilityCells, percent: Reals, label: str
+) -> Figure:
     """A percentage of each cell, NaN where unknown, in three slices across axis 1, or along the slide."""
-    lookup, origin = CellLookup(capability, cells), across_slide(capability)
+    lookup, origin = model.CellLookup(capability, cells), across_slide(capability)
     line = lookup.reach * np.linspace(0 if lookup.bars else -1, 1, PIXELS)
     along = np.linspace(0, capability.bar_m, PIXELS) if lookup.bars else line
     x, y = np.meshgrid(line, along, indexing="ij")
@@ -231,7 +218,7 @@ def level_slices(capability: CapabilitySummary, cells: CapabilityCells, percent:
     return figure
 
 
-def asked_ratio(capability: CapabilitySummary) -> str:
+def asked_ratio(capability: model.CapabilitySummary) -> str:
     """Label of what of the orientations asked is reached."""
     return {
         "directions": tr("tool directions reached (%)"),
@@ -241,7 +228,7 @@ def asked_ratio(capability: CapabilitySummary) -> str:
     }[capability.asked]
 
 
-def solutions_label(capability: CapabilitySummary) -> str:
+def solutions_label(capability: model.CapabilitySummary) -> str:
     """Label of the solutions of what is asked."""
     return {
         "directions": tr("IK solutions per reached direction"),
@@ -251,13 +238,13 @@ def solutions_label(capability: CapabilitySummary) -> str:
     }[capability.asked]
 
 
-def across_slide(capability: CapabilitySummary) -> Reals:
+def across_slide(capability: model.CapabilitySummary) -> Reals:
     """Where bars begin in the plane across the slide, counted from the base's origin, (2,), m; 0 for rings."""
     frame = capability.frame
     return np.array(frame.axes)[[0, 2]] @ frame.origin_m if capability.bar_m else np.zeros(2)
 
 
-def clear_percent(cells: CapabilityCells) -> Reals:
+def clear_percent(cells: model.CapabilityCells) -> Reals:
     """Of the poses tried in each cell and reached, those held with nothing touched, %; NaN where none was reached."""
     reached = cells.reached_tries.astype(float)
     found: Reals = np.divide(100.0 * cells.clear_tries, reached, out=np.full(len(reached), np.nan), where=reached > 0)
@@ -266,9 +253,9 @@ def clear_percent(cells: CapabilityCells) -> Reals:
 
 def placement_views(
     robot: Robot,
-    capability: CapabilitySummary,
-    placement: PlacementSummary,
-    places: BoxPlaces,
+    capability: model.CapabilitySummary,
+    placement: model.PlacementSummary,
+    places: model.BoxPlaces,
     scene: Scene | None = None,
 ) -> Figure:
     """Where the middle of the box can stand, from above and from the side, with the best places as boxes."""
@@ -305,25 +292,27 @@ def placement_views(
     return figure
 
 
-def _looked_up(values: Reals | Singles, row: Integers) -> np.ma.MaskedArray:
+def _looked_up(values: Reals | model.Singles, row: Integers) -> np.ma.MaskedArray:
     return np.ma.masked_array(values[np.maximum(row, 0)], row < 0)
 
 
-def _quantiles(cells: CapabilityCells, bars: bool) -> Reals:
+def _quantiles(cells: model.CapabilityCells, bars: bool) -> Reals:
     """Heights below which 25, 50 and 75 % of the reached volume lie."""
     heights, row = np.unique(cells.z_m, return_inverse=True)
     volume = np.bincount(row, weights=None if bars else cells.rho_m)
     return np.interp(_HEIGHTS, volume.cumsum() / volume.sum(), heights)
 
 
-def _draw_arm(axes: Axes, robot: Robot, frame: SectionFrame, origin: Reals) -> None:
+def _draw_arm(axes: Axes, robot: Robot, frame: model.SectionFrame, origin: Reals) -> None:
     local = (skeleton(robot, np.zeros(robot.joints)) - frame.origin_m) @ np.array(frame.axes).T * 1000
     local[:, [0, 2]] += 1000 * origin
     axes.plot(local[:, 0], local[:, 2], color="white", linewidth=3.6, solid_capstyle="round")
     axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
 
 
-def _raster(points: Reals, steps: list[float], percent: Singles, proven: Flags) -> tuple[list[Reals], Reals, Flags]:
+def _raster(
+    points: Reals, steps: list[float], percent: model.Singles, proven: Flags
+) -> tuple[list[Reals], Reals, Flags]:
     """Edges of the raster's columns and rows (m), the largest value in each of its cells (proven ones first; -1: none
     there), and whether one is proven."""
     low = points.min(axis=0)
@@ -335,7 +324,7 @@ def _raster(points: Reals, steps: list[float], percent: Singles, proven: Flags) 
     return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value, sure
 
 
-def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, PlaceSummary]], shown: list[int]) -> None:
+def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, model.PlaceSummary]], shown: list[int]) -> None:
     """Outlines with their names; boxes that fall on each other share a label."""
     labels: dict[tuple[float, float], list[str]] = {}
     for name, place in listed:
@@ -355,10 +344,10 @@ def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, PlaceSummary]], shown: l
         axes.annotate(text, (x, y), (3, -10), textcoords="offset points", color=HIGHLIGHT, fontsize=8, bbox=shade)
 
 
-def capability_context(robot: Robot, results: WorkspaceResults, scene: Scene | None = None) -> dict[str, Any]:
+def capability_context(robot: Robot, results: model.WorkspaceResults, scene: Scene | None = None) -> dict[str, Any]:
     """What the template include ``capability.html.j2`` needs."""
     capability, placement = results.summary.capability, results.summary.placement
-    if isinstance(capability, CapabilityMissing) or placement is None:
+    if isinstance(capability, model.CapabilityMissing) or placement is None:
         return {"missing": say(capability)}
     return {
         "missing": "",
@@ -373,9 +362,13 @@ def capability_context(robot: Robot, results: WorkspaceResults, scene: Scene | N
 
 
 def _placement_context(
-    robot: Robot, results: WorkspaceResults, capability: CapabilitySummary, placement: Placement, scene: Scene | None
+    robot: Robot,
+    results: model.WorkspaceResults,
+    capability: model.CapabilitySummary,
+    placement: model.Placement,
+    scene: Scene | None,
 ) -> dict[str, Any]:
-    if not isinstance(placement, PlacementSummary):
+    if not isinstance(placement, model.PlacementSummary):
         return {"nowhere": say(placement), "best_text": ""}
     rows = [place_row(name, place, capability) for name, place in placement.named_places]
     return {
@@ -397,7 +390,7 @@ def _placement_context(
     }
 
 
-def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySummary) -> list[Picture]:
+def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> list[Picture]:
     return [
         Picture(
             upright_slices(robot, capability, results.capability),
@@ -433,7 +426,7 @@ def _pictures(robot: Robot, results: WorkspaceResults, capability: CapabilitySum
     ]
 
 
-def _clear_caption(clear: ClearSummary, assumed: bool) -> str:
+def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
     if clear.scene is None:
         what = tr("An estimate: {share} % of the poses reached can be held without the arm touching itself.",
                   share=number(100 * clear.share, 2))  # fmt: skip
@@ -466,7 +459,7 @@ def _clear_caption(clear: ClearSummary, assumed: bool) -> str:
     return tr("{first} {rest}", first=what, rest=tried)
 
 
-def _level_caption(capability: CapabilitySummary) -> str:
+def _level_caption(capability: model.CapabilitySummary) -> str:
     if capability.bar_m:
         return tr("The arm can do the same everywhere along the slide, up to its ends.")
     if capability.sectors == 1:
@@ -479,7 +472,7 @@ def _level_caption(capability: CapabilitySummary) -> str:
     return tr("Joint 1 is limited: blank sectors are out of its reach.")
 
 
-def _slices_caption(capability: CapabilitySummary) -> str:
+def _slices_caption(capability: model.CapabilitySummary) -> str:
     overall = capability.overall
     numbers = {
         "mean": number(100 * overall.mean_reachability, 2),
@@ -520,7 +513,7 @@ def _slices_caption(capability: CapabilitySummary) -> str:
     )  # fmt: skip
 
 
-def _asked_text(capability: CapabilitySummary) -> str:
+def _asked_text(capability: model.CapabilitySummary) -> str:
     """What was asked of the cells, and how."""
     count = capability.directions
     asked = {
@@ -548,7 +541,7 @@ def _asked_text(capability: CapabilitySummary) -> str:
     return joined([asked, _roll_text(capability), _effort_text(capability)], " ")
 
 
-def _effort_text(capability: CapabilitySummary) -> str:
+def _effort_text(capability: model.CapabilitySummary) -> str:
     if not capability.coarse:
         return ""
     return tr(
@@ -557,7 +550,7 @@ def _effort_text(capability: CapabilitySummary) -> str:
     )
 
 
-def _roll_text(capability: CapabilitySummary) -> str:
+def _roll_text(capability: model.CapabilitySummary) -> str:
     if capability.asked != "directions":
         return ""
     rolls = tr("left free") if capability.roll.free else capability.roll.per_direction
@@ -592,7 +585,7 @@ def _roll_text(capability: CapabilitySummary) -> str:
     )
 
 
-def _core_text(capability: CapabilitySummary) -> str:
+def _core_text(capability: model.CapabilitySummary) -> str:
     core = capability.core_m3
     if core is None:
         if capability.asked != "directions":
@@ -617,7 +610,7 @@ def _core_text(capability: CapabilitySummary) -> str:
     )
 
 
-def _task_text(task: TaskSummary, capability: CapabilitySummary) -> str:
+def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> str:
     box = " × ".join(number(value, 4).rstrip(".") for value in map(_whole, task.box_mm))
     direction = ", ".join(fixed(value, 2).removesuffix(".00") for value in task.tool_direction)
     shown = {
@@ -665,7 +658,7 @@ def _task_text(task: TaskSummary, capability: CapabilitySummary) -> str:
     return joined([served, stands], " ")
 
 
-def _try_text(robot: Robot, task: TaskSummary) -> str:
+def _try_text(robot: Robot, task: model.TaskSummary) -> str:
     """How to see the arm at a place: the roll, pitch and yaw (ZYX) that point the tool along the task's direction."""
     roll, pitch, _ = np.degrees(rpy_along(np.array(task.tool_direction)))
     parts = {"roll": fixed(roll, 1).removesuffix(".0"), "pitch": fixed(pitch, 1).removesuffix(".0")}
@@ -686,7 +679,7 @@ def _whole(value: float) -> float | int:
     return int(value) if value == int(value) else value
 
 
-def _places_caption(placement: PlacementSummary, provable: bool) -> str:
+def _places_caption(placement: model.PlacementSummary, provable: bool) -> str:
     if not provable:
         return tr(
             "{fitting} grid positions pass by samples; proofs exist only for arms of six revolute joints with a "

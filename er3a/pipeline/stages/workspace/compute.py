@@ -12,7 +12,6 @@ from er3a.collision.along import bodies_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.reference_sets import check_reference_file, reference_folder
-from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.si_units import stated
@@ -21,35 +20,6 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
-from er3a.pipeline.stages.workspace.model import (
-    AxisSummary,
-    Bars,
-    Bounds,
-    CapabilityMissing,
-    CellCounts,
-    Drawing,
-    Flat,
-    GridSummary,
-    HullSummary,
-    HullTriangles,
-    NoVoid,
-    OnSurface,
-    PlacementSummary,
-    PlacementTooLong,
-    ProofSummary,
-    SectionFrame,
-    Undersampled,
-    VoidAtShoulder,
-    VoidSummary,
-    VoidUncertain,
-    VoidUnexpected,
-    Volume,
-    VolumePoints,
-    WorkspaceFinding,
-    WorkspaceResults,
-    WorkspaceSummary,
-    triple,
-)
 from er3a.pipeline.stages.workspace.sample import draw_of, gather, sampled
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
@@ -80,7 +50,7 @@ _ACROSS = {"greatest_x": 1.0, "least_x": -1.0}
 _UP = ("greatest_z", "least_z")
 
 
-def drawing_table(robot: Robot, shoulder_m: float) -> Drawing:
+def drawing_table(robot: Robot, shoulder_m: float) -> model.Drawing:
     """Labels of the wrist centre's envelope: extents (one coordinate) and corners (both).
 
     Parameters
@@ -102,7 +72,7 @@ def drawing_table(robot: Robot, shoulder_m: float) -> Drawing:
         if {"rho", "z"} <= set(values):
             x = values["rho"] * corner_side(robot, float(np.radians(q2)), float(np.radians(q3)))
             marks.append((values["rho"], x, shoulder_m + values["z"], q2, q3))
-    return Drawing.of_rows(marks)
+    return model.Drawing.of_rows(marks)
 
 
 def _labels(robot: Robot) -> list[EnvelopeRow]:
@@ -121,7 +91,7 @@ def judge(
     unseen: float,
     proof: bool,
     undecided_percent: float | None = None,
-) -> Verdict[WorkspaceFinding]:
+) -> Verdict[model.WorkspaceFinding]:
     """The stage's verdict.
 
     An enclosed void about the shoulder is what every arm leaves that can't fold onto itself. Any other one is a hole
@@ -134,19 +104,19 @@ def judge(
     proof : whether there is a proof that settles most; undecided_percent : what it leaves undecided, where known
     """
     if hull_volume == 0:
-        return Verdict("caution", Flat())
+        return Verdict("caution", model.Flat())
     if not proof and unseen > UNSEEN_RATIO * touched:
-        return Verdict("caution", Undersampled(100 * unseen / (unseen + touched)))
+        return Verdict("caution", model.Undersampled(100 * unseen / (unseen + touched)))
     enclosed = [void for void in voids if void.kind == "enclosed"]
     elsewhere = [void for void in enclosed if not void.holds_shoulder]
     unexpected = [void for void in elsewhere if void.status == "proven_empty"]
     if unexpected:
-        return Verdict("caution", VoidUnexpected(*_size_and_place(unexpected[0]), unexpected[0].cause))
+        return Verdict("caution", model.VoidUnexpected(*_size_and_place(unexpected[0]), unexpected[0].cause))
     if elsewhere:
-        return Verdict("caution", VoidUncertain(*_size_and_place(elsewhere[0])))
+        return Verdict("caution", model.VoidUncertain(*_size_and_place(elsewhere[0])))
     if enclosed:
-        return Verdict("pass", VoidAtShoulder(*_size_and_place(enclosed[0])))
-    return Verdict("pass", NoVoid(proof, undecided_percent))
+        return Verdict("pass", model.VoidAtShoulder(*_size_and_place(enclosed[0])))
+    return Verdict("pass", model.NoVoid(proof, undecided_percent))
 
 
 def _size_and_place(void: Void) -> tuple[float, float, float, float]:
@@ -173,7 +143,7 @@ class _Samples:
         return np.concatenate([self.q_extreme, self.q_cloud])
 
 
-def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> WorkspaceResults:
+def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> model.WorkspaceResults:
     """Work out a robot's workspace.
 
     Parameters
@@ -197,14 +167,13 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
     voids = proven_voids(robot, proven, hull, shoulder)
     if not proven.settles:
         voids += sampled_only(in_cloud, grid, shoulder, voids)
-    scene_file = study.scene(name, "capability")
-    scene = load_scene(scene_file) if scene_file else None
+    scene = study.scene(name, "capability")
     assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
     margin = motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm
     asked = study.section(CapabilitySettings)
     tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin / 1000, proven=proven)
     vertices, triangles = model.void_surfaces(voids)
-    return WorkspaceResults(
+    return model.WorkspaceResults(
         summary=_summary(study, robot, samples, proven, voids, tool, scene=scene),
         cells=model.cells(tally, void_numbers(in_cloud, tally.counts, samples.inside)),
         section=model.section(section_cells(tally, grid)),
@@ -212,7 +181,7 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> Wor
         curve=model.curve(touched_growth(draw, tally, grid)),
         cloud=model.cloud(robot, samples.q_cloud),
         hull_vertices=model.hull_vertices(robot, hull, samples.q_extreme),
-        hull_triangles=HullTriangles(hull.triangles),
+        hull_triangles=model.HullTriangles(hull.triangles),
         proof=model.proof(proven),
         border=model.border(border_lines(robot)),
         drawing=drawing_table(robot, float((shoulder - grid.axis_point) @ grid.axis)),
@@ -245,34 +214,36 @@ def _summary(
     tool: ToolCapability,
     *,
     scene: Scene | None,
-) -> WorkspaceSummary:
+) -> model.WorkspaceSummary:
     settings, grid, tally, hull = study.section(WorkspaceSettings), samples.grid, samples.tally, samples.hull
     touched, unseen = tally.counts > 0, unseen_cells(tally.counts)
-    counts = CellCounts(int(touched.sum()), int(samples.inside.sum()), int((touched & samples.inside).sum()), unseen)
+    counts = model.CellCounts(
+        int(touched.sum()), int(samples.inside.sum()), int((touched & samples.inside).sum()), unseen
+    )
     lower, upper = proven.proof.bounds
     surface = surface_of(robot, 2 * settings.proof_cells, study.seed) if lower == 0 else None
     left = 100 * proven.proof.width if proven.arm is None and proven.settles else None
     judged = judge(hull.volume, voids, counts.touched, unseen, proven.settles, left)
-    if isinstance(judged.finding, VoidUnexpected) and proven.arm is not None:
+    if isinstance(judged.finding, model.VoidUnexpected) and proven.arm is not None:
         tried = single_changes(robot, judged.finding.cause, study.seed)
         judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
     if surface:
-        judged = Verdict("caution", OnSurface(surface))
+        judged = Verdict("caution", model.OnSurface(surface))
     margin = study.section(TrajectorySettings).assumed_margin_mm / 1000
-    assumed = None if isinstance(tool.capability, CapabilityMissing) else shapes_assumed(robot, margin, {})
+    assumed = None if isinstance(tool.capability, model.CapabilityMissing) else shapes_assumed(robot, margin, {})
     guess = proven.estimate
-    volume = Volume(lower, upper, guess.value, (guess.low, guess.high))
+    volume = model.Volume(lower, upper, guess.value, (guess.low, guess.high))
     reach = search_reach(robot, grid, samples.q_kept)
-    return WorkspaceSummary(
+    return model.WorkspaceSummary(
         verdict=judged.without(tool.unexamined).resting_on(assumed),
         figures=_figures(reach, voids, volume, hull, settings.samples, surface),
         samples=settings.samples,
         sampling=settings.sampling,
         volume_m3=volume,
         surface=surface,
-        volume_points=VolumePoints(guess.points, guess.reached, guess.undecided),
+        volume_points=model.VolumePoints(guess.points, guess.reached, guess.undecided),
         touched_m3=counts.touched * grid.cell_volume,
-        proof=ProofSummary(
+        proof=model.ProofSummary(
             proven.method,
             len(proven.proof.cells),
             proven.proof.width,
@@ -280,13 +251,15 @@ def _summary(
             proven.count_in_empty(forward(robot, samples.q_kept)[:, :3, 3]),
             _bars(proven),
         ),
-        hull=HullSummary(hull.volume, hull.area, settings.hull_directions, len(hull.vertices)),
+        hull=model.HullSummary(hull.volume, hull.area, settings.hull_directions, len(hull.vertices)),
         reach_m=reach,
-        grid=stated(GridSummary, grid),
-        axis=AxisSummary(triple(grid.axis_point), triple(grid.axis), triple(shoulder_of(robot, grid))),
+        grid=stated(model.GridSummary, grid),
+        axis=model.AxisSummary(
+            model.triple(grid.axis_point), model.triple(grid.axis), model.triple(shoulder_of(robot, grid))
+        ),
         section_cell_m=grid.section_cell,
         cells=counts,
-        voids=tuple(stated(VoidSummary, void, volume_m3=Bounds(void.lower, void.upper)) for void in voids),
+        voids=tuple(stated(model.VoidSummary, void, volume_m3=model.Bounds(void.lower, void.upper)) for void in voids),
         pocket_block_m=pocket_block(proven),
         capability=tool.capability,
         placement=tool.placement,
@@ -314,7 +287,7 @@ def _left_out(
         yield LeftOut("sampled_voids", amount=sampled_voids)
     yield LeftOut("colliding_reach")
     found, placement = tool.capability, tool.placement
-    if isinstance(found, CapabilityMissing):
+    if isinstance(found, model.CapabilityMissing):
         yield LeftOut("capability")
         return
     yield LeftOut("tool_directions", amount=found.directions)
@@ -324,24 +297,27 @@ def _left_out(
         yield LeftOut("core")
     elif found.core_m3.upper > found.core_m3.lower:
         yield LeftOut("undecided_core", amount=1000 * (found.core_m3.upper - found.core_m3.lower))
-    if isinstance(placement, PlacementTooLong):
+    if isinstance(placement, model.PlacementTooLong):
         yield LeftOut("places")
-    if isinstance(placement, PlacementSummary):
+    if isinstance(placement, model.PlacementSummary):
         if placement.fitting > placement.fitting_proven:
             yield LeftOut("sampled_places", amount=placement.fitting - placement.fitting_proven)
         yield LeftOut("between_places", amount=1000 * max(placement.spacing_m))
         yield LeftOut("placed_box")
 
 
-def _bars(proven: Proven) -> Bars | None:
+def _bars(proven: Proven) -> model.Bars | None:
     if proven.proof.bar == 0:
         return None
     x, y, z = proven.R
-    return Bars(proven.proof.bar, SectionFrame((triple(x), triple(y), triple(z)), triple(proven.origin)))
+    return model.Bars(
+        proven.proof.bar,
+        model.SectionFrame((model.triple(x), model.triple(y), model.triple(z)), model.triple(proven.origin)),
+    )
 
 
 def _figures(
-    reach: ReachExtremes, voids: Sequence[Void], volume: Volume, hull: Hull, samples: int, surface: Surface | None
+    reach: ReachExtremes, voids: Sequence[Void], volume: model.Volume, hull: Hull, samples: int, surface: Surface | None
 ) -> tuple[Figure, ...]:
     if surface:
         bounds = {"area_lower": surface.lower, "area_upper": surface.upper}

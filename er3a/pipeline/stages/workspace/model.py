@@ -56,37 +56,35 @@ class Undersampled:
 
 
 @dataclass(frozen=True)
-class VoidUnexpected:
-    """An enclosed void away from the shoulder, proven empty."""
+class VoidFound:
+    """How large an enclosed void is, and where its middle lies."""
 
     litres: float
     x_mm: float
     y_mm: float
     z_mm: float
+
+
+@dataclass(frozen=True)
+class VoidUnexpected(VoidFound):
+    """An enclosed void away from the shoulder, proven empty."""
+
     cause: VoidCause
     single_changes: tuple[SingleChange, ...] = ()
     code: Literal["workspace.void_unexpected"] = "workspace.void_unexpected"
 
 
 @dataclass(frozen=True)
-class VoidUncertain:
+class VoidUncertain(VoidFound):
     """An enclosed void away from the shoulder that only samples suggest."""
 
-    litres: float
-    x_mm: float
-    y_mm: float
-    z_mm: float
     code: Literal["workspace.void_uncertain"] = "workspace.void_uncertain"
 
 
 @dataclass(frozen=True)
-class VoidAtShoulder:
+class VoidAtShoulder(VoidFound):
     """An enclosed void about the shoulder, as every arm leaves that can't fold onto itself."""
 
-    litres: float
-    x_mm: float
-    y_mm: float
-    z_mm: float
     code: Literal["workspace.void_at_shoulder"] = "workspace.void_at_shoulder"
 
 

@@ -13,22 +13,13 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.workspace import VOID_STATUS
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.workspace.model import (
-    CapabilityCells,
-    CapabilityMissing,
-    CapabilitySummary,
-    CellLookup,
-    PlacementSummary,
-    WorkspaceResults,
-    WorkspaceSummary,
-)
+from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Logged, Recorded, escaped, write_recording
 from er3a.robots.robot import Robot
 
-STAGE = "workspace"
 POINT_SHARE = 0.16  # radius of a point of the cloud, of the mean distance between points
 DIMMEST = 0.4  # of the colour scale: darker points can't be seen on the viewer's ground
 _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
@@ -36,13 +27,13 @@ _CLASSES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _NAMES = ("below_25_percent", "25_to_50_percent", "50_to_75_percent", "75_percent_and_more", "all")
 
 
-def record(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None:
+def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
     """Write the workspace recording of a robot from its results."""
     robot, results = study.robot(stored.robot), stored.results
     shown = Recorded(
         robot=robot,
         name=stored.robot,
-        stage=STAGE,
+        stage=stored.stage,
         note=_note(robot, results.summary),
         views={
             "Cloud, near half cut away": ["cloud/far/**"],
@@ -55,7 +46,7 @@ def record(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
     write_recording(shown, output)
 
 
-def _cloud(results: WorkspaceResults) -> dict[str, Logged]:
+def _cloud(results: model.WorkspaceResults) -> dict[str, Logged]:
     points, value = results.cloud.point_m, results.cloud.manipulability_m3
     top = np.quantile(value, 0.99)
     share = np.minimum(value / top, 1.0) if top > 0 else value
@@ -68,13 +59,13 @@ def _cloud(results: WorkspaceResults) -> dict[str, Logged]:
     }
 
 
-def _hull(results: WorkspaceResults) -> dict[str, Logged]:
+def _hull(results: model.WorkspaceResults) -> dict[str, Logged]:
     vertices, triangles = results.hull_vertices.point_m, results.hull_triangles.corners
     edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     return {"hull": rr.LineStrips3D(list(vertices[edges]), colors=[(*rgb(MUTED), 90)], radii=rr.Radius.ui_points(0.4))}
 
 
-def _voids(results: WorkspaceResults) -> Iterator[tuple[str, Logged]]:
+def _voids(results: model.WorkspaceResults) -> Iterator[tuple[str, Logged]]:
     vertices, triangles = results.void_vertices, results.void_triangles
     for number, void in enumerate(results.summary.voids, start=1):
         faces = triangles.corners[triangles.void == number]
@@ -91,14 +82,14 @@ def _voids(results: WorkspaceResults) -> Iterator[tuple[str, Logged]]:
             )
 
 
-def _capability(results: WorkspaceResults) -> Iterator[tuple[str, Logged]]:
+def _capability(results: model.WorkspaceResults) -> Iterator[tuple[str, Logged]]:
     """Voxels coloured by reachability, by halves and classes of it, and the best places."""
     capability, placement = results.summary.capability, results.summary.placement
-    if isinstance(capability, CapabilityMissing):
+    if isinstance(capability, model.CapabilityMissing):
         return
     if len(results.capability):
         yield from _voxels(capability, results.capability)
-    places = placement.named_places if isinstance(placement, PlacementSummary) else ()
+    places = placement.named_places if isinstance(placement, model.PlacementSummary) else ()
     for name, place in places:
         yield (
             f"places/{name}",
@@ -112,8 +103,8 @@ def _capability(results: WorkspaceResults) -> Iterator[tuple[str, Logged]]:
         )
 
 
-def _voxels(capability: CapabilitySummary, cells: CapabilityCells) -> Iterator[tuple[str, Logged]]:
-    lookup = CellLookup(capability, cells)
+def _voxels(capability: model.CapabilitySummary, cells: model.CapabilityCells) -> Iterator[tuple[str, Logged]]:
+    lookup = model.CellLookup(capability, cells)
     axes, cell = np.array(capability.frame.axes), lookup.cell
     count = int(np.ceil(lookup.reach / cell))
     line = (np.arange(-count, count) + 0.5) * cell
@@ -152,7 +143,7 @@ def _normals(corners: Reals, faces: Integers) -> Reals:
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
-def _note(robot: Robot, summary: WorkspaceSummary) -> str:
+def _note(robot: Robot, summary: model.WorkspaceSummary) -> str:
     lines = [
         f"# Workspace of {escaped(robot.title)}",
         say(summary.verdict.finding),

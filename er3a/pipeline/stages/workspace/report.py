@@ -8,20 +8,13 @@ from typing import Any
 import numpy as np
 
 from er3a.collision.scene import Scene
-from er3a.files.scene_file import load_scene
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import FIGURES, VOID_KINDS, VOID_STATUS, entry_word
+from er3a.pipeline.messages.workspace import VOID_KINDS, VOID_STATUS, entry_word
 from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored
+from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.capability_section import capability_context
-from er3a.pipeline.stages.workspace.model import (
-    GrowthCurve,
-    VoidSummary,
-    VoidUnexpected,
-    WorkspaceResults,
-    WorkspaceSummary,
-)
 from er3a.pipeline.stages.workspace.workspace_figures import (
     arc_rows,
     convergence,
@@ -33,26 +26,21 @@ from er3a.pipeline.stages.workspace.workspace_figures import (
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
-from er3a.pipeline.viewing.page import Picture, head_of, render, run_command
+from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
 from er3a.workspace.causes import joints_after
 
 LISTED = 12
 
 
-def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None:
+def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
     """Render the workspace page of a robot from its results."""
     robot, results = study.robot(stored.robot), stored.results
-    summary, file = results.summary, study.scene(stored.robot, "capability")
-    scene = load_scene(file) if file else None
-    render(
-        Path(__file__).with_name("report.html.j2"),
+    summary, scene = results.summary, study.scene(stored.robot, "capability")
+    render_stage(
+        study,
+        stored,
         output,
-        summary,
-        head=head_of(stored, FIGURES),
-        command=run_command(study, f"{stored.robot}/workspace.html"),
-        robot=robot,
-        robot_pages=study.pages(stored.robot),
         side=_side(robot, results),
         arc_rows=arc_rows(results.border),
         method=say(summary.proof.method),
@@ -63,14 +51,14 @@ def report(study: Study, stored: Stored[WorkspaceResults], output: Path) -> None
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
         voids_more=max(0, len(summary.voids) - LISTED),
         change_rows=_change_rows(summary),
-        unexpected=isinstance(summary.verdict.finding, VoidUnexpected),
+        unexpected=isinstance(summary.verdict.finding, model.VoidUnexpected),
         wide=100 * summary.proof.width,
         has_drawing=len(results.drawing) > 0,
         **_context(robot, results, scene),
     )
 
 
-def _context(robot: Robot, results: WorkspaceResults, scene: Scene | None) -> dict[str, Any]:
+def _context(robot: Robot, results: model.WorkspaceResults, scene: Scene | None) -> dict[str, Any]:
     summary = results.summary
     return capability_context(robot, results, scene) | {
         "section": Picture(
@@ -97,7 +85,7 @@ def _context(robot: Robot, results: WorkspaceResults, scene: Scene | None) -> di
     }
 
 
-def _side(robot: Robot, results: WorkspaceResults) -> Picture | None:
+def _side(robot: Robot, results: model.WorkspaceResults) -> Picture | None:
     """The side view, where the arm has a wrist centre and an exact border."""
     if not len(results.border):
         return None
@@ -115,7 +103,7 @@ def _side(robot: Robot, results: WorkspaceResults) -> Picture | None:
     )
 
 
-def _rule(enclosed: list[VoidSummary]) -> str:
+def _rule(enclosed: list[model.VoidSummary]) -> str:
     """The rule that an unexpected hole points to joints 2 and 3, applied."""
     elsewhere = [void for void in enclosed if not void.holds_shoulder]
     if not elsewhere:
@@ -127,7 +115,7 @@ def _rule(enclosed: list[VoidSummary]) -> str:
     return sentence("workspace.rule", count=len(elsewhere), named=named)
 
 
-def _void_row(row: int, void: VoidSummary) -> list[str]:
+def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
         str(row),
@@ -141,7 +129,7 @@ def _void_row(row: int, void: VoidSummary) -> list[str]:
     ]
 
 
-def _change_rows(summary: WorkspaceSummary) -> list[list[str]]:
+def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
     finding = summary.verdict.finding
     return [
         [
@@ -150,11 +138,11 @@ def _change_rows(summary: WorkspaceSummary) -> list[list[str]]:
             f"{change.tried:g}".replace("-", "−"),
             tr("{low} to {high}", low=number(change.left_litres[0], 3), high=number(change.left_litres[1], 3)),
         ]
-        for change in (finding.single_changes if isinstance(finding, VoidUnexpected) else ())
+        for change in (finding.single_changes if isinstance(finding, model.VoidUnexpected) else ())
     ]
 
 
-def _section_caption(summary: WorkspaceSummary, drawn: bool) -> str:
+def _section_caption(summary: model.WorkspaceSummary, drawn: bool) -> str:
     texts = [
         tr(
             "Cells are bars along the slide. What is white on the right is proven unreachable all along it; blank "
@@ -203,7 +191,7 @@ def _top_caption(robot: Robot) -> str:
     )
 
 
-def _slices_caption(summary: WorkspaceSummary) -> str:
+def _slices_caption(summary: model.WorkspaceSummary) -> str:
     enclosed = len(summary.enclosed_voids)
     pockets = len(summary.voids) - enclosed
     return tr(
@@ -214,7 +202,7 @@ def _slices_caption(summary: WorkspaceSummary) -> str:
     )
 
 
-def _curve_caption(summary: WorkspaceSummary, curve: GrowthCurve) -> str:
+def _curve_caption(summary: model.WorkspaceSummary, curve: model.GrowthCurve) -> str:
     volume = summary.volume_m3
     finest = curve.touched_m3[curve.cell_mm == curve.cell_mm.min()][-1]
     if finest > volume.upper:

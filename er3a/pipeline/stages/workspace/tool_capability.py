@@ -23,25 +23,6 @@ from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
-from er3a.pipeline.stages.workspace.model import (
-    BoxPlaces,
-    CapabilityCells,
-    CapabilityMissing,
-    CapabilitySummary,
-    ClearSummary,
-    Placement,
-    PlacementSummary,
-    PlacementTooLong,
-    PlaceSummary,
-    RollSummary,
-    SectionFrame,
-    StandSummary,
-    TaskSummary,
-    ToolPointsElsewhere,
-    Triple,
-    WhyNoStand,
-    triple,
-)
 from er3a.robots.robot import Robot
 from er3a.workspace.capability import ClearPoses, map_capability, overall, rings, try_poses
 from er3a.workspace.cell_frame import cell_frame, is_quick
@@ -188,10 +169,10 @@ CLEAR_STREAM = 11
 class ToolCapability:
     """This part's entries of the summary, and its tables; ``unexamined``: pairs whose collisions were not looked at."""
 
-    capability: CapabilitySummary | CapabilityMissing
-    placement: Placement | None
-    cells: CapabilityCells
-    places: BoxPlaces
+    capability: model.CapabilitySummary | model.CapabilityMissing
+    placement: model.Placement | None
+    cells: model.CapabilityCells
+    places: model.BoxPlaces
     unexamined: tuple[Pair, ...] = ()
 
 
@@ -218,8 +199,10 @@ def tool_capability(
     """
     asked, lacks = asked_of(robot, settings.rolls), lacking_for_maps(robot)
     if lacks or asked is None:
-        missing = CapabilityMissing(lacks) if lacks else CapabilityMissing(OrientationsUnknown(robot.joints))
-        return ToolCapability(missing, None, CapabilityCells.empty(), BoxPlaces.empty())
+        missing = (
+            model.CapabilityMissing(lacks) if lacks else model.CapabilityMissing(OrientationsUnknown(robot.joints))
+        )
+        return ToolCapability(missing, None, model.CapabilityCells.empty(), model.BoxPlaces.empty())
     task = _task(settings.placement)
     plan = plan_of(robot, settings, asked, cell, task, proven)
     asked, task, frame, cells = plan.asked, replace(task, step=plan.step), cell_frame(robot), plan.cells
@@ -230,14 +213,14 @@ def tool_capability(
     core = None
     if proofs_hold(robot):
         core = dexterous_core(robot, cells, plan.count, asked.roll, settings.proof_poses)
-    summary = CapabilitySummary(
+    summary = model.CapabilitySummary(
         asked=asked.kind,
         directions=plan.count,
         cell_m=plan.cell,
         bar_m=frame.bar,
-        frame=SectionFrame(_rows(frame.R), triple(frame.origin)),
+        frame=model.SectionFrame(_rows(frame.R), model.triple(frame.origin)),
         sectors=frame.sectors,
-        roll=RollSummary(asked.roll.free, len(asked.roll.angles), asked.roll.last_joint),
+        roll=model.RollSummary(asked.roll.free, len(asked.roll.angles), asked.roll.last_joint),
         overall=overall(found, cells, frame.bar),
         core_m3=core,
         arm_angles=tried_values(robot),
@@ -255,8 +238,8 @@ def tool_capability(
     )
 
 
-def _rows(R: Reals) -> tuple[Triple, Triple, Triple]:
-    x, y, z = (triple(row) for row in R)
+def _rows(R: Reals) -> tuple[model.Triple, model.Triple, model.Triple]:
+    x, y, z = (model.triple(row) for row in R)
     return x, y, z
 
 
@@ -269,7 +252,7 @@ def _placed(
     scene: Scene | None,
     margin: float,
     best: float,
-) -> tuple[Placement, BoxPlaces]:
+) -> tuple[model.Placement, model.BoxPlaces]:
     """Where the box can stand, the arm a margin (m) from what it may not touch.
 
     Parameters
@@ -278,9 +261,11 @@ def _placed(
     """
     asked = plan.asked
     if not asked.in_cone(np.zeros((1, 3)), task.axis, task.half_angle, task.step).shape[1]:
-        return ToolPointsElsewhere(_task_summary(settings.placement), triple(asked.tool[:, 2])), BoxPlaces.empty()
+        return model.ToolPointsElsewhere(
+            _task_summary(settings.placement), model.triple(asked.tool[:, 2])
+        ), model.BoxPlaces.empty()
     if plan.lattice is None:
-        return PlacementTooLong(_task_summary(settings.placement)), BoxPlaces.empty()
+        return model.PlacementTooLong(_task_summary(settings.placement)), model.BoxPlaces.empty()
     within = narrowed(robot, task.margin)
     bodies, free = Bodies(robot, scene), partial(Bodies(within, scene).free, margin=margin)
     placement = find_places(
@@ -288,7 +273,7 @@ def _placed(
     )
     placed = _placement_summary(robot, settings.placement, task, placement, best, scene=scene, margin=margin)
 
-    def listed(own: Task, found: BoxPlacement) -> tuple[PlaceSummary, ...]:
+    def listed(own: Task, found: BoxPlacement) -> tuple[model.PlaceSummary, ...]:
         arms = _arms_at(within, free, own, asked, found)
         return tuple(_with_nearest(place, bodies, q) for place, q in zip(_listed(robot, own, found, best), arms))
 
@@ -308,14 +293,14 @@ def _placed(
             most = settings.proof_poses
             over = _best_over(within, support, supports, task, asked.roll, most_poses=most, placement=placement)
             (above,) = listed(task, over) or (None,)
-        stands.append(StandSummary(support.name, support.height, place, served_from, why, above))
+        stands.append(model.StandSummary(support.name, support.height, place, served_from, why, above))
     return (
         replace(placed, places=listed(task, placement), stands=tuple(stands)),
         model.places(placement.best_turns),
     )
 
 
-def _why_not(support: Support, task: Task) -> WhyNoStand | None:
+def _why_not(support: Support, task: Task) -> model.WhyNoStand | None:
     """What of a support alone keeps the box from standing on it."""
     if support.height < task.lowest - 1e-9:
         return "too_low"
@@ -342,7 +327,7 @@ def _on_support(
     return part, found
 
 
-def _whole_box(served: PlaceSummary, task: Task) -> PlaceSummary:
+def _whole_box(served: model.PlaceSummary, task: Task) -> model.PlaceSummary:
     """The place of the box of whose upper part this is the place."""
     (x, y, z), below = served.centre_m, float(task.box[2]) - served.size_m[2]
     return replace(served, centre_m=(x, y, z - below / 2), size_m=(*served.size_m[:2], float(task.box[2])))
@@ -389,12 +374,12 @@ def _tried(
 
 def _clear_summary(
     cells: Reals, bar: float, reachability: Reals, tried: ClearPoses, scene: Scene | None
-) -> ClearSummary:
+) -> model.ClearSummary:
     """Cells weigh by their volume and reachability, since each was tried equally often."""
     cell, _ = np.nonzero(reachability)
     volume = ring_volumes(cells, bar)[cell]
     reached = float(volume @ tried.reached)
-    return ClearSummary(
+    return model.ClearSummary(
         scene=scene.title if scene else None,
         tries=tried.tries,
         reached=int(tried.reached.sum()),
@@ -415,10 +400,10 @@ def _task(asked: BoxTask) -> Task:
     )
 
 
-def _task_summary(asked: BoxTask) -> TaskSummary:
-    return TaskSummary(
-        triple(asked.box_mm),
-        triple(asked.tool_direction),
+def _task_summary(asked: BoxTask) -> model.TaskSummary:
+    return model.TaskSummary(
+        model.triple(asked.box_mm),
+        model.triple(asked.tool_direction),
         asked.cone_deg,
         asked.limit_margin_deg,
         asked.lowest_mm,
@@ -435,14 +420,14 @@ def _placement_summary(
     *,
     scene: Scene | None,
     margin: float,
-) -> PlacementSummary:
+) -> model.PlacementSummary:
     """The placement as the summary has it; ``best`` is the arm's largest manipulability, m^3."""
     places = placement.places
-    return PlacementSummary(
+    return model.PlacementSummary(
         scene=scene.title if scene else None,
         margin_mm=1000 * margin,
         task=_task_summary(asked),
-        spacing_m=triple(placement.field.spacing),
+        spacing_m=model.triple(placement.field.spacing),
         directions=len(cone_directions(task.axis, task.half_angle, task.step)),
         points_serving=int((placement.field.least_any > NO).sum()),
         fitting=len(places.slot),
@@ -454,15 +439,15 @@ def _placement_summary(
     )
 
 
-def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> list[PlaceSummary]:
+def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> list[model.PlaceSummary]:
     places, chosen = placement.places, placement.chosen
     named = slot_labels(robot) if tried_values(robot) == 1 else ()
     labels = named or (None,) * slot_count(robot)
     rooms = [placement.room(row) for row in chosen.row]
     return [
-        PlaceSummary(
-            centre_m=triple(places.centre[row]),
-            size_m=triple(task.box[[1, 0, 2]] if places.turned[row] else task.box),
+        model.PlaceSummary(
+            centre_m=model.triple(places.centre[row]),
+            size_m=model.triple(task.box[[1, 0, 2]] if places.turned[row] else task.box),
             turned=bool(places.turned[row]),
             status=_status(proven),
             branch=None if slot == MIXED else labels[slot],
@@ -472,8 +457,8 @@ def _listed(robot: Robot, task: Task, placement: BoxPlacement, best: float) -> l
             limit_margin_deg=float(np.degrees(places.limit_margin[row] + task.margin))
             if slot != MIXED and np.isfinite(places.limit_margin[row])
             else None,
-            room_down_m=triple(room[:, 0]),
-            room_up_m=triple(room[:, 1]),
+            room_down_m=model.triple(room[:, 0]),
+            room_up_m=model.triple(room[:, 1]),
         )
         for row, slot, proven, branch_proven, room in zip(
             chosen.row, chosen.slot, chosen.proven, chosen.branch_proven, rooms
@@ -497,7 +482,7 @@ def _arms_at(within: Robot, free: Free, task: Task, asked: AskedOrientations, pl
     return arms
 
 
-def _with_nearest(place: PlaceSummary, bodies: Bodies, q: Reals) -> PlaceSummary:
+def _with_nearest(place: model.PlaceSummary, bodies: Bodies, q: Reals) -> model.PlaceSummary:
     """A place with the smallest clearance of its arms (m, joints), rad, the pair that has it, and the joint nearest to
     a limit."""
     least, pair = bodies.min_distance(q)

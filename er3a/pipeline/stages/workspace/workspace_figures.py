@@ -23,19 +23,7 @@ from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import POINTS, SWEEPS
 from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
-from er3a.pipeline.stages.workspace.model import (
-    AxisSummary,
-    Bars,
-    Border,
-    Cells,
-    Drawing,
-    GridSummary,
-    ProofCells,
-    SectionCells,
-    SectionFrame,
-    SideViewCells,
-    WorkspaceResults,
-)
+from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
@@ -55,7 +43,7 @@ class CellMap:
     origin, cell : m
     """
 
-    def __init__(self, grid: GridSummary, cells: Cells):
+    def __init__(self, grid: model.GridSummary, cells: model.Cells):
         self.origin, self.cell = np.array(grid.origin_m), grid.cell_m
         self.samples = np.zeros(grid.shape, dtype=np.int64)
         self.samples[tuple(cells.index.astype(np.int64).T)] = cells.samples
@@ -65,7 +53,7 @@ class CellMap:
         return (self.origin[axis] + np.arange(self.samples.shape[axis] + 1) * self.cell) * 1000
 
 
-def top_view(robot: Robot, results: WorkspaceResults) -> Figure:
+def top_view(robot: Robot, results: model.WorkspaceResults) -> Figure:
     """The cloud from above, with the wedge that joint 1 leaves."""
     figure, axes = new_figure(width=8.0, height=6.6)
     _draw_top(figure, axes, robot, CellMap(results.summary.grid, results.cells))
@@ -101,7 +89,7 @@ def _draw_top(figure: Figure, axes: Axes, robot: Robot, cells: CellMap) -> None:
     axes.grid(False)
 
 
-def convergence(results: WorkspaceResults) -> Figure:
+def convergence(results: model.WorkspaceResults) -> Figure:
     """Touched volume over the number of samples, by cell size."""
     figure, axes = new_figure(width=9.0, height=4.2)
     curve, volume = results.curve, results.summary.volume_m3
@@ -151,7 +139,7 @@ PANEL_IN, AROUND_PANELS_IN = 4.9, 2.4  # a panel's width; what stands above and 
 WITHIN = 0.05  # of the reached heights: nearer to an end, a height is no slice's
 
 
-def sections(robot: Robot, results: WorkspaceResults) -> Figure:
+def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
     """Side sections about axis 1, or across it where it slides: what the samples show, and what is proven."""
     border, drawing, bars = results.border, results.drawing, results.summary.proof.bars
     figure, (left, right) = new_figure(1, 2, width=11.5, height=9.0, sharey=True, sharex=True)
@@ -211,7 +199,7 @@ def _colour_bar(figure: Figure, shown: QuadMesh, label: str) -> None:
     bar.ax.minorticks_off()
 
 
-def _draw_density(axes: Axes, cell: float, section: SectionCells) -> QuadMesh:
+def _draw_density(axes: Axes, cell: float, section: model.SectionCells) -> QuadMesh:
     middles = np.stack([section.rho_m, section.z_m], axis=1)
     low = middles.min(axis=0) - cell / 2
     index = np.rint((middles - low) / cell - 0.5).astype(int)
@@ -222,17 +210,17 @@ def _draw_density(axes: Axes, cell: float, section: SectionCells) -> QuadMesh:
     return axes.pcolormesh(rho, z, masked(density).T, cmap=DENSITY, norm=log_norm(density), rasterized=True)
 
 
-def _across(bars: Bars, points: Reals) -> Reals:
+def _across(bars: model.Bars, points: Reals) -> Reals:
     """Points (n, 3), m, of the base frame in the plane across the slide (n, 2), counted from the base's origin."""
     return points @ np.array(bars.frame.axes)[[0, 2]].T
 
 
-def _origin_across(bars: Bars | None) -> Reals:
+def _origin_across(bars: model.Bars | None) -> Reals:
     """Where the section of the proof begins in the plane that is drawn, (2,), m."""
     return _across(bars, np.array([bars.frame.origin_m]))[0] if bars else np.zeros(2)
 
 
-def slide_names(frame: SectionFrame) -> tuple[str, str]:
+def slide_names(frame: model.SectionFrame) -> tuple[str, str]:
     """Labels of the axes across the slide."""
     x, _, z = (", ".join(fixed(part, 2).removesuffix(".00") for part in axis) for axis in frame.axes)
     return (
@@ -241,14 +229,14 @@ def slide_names(frame: SectionFrame) -> tuple[str, str]:
     )
 
 
-def _draw_cloud(axes: Axes, bars: Bars, points: Reals) -> QuadMesh:
+def _draw_cloud(axes: Axes, bars: model.Bars, points: Reals) -> QuadMesh:
     x, z = _across(bars, points).T * 1000
     counts, *edges = np.histogram2d(x, z, bins=_CLOUD_CELLS)
     counts *= 100 / (np.diff(edges[0])[0] * np.diff(edges[1])[0])
     return axes.pcolormesh(*edges, masked(counts).T, cmap=DENSITY, norm=log_norm(counts), rasterized=True)
 
 
-def _draw_proof(axes: Axes, proof: ProofCells, bars: Bars | None) -> None:
+def _draw_proof(axes: Axes, proof: model.ProofCells, bars: model.Bars | None) -> None:
     corners = (np.concatenate([proof.rho_m, proof.z_m], axis=1) + _origin_across(bars)[[0, 0, 1, 1]]) * 1000
     filled, empty = proof.filled_ratio, proof.empty_ratio
     if bars:  # their ends are empty
@@ -264,19 +252,19 @@ def _draw_proof(axes: Axes, proof: ProofCells, bars: Bars | None) -> None:
     axes.set_ylim(corners[:, 2].min(), corners[:, 3].max())
 
 
-def arcs_of(border: Border, view: str, point: str) -> Iterator[tuple[int, Border]]:
+def arcs_of(border: model.Border, view: str, point: str) -> Iterator[tuple[int, model.Border]]:
     """Numbers and rows of the arcs of a point's border in a view."""
     rows = border.take((border.view == view) & (border.point == point))
     yield from ((int(number), rows.take(rows.arc == number)) for number in np.unique(rows.arc))
 
 
-def _draw_border(axes: Axes, border: Border) -> None:
+def _draw_border(axes: Axes, border: model.Border) -> None:
     for point in sorted(BORDERS):
         for _, arc in arcs_of(border, "section", point):
             axes.plot(arc.rho_m * 1000, arc.z_m * 1000, color=BORDERS[point], linewidth=1.3)
 
 
-def draw_labels(axes: Axes, drawing: Drawing, across_m: Reals) -> None:
+def draw_labels(axes: Axes, drawing: model.Drawing, across_m: Reals) -> None:
     """The manufacturer's labels: extents as dotted lines, corners as dots; ``across_m`` are the level coordinates."""
     for x, z, q2, q3 in zip(across_m * 1000, drawing.z_m * 1000, drawing.q2_deg, drawing.q3_deg):
         if np.isnan(z):
@@ -295,7 +283,7 @@ def draw_labels(axes: Axes, drawing: Drawing, across_m: Reals) -> None:
             )
 
 
-def _about(axis: AxisSummary, points: Reals) -> Reals:
+def _about(axis: model.AxisSummary, points: Reals) -> Reals:
     """Distance from axis 1 and height along it (n, 2) of points (n, 3), m."""
     offset = points - axis.point_m
     height = offset @ axis.direction
@@ -303,7 +291,7 @@ def _about(axis: AxisSummary, points: Reals) -> Reals:
     return np.stack([away, height], axis=1)
 
 
-def slices(results: WorkspaceResults) -> Figure:
+def slices(results: model.WorkspaceResults) -> Figure:
     """Slices of the proof across axis 1, or along the slide."""
     bars = results.summary.proof.bars
     figure, axes = new_figure(1, 3, width=12.0, height=5.0)
@@ -336,7 +324,7 @@ def slices(results: WorkspaceResults) -> Figure:
     return figure
 
 
-def slice_heights(results: WorkspaceResults) -> list[float]:
+def slice_heights(results: model.WorkspaceResults) -> list[float]:
     """Three heights (m) along axis 1: of the largest enclosed void, or else the shoulder, and midway to both ends.
 
     Quarters of the reached heights where the shoulder lies at an end of them or joint 1 slides.
@@ -351,7 +339,7 @@ def slice_heights(results: WorkspaceResults) -> list[float]:
     return [(low + middle) / 2, middle, (middle + high) / 2]
 
 
-def _slice(proof: ProofCells, rho: Reals, azimuth: Reals, z: float) -> Integers:
+def _slice(proof: model.ProofCells, rho: Reals, azimuth: Reals, z: float) -> Integers:
     """State of each pixel (m, deg) about axis 1, as a row of PROOF."""
     state = np.full(rho.shape, EMPTY)
     for row in np.flatnonzero((proof.z_m[:, 0] <= z) & (z < proof.z_m[:, 1])):
@@ -373,7 +361,7 @@ def _on_arcs(azimuth: Reals, arcs: Reals) -> Flags:
 SIDE_DRAWN, FLANGE, WRIST = JOINTS[2], INK, REFERENCE
 
 
-def side_view(results: WorkspaceResults, has_tool: bool) -> Figure:
+def side_view(results: model.WorkspaceResults, has_tool: bool) -> Figure:
     """Wrist centre and flange in the arm's plane: samples, exact border with numbered arcs, the manufacturer's labels.
 
     Parameters
@@ -405,7 +393,7 @@ def side_view(results: WorkspaceResults, has_tool: bool) -> Figure:
     return figure
 
 
-def arc_rows(border: Border) -> list[list[str]]:
+def arc_rows(border: model.Border) -> list[list[str]]:
     """The wrist centre's arcs with the joint values that make them, as rows of text."""
     return [
         [str(i), word("workspace.sweeps", SWEEPS, arc.sweeps[0]), _swept(arc.q2_deg), _swept(arc.q3_deg)]
@@ -424,7 +412,7 @@ def _numbered(colour: str) -> dict[str, Any]:
     return {"ha": "center", "va": "center", "fontsize": 8, "color": colour, "bbox": box}
 
 
-def _draw_samples(axes: Axes, views: SideViewCells, point: str) -> QuadMesh:
+def _draw_samples(axes: Axes, views: model.SideViewCells, point: str) -> QuadMesh:
     rows = views.take(views.point == point)
     cell, middles = rows.cell_m[0], np.stack([rows.x_m, rows.z_m], axis=1)
     low = middles.min(axis=0) - cell / 2
@@ -442,7 +430,7 @@ _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 _NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
 
 
-def in_space(robot: Robot, results: WorkspaceResults, scene: Scene | None) -> Markup:
+def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None) -> Markup:
     """The cloud's far half, the voids, the scene and the arm at zero in a figure that turns."""
     cloud, vertices, triangles = results.cloud, results.void_vertices, results.void_triangles
     far = np.flatnonzero(cloud.point_m[:, 1] >= results.summary.axis.point_m[1])[:CLOUD_POINTS]
