@@ -66,10 +66,10 @@ def is_frame(value: Value | None) -> bool:
 
 
 def record_pose(value: Value | None) -> Reals | None:
-    """The transform (4, 4) in m of a frame, with 0 for what it leaves out; None for anything else."""
+    """The transform (4, 4) in m of a frame; None for anything else, and for a frame that leaves something out."""
     if not isinstance(value, Record):
         return None
-    given = [0.0 if value.get(key) is None else number(value.get(key)) for key in FRAME_KEYS]
+    given = [number(value.get(key)) for key in FRAME_KEYS]
     plain = tuple(each for each in given if each is not None)
     return pose_of(plain, "kuka") if len(plain) == 6 and finite(plain) else None
 
@@ -105,7 +105,8 @@ def relative(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[st
         if memory.here.joints is None or not isinstance(change, JointTarget):
             return UnresolvedTarget(text, "position_unknown")
         return JointTarget(memory.here.joints + change.joints)
-    offset, seen = record_pose(value), memory.here.seen(*frames, memory.cell.flange)
+    steps = Record(value.kind, (*((key, 0.0) for key in FRAME_KEYS if value.get(key) is None), *value.items))
+    offset, seen = record_pose(steps), memory.here.seen(*frames, memory.cell.flange)
     if offset is None or seen is None:
         return UnresolvedTarget(text, "position_unknown")
     if in_tool:
@@ -169,8 +170,10 @@ def _pose(memory: ProgramMemory, value: Record, frames: Frames, text: str) -> Ta
             return UnresolvedTarget(text, "position_unknown")
         given = [old if each is None else each for each, old in zip(given, numbers_of(seen, "kuka"))]
     plain = tuple(each for each in given if each is not None)
-    configuration = tuple((key, part) for key in ("S", "T") if (part := number(value.get(key))) is not None)
-    branch = _branch(dict(configuration).get("T"), memory.cell.joints)
+    words = ((key, value.get(key)) for key in ("S", "T"))
+    given_words = ((key, each.text if isinstance(each, Unclear) else number(each)) for key, each in words)
+    configuration = tuple((key, each) for key, each in given_words if each is not None)
+    branch = _branch(number(value.get("T")), memory.cell.joints)
     return PoseTarget(pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch)
 
 
@@ -195,13 +198,22 @@ def base_of(memory: ProgramMemory) -> NamedFrame:
 def _frame(memory: ProgramMemory, variable: str) -> NamedFrame:
     value = memory.read(variable)
     if value is None:
+        if any(f"{variable}.{key}" in memory.shared for key in FRAME_KEYS):  # a part of one that nothing gives
+            return NamedFrame(variable)
         return NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
-    pose = record_pose(value) if is_frame(value) else None
+    own, pose = memory.local.get(name, memory.shared.get(name)), record_pose(value)
     if isinstance(value, Unclear):
         name = name or value.text
-    return NamedFrame(name, memory.cell.frames.get(name) if pose is None else pose)
+        if isinstance(own, Unclear) and own.text != name:  # the program has changed what the name stands for
+            name = f"{name}={own.text}"
+    elif pose is None and is_frame(value):
+        name = shown(value)
+    mapped = memory.cell.frames.get(name)
+    if pose is None or (mapped is not None and value == frame_record(mapped)):
+        pose = mapped
+    return NamedFrame(name, pose)
 
 
 def set_by_bas(memory: ProgramMemory, call: Invocation) -> bool:
@@ -488,14 +500,23 @@ class KrlDialect(Dialect):
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
 
+    def assigned(self, old: Value, new: Value) -> Value:
+        """A position that leaves out what the variable had: no source tells whether the controller keeps that."""
+        if not isinstance(old, Record) or not isinstance(new, Record) or not (is_frame(new) or _has_axes(new)):
+            return new
+        missing = tuple((key, Unclear(f"{key} of {shown(new)}")) for key, _ in old.items if new.get(key) is None)
+        return Record(new.kind, (*new.items, *missing))
+
     def constant(self, memory: ProgramMemory, name: str) -> Value | None:
-        """Frames of the controller, and where the arm stands."""
+        """Frames of the controller and of the cell, and where the arm stands."""
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
             return frame_record(pose_of((0.0,) * 6, "kuka"))
         if name == "$NUM_AX":
             return memory.cell.joints
         if name in CONTROLLER:
             return CONTROLLER[name]
+        if (mapped := memory.cell.frames.get(name)) is not None:
+            return frame_record(mapped)
         if name in HERE:
             seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
             return None if seen is None else frame_record(seen, "E6POS")
