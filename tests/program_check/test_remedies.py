@@ -265,8 +265,12 @@ MENDED = {
     "passes_singularity": (krl("PTP {A5 -20}", "LIN {A1 2,A5 20}"), krl(SOFT, "PTP {A5 -20}", "LIN {A1 2,A5 -30}")),
 }
 
+LONG = ("loop_comes_back_otherwise", "undecided", "not_followed_to_end.drifts")
 
-@pytest.mark.parametrize("code", MENDED)
+
+@pytest.mark.parametrize(
+    "code", [pytest.param(code, marks=pytest.mark.long if code in LONG else ()) for code in MENDED]
+)
 def test_a_program_that_is_mended_as_advised_passes(tmp_path, code):
     """Each way to mend it that the remedy names."""
 

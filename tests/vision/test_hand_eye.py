@@ -449,6 +449,7 @@ MENDED = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("code", MENDED)
 def test_a_set_that_is_mended_as_advised_gives_the_camera_and_no_warning(code):
     make, mend = MENDED[code]
