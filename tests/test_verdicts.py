@@ -141,3 +141,80 @@ def test_an_index_without_validation_says_so(study, tmp_path, monkeypatch):
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "Its table has not been examined yet" in page
     assert "er3_600/teach.html" not in page
+
+
+MOVE = "movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"
+EVERY = {  # robot: program, what is expected of the stage; its status; exit codes at caution and fail; case; badge
+    "passes": (MOVE, None, "pass", (0, 0), None),
+    "doubtful": (MOVE + "go_home()\n", None, "caution", (1, 0), "system-out"),
+    "fails": ("movej([9, 0, 0, 0, 0, 0])\n", None, "fail", (1, 1), "failure"),
+    "fails_as_expected": ("movej([9, 0, 0, 0, 0, 0])\n", "fail", "fail", (0, 0), "system-out"),
+    "passes_unexpectedly": (MOVE, "fail", "pass", (1, 1), "failure"),
+    "without_programs": (None, None, "no_reference", (0, 0), "skipped"),
+    "breaks": (MOVE, None, "not_computed", (1, 1), "error"),
+    "not_run": (MOVE, None, "not_examined", (0, 0), "skipped"),
+}
+
+
+@pytest.mark.long
+def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tmp_path, monkeypatch, call):
+    monkeypatch.chdir(ROOT)
+    content = yaml.safe_load((ROOT / "config/small.yaml").read_text(encoding="utf-8"))
+    own, results, robots = content["robots"]["er3a_c60"], tmp_path / "results", {}
+    for name, (program, expect, *_) in EVERY.items():
+        (tmp_path / f"{name}.script").write_text(program or "")
+        given = {
+            "name": "job",
+            "title": "Job",
+            "file": str(tmp_path / f"{name}.script"),
+            "start_deg": [0] * 4 + [-70, 0],
+        }
+        (tmp_path / f"{name}.yaml").write_text(
+            yaml.safe_dump({"kind": "programs", "programs": [given] * bool(program)})
+        )
+        robots[name] = {
+            **{key: own[key] for key in ("targets", "paths")},
+            "file": "data/robots/er3a_c60.yaml",
+            "programs": str(tmp_path / f"{name}.yaml"),
+            "stages": ["validation", "workspace", "programs"],
+            "expect": {"programs": expect} if expect else {},
+        }
+    study = Study.model_validate(content | {"robots": robots})
+    for name in EVERY:
+        with monkeypatch.context() as patch:
+            if name == "breaks":
+                patch.setattr("er3a.pipeline.stages.programs.compute.check_program", None)
+            if name != "not_run":
+                run.compute("programs", study, name, results / name / "programs")
+    write_index(study, results, tmp_path)
+    report = etree.parse(tmp_path / "junit.xml").getroot()
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    found = {verdict.robot: verdict for verdict in read_verdicts(study, results) if verdict.stage == "programs"}
+    outcomes = [case for *_, case in EVERY.values()]
+    assert report.get("tests") == str(3 * len(EVERY))
+    assert [report.get(key) for key in ("failures", "errors")] == [
+        str(outcomes.count(key)) for key in ("failure", "error")
+    ]
+    for name, (_, _, status, codes, case) in EVERY.items():
+        assert found[name].status == status, name
+        (own_case,) = report.iterfind(f"testsuite[@name='{name}']/testcase[@name='programs']")
+        assert [each.tag for each in own_case][:1] == [case] * bool(case), name
+        (tmp_path / "study.yaml").write_text(yaml.safe_dump(content | {"robots": {name: robots[name]}}))
+        for level, code in zip(("caution", "fail"), codes):
+            if name != "not_run":
+                done = call("verdicts", "--study", tmp_path / "study.yaml", "--results", results, "--fail-on", level)
+                assert done.returncode == code, (name, level)
+                assert "neither passed nor failed: 2 not examined" in done.stderr
+        section = page.split(f'id="{name}"')[1].split("<section")[0]
+        assert ("See why programs fails" in section) == bool(codes[1]), name
+        cells = [each for each in section.split("<li>") if f"{name}/programs.html" in each and "badge" in each]
+        assert [f'badge {status}"' in each for each in cells] == [True] * (name != "not_run"), name
+        assert ("as expected" in "".join(cells)) == (name == "fails_as_expected")
+    whole = tmp_path / "study.yaml"
+    whole.write_text(yaml.safe_dump(content | {"robots": robots}))
+    for level, count in (("caution", 4), ("fail", 3)):
+        done = call("verdicts", "--study", whole, "--results", results, "--fail-on", level)
+        assert done.returncode == 1
+        assert done.stderr.count(", programs (") == count
+        assert "17 not examined, 1 no reference, of 24 stages" in done.stderr
+        assert "counted apart: fails_as_expected, programs" in done.stderr

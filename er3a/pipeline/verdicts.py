@@ -54,6 +54,12 @@ class StageVerdict:
         """Whether the stage could not be computed although it applies to the robot."""
         return self.status == "not_computed" and self.code == NotComputed.code
 
+    @property
+    def is_skipped(self) -> bool:
+        """Whether nothing was judged: not examined yet, no reference, or a stage that does not apply to the robot."""
+        absent = self.status in (NOT_EXAMINED, "no_reference", "not_computed")
+        return absent and not self.broken and not self.is_otherwise
+
     def counts(self, level: Level) -> bool:
         """Whether this is a finding at a level.
 

@@ -172,14 +172,14 @@ class Dialect(ABC):
     modal : variables that motions depend on without naming them
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
     setters : functions that are not in the program, move nothing, and set what motions depend on
-    whole_division : whether two whole numbers have a whole quotient
+    whole_division : whether two whole numbers have a whole quotient; None where no source tells
     first_index : of a list's first element
     """
 
     modal: frozenset[str] = frozenset()
     local_by_default: bool = False
     setters: frozenset[str] = frozenset()
-    whole_division: bool = False
+    whole_division: bool | None = False
     first_index: int = 1
 
     def __init__(self, program: syntax.Program) -> None:  # noqa: B027 - most languages need nothing of it
@@ -192,6 +192,10 @@ class Dialect(ABC):
     def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
         return True
+
+    def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
+        """What a variable has behind an assignment to it."""
+        return new
 
     def named(self, name: str) -> bool:
         """Whether the text that is assigned to this variable is kept, as the name of a tool or base."""
@@ -429,6 +433,13 @@ class ProgramMemory:
             return left != right
         return self._computed(sign, left, right)
 
+    def _quotient(self, a: float, b: float, whole: bool) -> syntax.Value:
+        if not whole or self.functions.whole_division is False:
+            return a / b
+        if self.functions.whole_division is None and a % b:
+            return syntax.Unclear(f"{a:g}/{b:g}, of which no source tells whether it is a whole number")
+        return int(a / b)
+
     def _computed(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:
         if sign == "+" and isinstance(left, str) and isinstance(right, str) and len(left + right) < LONGEST_TEXT:
             return left + right
@@ -440,7 +451,7 @@ class ProgramMemory:
         whole = isinstance(left, int) and isinstance(right, int)
         try:
             if sign == "/":
-                return int(a / b) if whole and self.functions.whole_division else a / b
+                return self._quotient(a, b, whole)
             if sign in ("^", "**"):
                 power = a**b
                 return syntax.Unclear("a root") if isinstance(power, complex) else power

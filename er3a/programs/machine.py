@@ -609,6 +609,8 @@ class Machine:
             return instructions.Output(name, syntax.shown(value))
         declared = each.type_name == "global" or not self.dialect.local_by_default
         local = each.local or (not declared and self._is_new(memory, name))
+        if not each.type_name and isinstance(value, syntax.Record):
+            value = self.dialect.assigned(memory.value(each.target), value)
         memory.assign(each.target, value, local)
         if self.dialect.named(name):
             memory.write(name + "%name", each.text.partition("=")[2].strip())

@@ -153,6 +153,21 @@ def test_declarations_before_a_routine_do_not_make_the_file_the_program(tmp_path
     assert [each.speed.value for each in motions(tmp_path, text)] == [0.5]
 
 
+@pytest.mark.parametrize("end", ["", "      end\n"])
+def test_a_block_whose_head_is_not_understood_is_named_line_by_line_and_reading_goes_on(tmp_path, end):
+    block = f"    case 1:\n      movej([9,0,0,0,0,0])\n{end}    default:\n      n = 2\n{end}  end\n"
+    text = f"def Main():\n  n = 1\n  movej({NEAR_TEXT})\n  switch mode:\n{block}  movej({FAR_TEXT})\n"
+    found = check(tmp_path, f"{text}  if n == 1:\n    movej([9,0,0,0,0,0])\n  end\nend\n")
+    last = text.count("\n")
+    assert codes(found)["may_move"] == [*range(4, last)]
+    assert codes(found)["way_not_known"] == [last]
+    assert [(each.place.line, each.level) for each in found.verdicts] == [
+        (3, "pass"),
+        (last, "note"),
+        (last + 2, "fail"),
+    ]
+
+
 # threads and interrupts
 
 
@@ -563,6 +578,67 @@ def test_motions_with_more_targets_than_they_have_are_not_understood(tmp_path):
         assert motions(tmp_path, krl(body), "a.src")[-1].target.reason == "not_understood"
     (motion,) = motions(tmp_path, "MJOINT(POINTJ(0,0,0,0,-70,0), v50perc, fine, tool0, wobj0, 3);\n", "a.pgm")
     assert motion.target.reason == "not_understood"
+
+
+ZEROS = "A 0,B 0,C 0"
+
+
+@pytest.mark.parametrize(
+    ("lines", "reason"),
+    [
+        (["P={X 300,Y 0,Z 400,A 0,B 90,C 0}", "LIN P"], None),
+        (["P={X 300,Y 0,Z 400,A 0,B 90,C 0}", "P={X 310}", "LIN P"], "undefined"),
+        (["P.X=300", "P.Y=0", "P.Z=400", "LIN P"], None),  # the rest is where the arm stands
+        ([f"LIN {{X 300,Y 0,Z 0,{ZEROS}}}:{{X 10,Y 0,Z 400}}"], "undefined"),
+        ([f"LIN {{X 300,Y 0,Z 0,{ZEROS}}}:{{X 10,Y 0,Z 400,{ZEROS}}}"], None),
+    ],
+)
+def test_what_a_position_leaves_out_is_no_zero(tmp_path, lines, reason):
+    body = f"{FRAMES}DECL E6POS P\nPTP {axes(NEAR)}\n" + "\n".join(lines)
+    assert getattr(motions(tmp_path, krl(body), "a.src")[-1].target, "reason", None) == reason
+
+
+def test_a_position_that_leaves_out_a_turn_the_variable_had_does_not_say_which_solution_is_meant(tmp_path):
+    body = f"{FRAMES}DECL E6POS P\nP={pose_text(NEAR, ',S 2,T 0')}\nP={pose_text(NEAR)}\nPTP P"
+    assert "configuration_not_read" in codes(check(tmp_path, krl(body), "a.src"))
+
+
+@pytest.mark.parametrize(
+    ("lines", "height"),
+    [
+        (["$BASE={X 0,Y 0,Z 100}"], None),
+        (["$BASE.Z=100"], None),
+        (["$BASE=BASE_DATA[1]"], 0.05),
+        (["BASE_DATA[1].Z=BASE_DATA[1].Z+100", "$BASE=BASE_DATA[1]"], 0.15),
+        (["$BASE=BASE_DATA[1]", "$BASE.Z=100"], 0.1),
+        ([f"$BASE=BASE_DATA[1]:{{X 0,Y 0,Z 100,{ZEROS}}}"], 0.15),
+        (["BASE_DATA[1]=SEEN", "$BASE=BASE_DATA[1]"], None),
+        (["BASE_DATA[1].Z=SEEN", "$BASE=BASE_DATA[1]"], None),
+        (["$BASE=SEEN"], None),
+    ],
+)
+def test_a_frame_of_the_cell_is_what_the_program_makes_of_it_or_not_given(tmp_path, lines, height):
+    cell = np.eye(4)
+    cell[2, 3] = 0.05
+    body = "$TOOL=$NULLFRAME\n" + "\n".join(lines) + f"\nPTP {axes(NEAR)}\nLIN {{X 300}}"
+    found = check(tmp_path, krl(body), "a.src", frames={"BASE_DATA[1]": cell})
+    missing = [each.finding.name for each in found.findings if each.finding.code == "frame_not_given"]
+    assert bool(missing) == (height is None)
+    if height is None:
+        mapped = check(tmp_path, krl(body), "a.src", frames={"BASE_DATA[1]": cell, missing[-1]: cell})
+        assert "frame_not_given" not in codes(mapped)
+    else:
+        (base,) = {each.placed.motion.base.pose[2, 3] for each in found.motions.values()}
+        assert base == pytest.approx(height)
+
+
+@pytest.mark.parametrize(("angle", "degrees"), [("7/2", None), ("8/2", 4), ("7/2.0", 3.5), ("-6/4", None)])
+def test_a_quotient_that_no_source_settles_has_no_value(tmp_path, angle, degrees):
+    """No document of RPL tells whether two whole numbers have a whole quotient; programs write 100.0."""
+    (found,) = motions(tmp_path, f"MJOINT(POINTJ({angle},0,0,0,-70,0), v50perc, fine, tool0);\n", "a.pgm")
+    assert isinstance(found.target, UnresolvedTarget) == (degrees is None)
+    if degrees is not None:
+        assert np.degrees(found.target.joints[0]) == pytest.approx(degrees)
 
 
 # what touches first is named first

@@ -20,6 +20,7 @@ from er3a.program_check.program_check_findings import (
     FasterThanAssumed,
     ZoneTooLarge,
 )
+from er3a.programs.execution import RunLimits
 from er3a.programs.languages import read_program
 
 ROBOT = load_robot("er3a_c60")
@@ -111,3 +112,190 @@ def test_what_no_joint_move_mends_says_so_by_not_advising_one(tmp_path):
     found = check_program(read_program(tmp_path / "a.src"), ROBOT, options).findings
     assert [(each.finding.code, each.joint_moves) for each in found] == [("motion_collides", ())]
     assert "joint move" not in remedy_at(found[0].finding, found[0].joint_moves)
+
+
+def rapid(*lines: str) -> str:
+    """A module whose main has these lines."""
+    return "MODULE a\nPROC main()\n" + "".join(f"{line}\n" for line in lines) + "ENDPROC\nENDMODULE\n"
+
+
+def krl(*lines: str, more: str = "") -> str:
+    """A program with these lines, at a speed that is given."""
+    return HEAD + "".join(f"{line}\n" for line in lines) + f"END\n{more}"
+
+
+def axes(q) -> str:
+    """Joint angles (rad) as a KRL axis position."""
+    return "{" + ",".join(f"A{i} {np.degrees(angle):.6f}" for i, angle in enumerate(q, 1)) + "}"
+
+
+def last(check):
+    """Where the arm stands behind the last motion."""
+    return list(check.motions.values())[-1].end
+
+
+HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
+BESIDE = np.radians([60.6, 0.9, 63.1, 47.8, 0.1, 0.0])  # a singular pose
+AT_HOME = "PTP {A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"
+NONE = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+SOFT = "$ACC.CP=0.2"
+DOWN = "A 0,B 0,C 180"
+RPL = (
+    "MJOINT(POINTJ(10,-10,-10,0,-70,0), {speed}, {zone}, {tool});\n"
+    "MJOINT(POINTJ(0,-10,-10,0,-70,0), v10perc, fine, {tool});\n"
+)
+AT_TOOL0 = "MLIN(POINTC(400,0,400,0,0,180), v50, fine, tool0);\n"
+WORDS = {"speed": "v10perc", "zone": "fine", "tool": "tool0"}
+FRAMED = f"DEF a( )\n$TOOL=TOOL_DATA[3]\n$BASE=$NULLFRAME\n$VEL.CP=0.05\nLIN {{X 300,Y 50,Z 400,{DOWN}}}\nEND\n"
+THIRDS = [f"LIN {{A {turn},B 0,C 180}}" for turn in (120, -120, 0)]
+LOOP = ("$ACC.CP=0.2", f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "LOOP", *THIRDS)
+MOVEJ = "  movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"
+THREAD = "def p():\n  {head} T():\n  " + MOVEJ + "  end\n" + MOVEJ.replace("-0.2", "-0.3") + "  {run}T()\nend\n"
+MENDED = {
+    "target_out_of_reach": (krl(f"PTP {{X 3000,Y 0,Z 400,{DOWN}}}"), krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}")),
+    "way_out_of_reach": (krl("LIN {X 3000}"), krl("LIN {X 420}")),
+    "more_than_full_speed": (RPL.format(**WORDS | {"speed": "v150perc"}), RPL.format(**WORDS | {"speed": "v100perc"})),
+    "arrives_otherwise": (
+        krl(AT_HOME, "LIN {A1 5,A2 -10,A3 -10,A4 180,A5 70,A6 180}"),
+        lambda found: krl(AT_HOME, f"LIN {axes(last(found))}"),
+    ),
+    "turns_at_start": (
+        krl("PTP {A4 0,A5 0}", "LIN_REL {Y 60}"),
+        krl("PTP {A4 0,A5 -30}", "LIN_REL {Y 60}"),
+    ),
+    "turn_not_met": (
+        krl(f"PTP {{X 400,Y 0,Z 400,{DOWN},S 2,T 1}}"),
+        lambda found: krl(f"PTP {axes(last(found))}"),
+    ),
+    "configuration_not_met": (
+        rapid(f"MoveJ [[400,0,400],[0,0,1,0],[3,3,3,7],{NONE}],v50,fine,tool0;"),
+        lambda found: rapid(
+            f"MoveAbsJ [[{','.join(f'{q:.6f}' for q in np.degrees(last(found)))}],{NONE}],v50,fine,tool0;"
+        ),
+    ),
+    "configuration_guessed": (
+        (krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}"), {"start": None}),
+        (krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}"), {}),
+        (krl(AT_HOME, f"PTP {{X 400,Y 0,Z 400,{DOWN}}}"), {"start": None}),
+    ),
+    "way_not_known": ((krl("PTP {A1 10}", AT_HOME), {"start": None}), krl("PTP {A1 10}", AT_HOME)),
+    "may_move": (krl("GO_HOME( )", AT_HOME), krl(AT_HOME)),
+    "program_not_understood": (krl("$CORR_T={X 5,Y 0,Z 0,A 0,B 0,C 0}", AT_HOME), krl(AT_HOME)),
+    "moves_beside": (
+        THREAD.format(head="thread", run="run "),
+        THREAD.format(head="def", run=""),
+    ),
+    "never_reached": (krl(AT_HOME, "RETURN", "PTP {A1 20}"), krl(AT_HOME)),
+    "zone_too_large": (
+        krl("$APO.CDIS=80", "LIN_REL {Z 40} C_DIS", "LIN_REL {Y 40}"),
+        krl("$APO.CDIS=20", "LIN_REL {Z 40} C_DIS", "LIN_REL {Y 40}"),
+    ),
+    "zone_without_size": (RPL.format(**WORDS | {"zone": "wide"}), RPL.format(**WORDS | {"zone": "z1"})),
+    "arc_has_no_circle": (
+        krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", f"CIRC {{X 420,Y 0,Z 400,{DOWN}}},{{X 440,Y 0,Z 400,{DOWN}}}"),
+        krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", f"CIRC {{X 420,Y 20,Z 400,{DOWN}}},{{X 440,Y 0,Z 400,{DOWN}}}"),
+        krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", f"LIN {{X 440,Y 0,Z 400,{DOWN}}}"),
+    ),
+    "arc_goes_on": (
+        krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "CIRC {X 420,Y 20},{X 440,Y 0,A 10},CA 270"),
+        krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "CIRC {X 420,Y 20},{X 440,Y 0}", "CIRC {X 434,Y -14},{X 420,Y -20}"),
+    ),
+    "target_not_given": (
+        krl("PTP XTHERE"),
+        (krl("PTP XTHERE"), {"data": "E6AXIS XTHERE={A1 10,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"}),
+    ),
+    "program_data_file_missing": (
+        krl("PTP XP1"),
+        (krl("PTP XP1"), {"data": "E6AXIS XP1={A1 10,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"}),
+    ),
+    "frame_not_given": (FRAMED, (FRAMED, {"frames": {"TOOL_DATA[3]": np.eye(4)}})),
+    "frame_taken_as_flange": (AT_TOOL0, (AT_TOOL0, {"frames": {"tool0": np.eye(4)}})),
+    "not_followed_to_end.operations": (
+        (krl("FOR i=1 TO 40", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR"), {"limits": RunLimits(operations=60)}),
+        krl("FOR i=1 TO 40", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR"),
+    ),
+    "not_followed_to_end.branches": (
+        (
+            krl(*(line for k in range(6) for line in (f"IF $IN[{k}] THEN", f"PTP {{A1 {k}}}", "ENDIF"))),
+            {"limits": RunLimits(ways=3)},
+        ),
+        krl(*(line for k in range(6) for line in (f"IF $IN[{k}] THEN", f"PTP {{A1 {k}}}", "ENDIF"))),
+    ),
+    "not_come_to": (
+        (krl("FOR i=1 TO 40", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR", AT_HOME), {"limits": RunLimits(operations=60)}),
+        krl("FOR i=1 TO 40", "PTP {A1 5}", "PTP {A1 0}", "ENDFOR", AT_HOME),
+    ),
+    "not_followed_to_end.drifts": (
+        (krl("LOOP", "PTP_REL {A1 0.1}", "ENDLOOP"), {"limits": RunLimits(rounds=20)}),
+        krl("LOOP", "PTP_REL {A1 0.1}", AT_HOME, "ENDLOOP"),
+        krl("FOR i=1 TO 20", "PTP_REL {A1 0.1}", "ENDFOR"),
+    ),
+    "not_followed_to_end.recursion": (
+        krl("b(3)", more="DEF b(n:IN)\nINT n\nPTP {A1 5}\nb(n-1)\nEND\n"),
+        krl("b(3)", more="DEF b(n:IN)\nINT n\nPTP {A1 5}\nIF n<1 THEN\nRETURN\nENDIF\nb(n-1)\nEND\n"),
+    ),
+    "rest_not_checked": (
+        (krl("PTP {A1 5}", "PTP {A1 6}", "PTP {A1 7}"), {"most_motions": 2}),
+        krl("PTP {A1 5}", "PTP {A1 6}", "PTP {A1 7}"),
+        (krl("PTP {A1 5}", "PTP {A1 6}"), {"most_motions": 2}),
+    ),
+    "loop_comes_back_otherwise": (
+        (krl(*LOOP, "ENDLOOP"), {"limits": RunLimits(rounds=5)}),
+        krl(*LOOP, *THIRDS[1::-1], THIRDS[2], "ENDLOOP"),
+    ),
+    "program_name_twice": (
+        krl("b( )", more="DEF b( )\nPTP {A1 5}\nEND\nDEF b( )\nPTP {A1 9}\nEND\n"),
+        krl("b( )", more="DEF b( )\nPTP {A1 9}\nEND\n"),
+    ),
+    "speed_not_given": ("DEF a( )\nPTP {A1 5}\nEND\n", krl("PTP {A1 5}")),
+    "above_limit": (krl("PTP {A1 170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.upper[0]):g}}}")),
+    "below_limit": (krl("PTP {A1 -170}"), krl(f"PTP {{A1 {np.degrees(ROBOT.lower[0]):g}}}")),
+    "motion_collides": (
+        (krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "LIN {Z -50}"), {"scene": SCENE}),
+        (krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "LIN {Z 300}"), {"scene": SCENE}),
+    ),
+    "joint_jumps": (
+        krl("PTP {A4 -180,A5 70,A6 180}"),
+        krl(AT_HOME),
+    ),
+    "undecided": (
+        (krl(SOFT, f"PTP {axes(BESIDE)}", "LIN_REL {Y -60,Z -60}"), {"start": BESIDE}),
+        (krl(SOFT, "PTP {A5 30}", "LIN_REL {Y -60,Z -60}"), {"start": BESIDE + np.radians([0, 0, 0, 0, 30, 0])}),
+    ),
+    "passes_singularity": (krl("PTP {A5 -20}", "LIN {A1 2,A5 20}"), krl(SOFT, "PTP {A5 -20}", "LIN {A1 2,A5 -30}")),
+}
+
+LONG = ("loop_comes_back_otherwise", "undecided", "not_followed_to_end.drifts")
+
+
+@pytest.mark.parametrize(
+    "code", [pytest.param(code, marks=pytest.mark.long if code in LONG else ()) for code in MENDED]
+)
+def test_a_program_that_is_mended_as_advised_passes(tmp_path, code):
+    """Each way to mend it that the remedy names."""
+
+    def checked(program):
+        text, given = program if isinstance(program, tuple) else (program, {})
+        suffix = {"M": "mod", "D": "src", "d": "script"}.get(text[0], "pgm") if text[:2] != "MJ" else "pgm"
+        options = {"start": HOME} | {key: value for key, value in given.items() if key != "data"}
+        (tmp_path / f"a.{suffix}").write_text(text)
+        (tmp_path / "a.dat").unlink(missing_ok=True)
+        if "data" in given:
+            (tmp_path / "a.dat").write_text(f"DEFDAT a\nDECL {given['data']}\nENDDAT\n")
+        return check_program(read_program(tmp_path / f"a.{suffix}"), ROBOT, CheckOptions(**options))
+
+    def codes(found):
+        return {
+            f"{each.finding.code}.{each.finding.kind}"
+            if each.finding.code == "not_followed_to_end"
+            else each.finding.code
+            for each in found.findings
+        }
+
+    broken, *mended = MENDED[code]
+    before = checked(broken)
+    assert code in codes(before), codes(before)
+    for program in mended:
+        after = checked(program(before) if callable(program) else program)
+        assert code not in codes(after)
+        assert after.level in ("pass", "note"), codes(after)

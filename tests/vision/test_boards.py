@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import json
 import sys
 from dataclasses import replace
 
@@ -114,7 +115,7 @@ def test_a_board_seen_head_on_leaves_its_tilt_open():
 
 
 @pytest.mark.long
-def test_a_camera_is_calibrated_from_images_alone(tmp_path):
+def test_a_camera_is_calibrated_from_images_alone_and_those_without_a_board_are_left_out_and_listed(tmp_path, call):
     """Eye-to-hand: images, joint poses and nothing else; the truth lies within twice the intervals."""
     random = np.random.default_rng(3)
     Y = pose([3, -4, 20], [0.02, 0.03, 0.05])
@@ -133,12 +134,21 @@ def test_a_camera_is_calibrated_from_images_alone(tmp_path):
     assert np.linalg.norm(off(found.X, X)[:3]) < 2e-3
     assert np.linalg.norm(off(found.X, X)[3:]) < np.radians(0.2)
     assert np.abs(off(found.Y, Y)[:3]).max() < 2e-3
-    Image.fromarray(np.full((960, 1280), 128, np.uint8)).save(tmp_path / "5.png")
+    blank = range(1, 12, 2)
+    for number in blank:
+        Image.fromarray(np.full((960, 1280), 128, np.uint8)).save(tmp_path / f"{number}.png")
     again, _, images = read_calibration(tmp_path / "set.yaml", None)
-    assert images.boardless == (BoardlessImage("row 7", "5.png", 0),)
-    assert again.names == tuple(name for name in samples.names if name != "row 7")
-    np.testing.assert_array_equal(again.target, np.delete(samples.target, 5, axis=0))
-    np.testing.assert_array_equal(again.flange, np.delete(samples.flange, 5, axis=0))
+    assert images.boardless == tuple(BoardlessImage(f"row {k + 2}", f"{k}.png", 0) for k in blank)
+    assert again.names == tuple(f"row {k + 2}" for k in range(0, 12, 2))
+    np.testing.assert_array_equal(again.target, samples.target[::2])
+    np.testing.assert_array_equal(again.flange, samples.flange[::2])
+    done = call("hand-eye", tmp_path / "set.yaml")
+    assert done.returncode == 0
+    assert "6 of 12 samples used" in done.stdout
+    assert done.stdout.count("the sample is left out") == 6
+    record = json.loads(call("hand-eye", tmp_path / "set.yaml", "--json").stdout)
+    assert record["samples"] == 12
+    assert [each["sample"] for each in record["left_out"]] == [f"row {k + 2}" for k in blank]
 
 
 def test_without_any_board_in_the_images_there_is_one_error(tmp_path):

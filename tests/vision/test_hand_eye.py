@@ -372,3 +372,93 @@ def test_touched_points_judge_the_calibration():
     bad = calibrate_hand_eye(a_set("eye_to_hand", 21, touched=touched, touch_deviation=1e-4))
     assert bad.touch.probability < 1e-6
     assert bad.touch.difference[:, 0].mean() == pytest.approx(0.01, abs=2e-3)
+
+
+def turned(samples: CalibrationSet, change) -> CalibrationSet:
+    """The set with changed rotations of the flange."""
+    R = Rotation.from_matrix(samples.flange[:, :3, :3])
+    samples.flange[:, :3, :3] = change(R).as_matrix()
+    return samples
+
+
+def with_axes(samples: CalibrationSet, axes: str) -> CalibrationSet:
+    """The set with the board's positions read as these axes."""
+    given = samples.target[:, :3, 3].copy()
+    for k, name in enumerate(axes.split(", ")):
+        samples.target[:, k, 3] = given[:, "xyz".index(name[-1])] * (-1 if name[0] == "-" else 1)
+    return samples
+
+
+def inverted(samples: CalibrationSet) -> CalibrationSet:
+    """The set with the flange's poses inverted."""
+    return CalibrationSet(samples.setup, np.linalg.inv(samples.flange), samples.target)
+
+
+def moving(rotations: Rotation) -> CalibrationSet:
+    """A set whose flange has these rotations."""
+    random = np.random.default_rng(16)
+    flange = flange_poses(random, len(rotations))
+    flange[:, :3, :3] = rotations.as_matrix()
+    return CalibrationSet("eye_in_hand", flange, noisy(seen("eye_in_hand", flange), random))
+
+
+def with_poses_added(samples: CalibrationSet) -> CalibrationSet:
+    """Beside those of the set, ten poses rotated by 30 deg and more about other axes."""
+    turns = np.radians(30) * np.concatenate([np.eye(3), -np.eye(3), 1.5 * np.eye(3), -1.5 * np.eye(3)[:1]])
+    more = moving(Rotation.from_rotvec(turns))
+    both = (np.concatenate([a, b]) for a, b in ((samples.flange, more.flange), (samples.target, more.target)))
+    return CalibrationSet(samples.setup, *both)
+
+
+def scaled(samples: CalibrationSet, factor: float) -> CalibrationSet:
+    """The set with a board this many times as large."""
+    samples.target[:, :3, 3] *= factor
+    return samples
+
+
+SMALL = Rotation.from_rotvec(np.random.default_rng(2).normal(0, 0.03, (12, 3)))
+ABOUT_Z = Rotation.from_euler("z", np.linspace(-60, 60, 10)[:, None], degrees=True)
+STILL = Rotation.from_rotvec(np.tile([0.1, 0.2, 0.3], (6, 1)))
+MENDED = {
+    "quaternion_order": (
+        lambda: turned(a_set("eye_in_hand", 14), lambda R: Rotation.from_quat(R.as_quat(scalar_first=True))),
+        lambda samples, _: turned(samples, lambda R: Rotation.from_quat(R.as_quat(), scalar_first=True)),
+    ),
+    "angle_order": (
+        lambda: turned(a_set("eye_in_hand", 14), lambda R: Rotation.from_euler("xyz", R.as_euler("ZYX"))),
+        lambda samples, _: turned(samples, lambda R: Rotation.from_euler("ZYX", R.as_euler("xyz"))),
+    ),
+    "transposed_rotations": (
+        lambda: turned(a_set("eye_in_hand", 14), Rotation.inv),
+        lambda samples, _: turned(samples, Rotation.inv),
+    ),
+    "position_axes": (
+        lambda: with_axes(a_set("eye_in_hand", 14), "z, -x, y"),
+        lambda samples, found: with_axes(samples, found.axes),
+    ),
+    "other_direction": (lambda: inverted(a_set("eye_in_hand", 15)), lambda samples, _: inverted(samples)),
+    "board_scale": (
+        lambda: scaled(a_set("eye_in_hand", 13, 20), 1 / 1.05),
+        lambda samples, found: scaled(samples, found.factor),
+    ),
+    "few_samples": (lambda: a_set("eye_in_hand", 3, 5), lambda samples, _: with_poses_added(samples)),
+    "too_few_samples": (lambda: a_set("eye_in_hand", 3, 2), lambda samples, _: with_poses_added(samples)),
+    "little_motion": (lambda: moving(SMALL), lambda samples, _: with_poses_added(samples)),
+    "no_rotation": (lambda: moving(STILL), lambda samples, _: with_poses_added(samples)),
+    "parallel_axes": (lambda: moving(ABOUT_Z), lambda samples, _: with_poses_added(samples)),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("code", MENDED)
+def test_a_set_that_is_mended_as_advised_gives_the_camera_and_no_warning(code):
+    make, mend = MENDED[code]
+    samples = make()
+    try:
+        (named,) = (each for each in calibrate_hand_eye(samples).warnings if each.code == code)
+    except HandEyeError as error:
+        named = error.finding
+    assert named.code == code
+    after = calibrate_hand_eye(mend(samples, named))
+    assert [each.code for each in after.warnings] == []
+    assert (np.abs(off(after.X, X_TRUE)) < 2 * after.half_width[:6]).all()

@@ -265,12 +265,16 @@ def hand_eye(
             raise Er3aError(f"{file}: {say(error.finding)}") from None
         at(f"{file}: the table's corrections are estimated")
         table = correct_table(found, arm, asked) if arm and asked else None
+    boardless = images.boardless if images else ()
     if as_json:
-        options.print_json(hand_eye_record(found, offset, table))
+        options.print_json(hand_eye_record(found, offset, table, boardless, open_tilts))
     else:
-        left_out = images.boardless if images else ()
-        sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *left_out)]
-        print("\n".join([hand_eye_lines(found, offset), *sample_lines, *(correction_lines(table) if table else [])]))
+        sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
+        print(
+            "\n".join(
+                [hand_eye_lines(found, offset, boardless), *sample_lines, *(correction_lines(table) if table else [])]
+            )
+        )
     if grave_warnings(found.warnings) or found.directions[0].status == "excluded":
         raise typer.Exit(1)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import subprocess
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, astuple
 from pathlib import Path
@@ -142,11 +143,11 @@ def verdicts(
 
 def _end_with_findings(found: Sequence[StageVerdict], level: options.FailOn) -> None:
     """Name the findings at a level, and end with 1 if there are any."""
-    from er3a.pipeline.verdicts import NOT_EXAMINED
-
     counted = [verdict for verdict in found if verdict.counts(level.value)]
-    if unknown := sum(verdict.status == NOT_EXAMINED for verdict in found):
-        options.print_note(f"not examined, and neither passed nor failed: {unknown} of {len(found)} stages")
+    skipped = Counter(verdict.status.replace("_", " ") for verdict in found if verdict.is_skipped)
+    if skipped:
+        named = ", ".join(f"{count} {status}" for status, count in skipped.items())
+        options.print_note(f"neither passed nor failed: {named}, of {len(found)} stages")
     if shown := [f"{verdict.robot}, {verdict.stage}" for verdict in found if verdict.is_demonstration]:
         options.print_note(f"as expected, and counted apart: {'; '.join(shown)}")
     for verdict in counted:

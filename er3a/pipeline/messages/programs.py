@@ -97,7 +97,7 @@ REMEDIES: dict[str, str] = {
     "way_not_known": N_("Give start_deg of the program, or mend the motion before."),
     "not_come_to": FURTHER,
     "rest_not_checked": N_("Give the check more time or motions, or split the program and check its parts."),
-    "loop_comes_back_otherwise": N_("Begin the loop with a joint move to fixed angles."),
+    "loop_comes_back_otherwise": N_("Turn the tool back within the loop, so that each round ends as it began."),
     "program_data_file_missing": N_("Put the data file beside the program."),
     "program_name_twice": N_("Remove one of the two definitions."),
     "program_nothing_moves": N_("Check that this is the program to run."),

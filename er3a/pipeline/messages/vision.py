@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 import er3a.pipeline.messages.collision
@@ -15,6 +17,7 @@ from er3a.pipeline.stages.vision.model import (
     DirectionContradicted,
     GraspCounts,
 )
+from er3a.vision.boards import AmbiguousTilt, BoardlessImage
 from er3a.vision.calibration_set import TimeOffset, quaternion_of
 from er3a.vision.grasping import (
     GraspCollides,
@@ -34,6 +37,7 @@ from er3a.vision.vision_findings import (
     QuaternionOrder,
     ReadingKind,
     RotationMismatch,
+    Suspect,
     TransposedRotations,
     UnexplainedResiduals,
 )
@@ -361,12 +365,12 @@ def pose_words(setup: str) -> tuple[str, str]:
     return word("vision.pose", {"pose": first}, "pose"), word("vision.pose", {"pose": second}, "pose")
 
 
-def hand_eye_lines(found: HandEye, offset: TimeOffset | None) -> str:
-    """A calibration as lines of text for a terminal."""
+def hand_eye_lines(found: HandEye, offset: TimeOffset | None, boardless: Sequence[BoardlessImage] = ()) -> str:
+    """A calibration as lines of text for a terminal; ``boardless``: images that it leaves out."""
     spread, turned = spread_of(found)
     about = {"roll": "x", "pitch": "y", "yaw": "z"}
     lines = [
-        f"{int(found.used.sum())} of {len(found.samples)} samples used; rotated by up to "
+        f"{int(found.used.sum())} of {len(found.samples) + len(boardless)} samples used; rotated by up to "
         f"{np.degrees(found.greatest_turn):.0f} deg, about axes up to {np.degrees(found.axes_apart):.0f} deg away from "
         "one direction",
         f"camera's standard deviation per axis {1000 * found.deviations[0]:.3g} mm, "
@@ -403,9 +407,19 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None) -> str:
 
 
 def hand_eye_record(
-    found: HandEye, offset: TimeOffset | None, table: TableCorrections | NoCorrections | None = None
+    found: HandEye,
+    offset: TimeOffset | None,
+    table: TableCorrections | NoCorrections | None = None,
+    boardless: Sequence[BoardlessImage] = (),
+    open_tilts: Sequence[AmbiguousTilt] = (),
 ) -> dict[str, object]:
-    """A calibration as plain data, for another program; half widths of 95 % intervals in mm and deg."""
+    """A calibration as plain data, for another program; half widths of 95 % intervals in mm and deg.
+
+    ``boardless``: images that it leaves out; ``open_tilts``: those that leave open which way the board is tilted.
+    """
+
+    def named(findings: Sequence[Suspect | BoardlessImage | AmbiguousTilt]) -> list[dict[str, str]]:
+        return [{"code": each.code, "sample": each.sample, "text": say(each)} for each in findings]
 
     def pose(T: np.ndarray, half: np.ndarray) -> dict[str, object]:
         return {
@@ -418,7 +432,7 @@ def hand_eye_record(
 
     return {
         "setup": found.samples.setup,
-        "samples": len(found.samples),
+        "samples": len(found.samples) + len(boardless),
         "used": [name for name, used in zip(found.samples.names, found.used) if used],
         "hand_eye": pose(found.X, found.half_width[:6]),
         "board": pose(found.Y, found.half_width[6:]),
@@ -439,7 +453,9 @@ def hand_eye_record(
             }
             for each in found.directions
         ],
-        "suspects": [{"code": each.code, "sample": each.sample, "text": say(each)} for each in found.suspects],
+        "suspects": named(found.suspects),
+        "left_out": named(boardless),
+        "open_tilts": named(open_tilts),
         "warnings": [{"code": each.code, "text": say(each)} for each in found.warnings],
         "time_offset_s": offset.offset if offset else None,
         "touch_probability": found.touch.probability if found.touch else None,

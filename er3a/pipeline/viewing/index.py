@@ -451,14 +451,9 @@ def _outcome(verdict: StageVerdict) -> str | None:
         return "error"
     if verdict.is_otherwise:
         return "failure"
-    if verdict.is_demonstration:
-        return None
-    return {
-        "fail": "failure",
-        "no_reference": "skipped",
-        "not_computed": "skipped",
-        "not_examined": "skipped",
-    }.get(verdict.status)
+    if verdict.is_skipped:
+        return "skipped"
+    return "failure" if verdict.status == "fail" and not verdict.is_demonstration else None
 
 
 def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
@@ -576,7 +571,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     failed = {
         stage: tr(STAGES[stage].title)
         for stage, head in heads.items()
-        if head.status == "fail" and expected.get(stage) != "fail"  # one that is expected is a demonstration
+        if StageVerdict(name, stage, head.status, head.finding.code, "", expected=expected.get(stage)).counts("fail")
     }
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
     by_status: dict[str, list[str]] = {}

@@ -34,10 +34,10 @@ def is_frame(value: syntax.Value | None) -> bool:
 
 
 def record_pose(value: syntax.Value | None) -> Reals | None:
-    """The transform (4, 4) in m of a frame, with 0 for what it leaves out; None for anything else."""
+    """The transform (4, 4) in m of a frame; None for anything else, and for a frame that leaves something out."""
     if not isinstance(value, syntax.Record):
         return None
-    given = [0.0 if value.get(key) is None else syntax.number(value.get(key)) for key in FRAME_KEYS]
+    given = [syntax.number(value.get(key)) for key in FRAME_KEYS]
     plain = tuple(each for each in given if each is not None)
     return instructions.pose_of(plain, "kuka") if len(plain) == 6 and syntax.finite(plain) else None
 
@@ -75,7 +75,8 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
         if memory.here.joints is None or not isinstance(change, instructions.JointTarget):
             return instructions.UnresolvedTarget(text, "position_unknown")
         return instructions.JointTarget(memory.here.joints + change.joints)
-    offset, seen = record_pose(value), memory.here.seen(*frames, memory.cell.flange)
+    steps = syntax.Record(value.kind, (*((key, 0.0) for key in FRAME_KEYS if value.get(key) is None), *value.items))
+    offset, seen = record_pose(steps), memory.here.seen(*frames, memory.cell.flange)
     if offset is None or seen is None:
         return instructions.UnresolvedTarget(text, "position_unknown")
     if in_tool:
@@ -143,8 +144,10 @@ def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str
             return instructions.UnresolvedTarget(text, "position_unknown")
         given = [old if each is None else each for each, old in zip(given, instructions.numbers_of(seen, "kuka"))]
     plain = tuple(each for each in given if each is not None)
-    configuration = tuple((key, part) for key in ("S", "T") if (part := syntax.number(value.get(key))) is not None)
-    branch = _branch(dict(configuration).get("T"), memory.cell.joints)
+    words = ((key, value.get(key)) for key in ("S", "T"))
+    given_words = ((key, each.text if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in words)
+    configuration = tuple((key, each) for key, each in given_words if each is not None)
+    branch = _branch(syntax.number(value.get("T")), memory.cell.joints)
     return instructions.PoseTarget(
         instructions.pose_of(plain, "kuka"), configuration, external=_external(value), branch=branch
     )
@@ -173,13 +176,22 @@ def base_of(memory: ProgramMemory) -> instructions.NamedFrame:
 def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
     value = memory.read(variable)
     if value is None:
+        if any(f"{variable}.{key}" in memory.shared for key in FRAME_KEYS):  # a part of one that nothing gives
+            return instructions.NamedFrame(variable)
         return instructions.NamedFrame("", memory.cell.tool if variable == "$TOOL" else memory.cell.base)
     said = memory.read(variable + "%name")
     name = said.upper() if isinstance(said, str) and said[:1] not in ("{", "") else ""
-    pose = record_pose(value) if is_frame(value) else None
+    own, pose = memory.local.get(name, memory.shared.get(name)), record_pose(value)
     if isinstance(value, syntax.Unclear):
         name = name or value.text
-    return instructions.NamedFrame(name, memory.cell.frames.get(name) if pose is None else pose)
+        if isinstance(own, syntax.Unclear) and own.text != name:  # the program has changed what the name stands for
+            name = f"{name}={own.text}"
+    elif pose is None and is_frame(value):
+        name = syntax.shown(value)
+    mapped = memory.cell.frames.get(name)
+    if pose is None or (mapped is not None and value == frame_record(mapped)):
+        pose = mapped
+    return instructions.NamedFrame(name, pose)
 
 
 def set_by_bas(memory: ProgramMemory, call: syntax.Invocation) -> bool:
@@ -466,14 +478,29 @@ class KrlDialect(Dialect):
         """Tool and base keep the name of what they are set to."""
         return name in ("$TOOL", "$BASE")
 
+    def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
+        """A position that leaves out what the variable had: no source tells whether the controller keeps that."""
+        if (
+            not isinstance(old, syntax.Record)
+            or not isinstance(new, syntax.Record)
+            or not (is_frame(new) or _has_axes(new))
+        ):
+            return new
+        missing = tuple(
+            (key, syntax.Unclear(f"{key} of {syntax.shown(new)}")) for key, _ in old.items if new.get(key) is None
+        )
+        return syntax.Record(new.kind, (*new.items, *missing))
+
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
-        """Frames of the controller, and where the arm stands."""
+        """Frames of the controller and of the cell, and where the arm stands."""
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
             return frame_record(instructions.pose_of((0.0,) * 6, "kuka"))
         if name == "$NUM_AX":
             return memory.cell.joints
         if name in CONTROLLER:
             return CONTROLLER[name]
+        if (mapped := memory.cell.frames.get(name)) is not None:
+            return frame_record(mapped)
         if name in HERE:
             seen = memory.here.seen(tool_of(memory), base_of(memory), memory.cell.flange)
             return None if seen is None else frame_record(seen, "E6POS")

@@ -19,7 +19,7 @@ LIBRARIES = ("tcpip.", "io.", "fidbus.", "str.", "log.")
 class RplDialect(Dialect):
     """RPL, as a run needs it."""
 
-    whole_division = True
+    whole_division = None
 
     def is_signal(self, name: str) -> bool:
         """Outputs, and what goes to the field bus."""

@@ -1,6 +1,7 @@
 """Reads URScript.
 
-Lines that are not understood are kept; blocks, brackets and texts without an end are errors.
+Lines that are not understood are kept, and so is all of a block whose head is not understood, up to the ``end`` below
+it; blocks, brackets and texts without an end are errors.
 """
 
 from __future__ import annotations
@@ -126,6 +127,7 @@ class _UrReader:
         self.routines: list[syntax.Routine] = []
         self.outermost: list[str] = []
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
+        self.unread: int | None = None  # columns before the head of the block that is not understood, while within one
 
     def read(self) -> list[syntax.Routine]:
         """All routines; the one without a name holds what stands outside of others."""
@@ -175,6 +177,11 @@ class _UrReader:
 
     def _statement(self, place: Place, text: str) -> None:
         builder = self.open[-1]
+        if self.unread is not None:
+            builder.unread(place, text)
+            if text == "end" and self._column(place) <= self.unread:
+                self.unread = None
+            return
         if (plain := PLAIN.match(text)) is not None and plain[1] in MOTIONS and plain[3].count(",") == 5:
             builder.add(_plain_motion(place, plain))
             return
@@ -184,11 +191,18 @@ class _UrReader:
         try:
             self._read(builder, UrWords(text.removesuffix(";")), place, text)
         except MisreadError:
-            if text.endswith(":"):  # of a block, without which the lines behind would mean something else
+            if text.startswith(("else", "elif")):  # of a block that is open
                 raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
             builder.unread(place, text)
+            if text.endswith(":"):  # the head of a block, whose lines mean nothing without it
+                self.unread = self._column(place)
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+
+    def _column(self, place: Place) -> int:
+        """How far a statement's first line is moved in."""
+        line = self.source.lines[place.line - 1].expandtabs(4)
+        return len(line) - len(line.lstrip())
 
     def _read(self, builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
         first = words.next

@@ -200,6 +200,7 @@ def calibration_result(
     """All that the summary says of a calibration."""
     spread, turned = spread_of(found)
     moved, tilted = (None, None) if found.without_suspects is None else found.without_suspects
+    boardless = images.boardless if images else ()
     return stated(
         model.CalibrationResult,
         found,
@@ -207,7 +208,7 @@ def calibration_result(
         source=head.source,
         simulated=head.simulated,
         setup=found.samples.setup,
-        samples=len(found.samples),
+        samples=len(found.samples) + len(boardless),
         used=found.used.sum(),
         stated=found.samples.camera_covariance is not None,
         hand_eye=_estimate(found.X, found.half_width[:6]),
@@ -224,7 +225,7 @@ def calibration_result(
         time_offset=stated(model.OffsetResult, offset) if offset else None,
         table=_table_result(table) if isinstance(table, TableCorrections) else table,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
-        boardless=images.boardless if images else (),
+        boardless=boardless,
         intrinsics_estimated=images is not None and images.views.shared is not None,
     )
 
