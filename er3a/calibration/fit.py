@@ -267,9 +267,9 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
     def slopes(here: Robot, coefficients: Reals) -> Reals:
         seen = with_errors(coefficients)
         J = jacobian(here, kept, seen) / deviation[:, None]
-        if not (terms and isinstance(observations, PointObservations)):
+        if not (terms and isinstance(observations, PointObservations) and isinstance(seen, PointObservations)):
             return J
-        by_terms = term_jacobian(here, robot, terms, observations) / deviation[:, None]
+        by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]
         return np.block([[J, by_terms], [np.zeros((len(prior), len(kept))), np.diag(prior)]])
 
     n, k = len(observations), len(kept)

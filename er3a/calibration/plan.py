@@ -84,7 +84,8 @@ class Plan:
 
     Attributes
     ----------
-    settled : numbers that they tell apart, ``bar_NAME`` a bar's length; lacking : that measurements of this kind at more poses would
+    settled : numbers that they tell apart, ``bar_NAME`` a bar's length
+    lacking : those that measurements of this kind at more poses would
     held : why no poses settle the others
     proposals : poses, the one that adds most first
     beyond : where these go beyond the measured poses
@@ -290,7 +291,7 @@ def _half_widths(robot: Robot, parameters: Sequence[Parameter], seen: PointObser
     """Of the numbers that are settled the half-widths of their 95 % intervals, mm or deg."""
     kept = [parameters[k] for k in subspace(robot, parameters, seen).kept]
     J = SCALE * jacobian(robot, kept, seen) / seen.deviation_mm[:, None]
-    covariance = SCALE**2 * np.linalg.pinv(J.T @ J)
+    covariance = np.asarray(SCALE**2 * np.linalg.pinv(J.T @ J), np.float64)
     errors = np.sqrt(np.diag(covariance))
     found = {each.name: INTERVAL_95 * float(error) * each.in_unit for each, error in zip(kept, errors)}
     for bar in bar_lengths(robot, kept, seen, covariance):

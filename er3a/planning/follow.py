@@ -286,8 +286,13 @@ class Followed(ByValue, Displayed):
         return Sheet(found, columns, rows, left_out, ("a row for each time of yours: .joints(t), in rad",))
 
     def joints(self, t: Reals) -> Reals:
-        """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable. :class:`er3a.Er3aError` beyond start
-        and end."""
+        """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable.
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         return self.joints_at(self.line.progress(t)[0])
 
     def joints_at(self, progress: Reals) -> Reals:

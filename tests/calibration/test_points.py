@@ -247,9 +247,7 @@ def test_a_worst_position_beyond_all_fitted_poses_is_named():
     assert held_back_line(rows, rows[:2], off).endswith("0.3 mm at worst (row 3)")
 
 
-def reached(
-    bench: Bench, target: np.ndarray, normal: np.ndarray | None, count: int, length: float = 0.0
-) -> np.ndarray:
+def reached(bench: Bench, target: np.ndarray, normal: np.ndarray | None, count: int, length: float = 0.0) -> np.ndarray:
     """Joint values (count, 6) at which the real arm touches a point, m, or the plane through it; or is at a length from
     the point, in the plane if there is one."""
     found: list[np.ndarray] = []

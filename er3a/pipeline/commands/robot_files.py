@@ -153,9 +153,7 @@ def mesh(
     print(f"they stand out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
-def _print_plan(
-    arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[FixedName], as_json: bool
-) -> None:
+def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[FixedName], as_json: bool) -> None:
     from er3a.calibration.plan import plan
     from er3a.pipeline.messages.calibration import plan_lines, plan_record
 
