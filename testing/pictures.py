@@ -1,7 +1,7 @@
 """Pictures of finished studies for the documentation, taken from their own pages in headless Chromium.
 
 `python -m testing.pictures playing` writes docs/images/playing.webp, a motion of the default study as its page plays
-it; `python -m testing.pictures arms` writes docs/arms.md and its pictures, from the results of config/gallery.yaml.
+it; `python -m testing.pictures arms` writes docs/arms.md and its pictures, from the pages of config/gallery.yaml.
 """
 
 from __future__ import annotations
@@ -16,9 +16,7 @@ from selenium.webdriver.chrome.webdriver import WebDriver
 from selenium.webdriver.common.by import By
 
 from er3a.pipeline.messages.language import own_title
-from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
-from er3a.pipeline.viewing.page import stage_head, status_word
 from testing import chromium
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -32,7 +30,7 @@ def main() -> None:
     """Write what the command line names."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=("playing", "arms"))
-    parser.add_argument("--folder", type=Path, default=Path(), help="where results and reports are")
+    parser.add_argument("--folder", type=Path, default=Path(), help="where reports are")
     options = parser.parse_args()
     with TemporaryDirectory() as profile:
         browser = chromium.start(Path(profile))
@@ -71,11 +69,11 @@ def write_playing(browser: WebDriver, reports: Path) -> None:
 
 
 def write_arms(browser: WebDriver, study: Study, folder: Path) -> None:
-    """The page on the arms of a study: each in its surroundings, what it reaches, and its verdicts."""
+    """The page on the arms of a study: each in its surroundings, and what it reaches."""
     parts = [
         "# Gallery of arms",
-        "Arms of other classes than those of the default study, as `er3a run --study config/gallery.yaml` computes "
-        "them. `make pictures` took the pictures from that study's pages and the verdicts from its results.",
+        "Arms of other classes than those of the default study, as `er3a run --study config/gallery.yaml` shows them: "
+        "its index has their verdicts. `make pictures` took the pictures from its pages.",
     ]
     for name in study.robots:
         pictures = {"playing": "the arm at the start of a path, as its page plays it", "reach": "what its tool reaches"}
@@ -83,18 +81,9 @@ def write_arms(browser: WebDriver, study: Study, folder: Path) -> None:
         _save(_canvas(browser, _there(page / "trajectory.html", GALLERY)), name, "playing")
         _save(_reach(browser, _there(page / "workspace.html", GALLERY)), name, "reach")
         shown = "\n".join(f"![{name}: {what}](images/arms/{name}_{kind}.webp)" for kind, what in pictures.items())
-        rows = [_verdict(folder / "results" / name / stage) for stage in study.stages(name)]
         title = f"## {own_title(study.robot(name).title)}"
-        parts += [title, shown, "\n".join(["| stage | verdict | what was found |", "|---|---|---|", *rows])]
+        parts += [title, shown]
     (DOCS / "arms.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
-
-
-def _verdict(results: Path) -> str:
-    """A stage's row of the table of verdicts."""
-    if not results.is_dir():
-        return f"| {results.name} | not run | |"
-    head = stage_head(results, STAGES[results.name])
-    return f"| {head.stage} | {status_word(head.status)} | {head.text} |"
 
 
 def _go_to(browser: WebDriver, motion: str | None, part: float) -> None:

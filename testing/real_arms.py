@@ -44,7 +44,7 @@ class Unseen:
 
     Attributes
     ----------
-    table, model : by the table alone, and by the model with terms where it has any
+    table, model : by what a robot file holds, and by the model with terms where it has any
     plain : by a fit without er3a
     found : the calibration without each part
     """

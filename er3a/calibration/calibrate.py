@@ -3,7 +3,8 @@
 Base and tool are estimated with the table's entries where points were measured, because a tracker's frame is no arm's
 base and a reflector is not where the drawing has it. Only parameters that the measurements can tell apart are
 estimated; the others keep the table's values. Errors of joints that no table holds are estimated beside it where they
-lower the error at poses left out (:mod:`er3a.calibration.cross_validation`).
+lower the error at poses left out (:mod:`er3a.calibration.cross_validation`). Of these the robot's file can hold the
+ratios of joints, as its coupling; the table that goes there is fitted with these alone.
 """
 
 from __future__ import annotations
@@ -27,8 +28,10 @@ from er3a.calibration.cross_validation import (
 )
 from er3a.calibration.fit import (
     SCALE,
+    BarLength,
     Fit,
     Subspace,
+    bar_lengths,
     covariance_by_poses,
     fit,
     held_with,
@@ -41,12 +44,20 @@ from er3a.calibration.observations import Measurement, Observations, PointObserv
 from er3a.calibration.outcomes import (
     INTERVAL_95,
     CalibrationError,
+    FixedName,
     LevelName,
     MorePositions,
     NoPositions,
     PlacementName,
 )
-from er3a.calibration.parameters import LEVELS, Parameter, corrected, parameters_of, placements_of
+from er3a.calibration.parameters import (
+    LEVELS,
+    Parameter,
+    corrected,
+    parameters_of,
+    placements_of,
+    with_ratios,
+)
 from er3a.calibration.plan import d_optimal
 from er3a.calibration.residuals import ResidualStructure, structure_of
 from er3a.calibration.terms import JointErrors, TermKind, effects, places_of
@@ -252,9 +263,10 @@ class Calibration(ByValue, Displayed):
 
     Attributes
     ----------
-    robot : with the corrected table, base and tool: the best without any terms
+    robot : with the corrected table, base and tool, the best without terms but for ratios, which are its coupling
     level : which entries were estimated
     estimates : one per identifiable entry; correlation : (k, k), of their errors
+    ratios : of joints, where poses left out are met better with them
     held : why the other entries of the level keep their values
     singular_values : of the scaled Jacobian (standard deviations per mm or mrad), descending
     coordinates, poses : how many measured coordinates at how many poses
@@ -264,7 +276,8 @@ class Calibration(ByValue, Displayed):
     more : what it takes to estimate more entries; None if all are estimated
     deviation_mm : standard deviation of a coordinate, estimated from what remains; None if it was stated
     outliers : measurements that were set aside
-    left_out : at poses left out, by the table alone; None of reference sets and of too few poses
+    bars : ball bars of unknown length, by the table alone
+    left_out : at poses left out, by what the robot's file holds; None of reference sets and of too few poses
     residuals : what remains: noise, or structure; None as for ``left_out``
     tried : terms beyond the table, in the order in which they were taken, then those that were not
     beyond : the model with those that were taken; None if there are none
@@ -285,6 +298,8 @@ class Calibration(ByValue, Displayed):
     more: outcomes.MorePositions | None
     deviation_mm: float | None = None
     outliers: tuple[Outlier, ...] = ()
+    ratios: tuple[TermEstimate, ...] = ()
+    bars: tuple[BarLength, ...] = ()
     left_out: HeldOutErrors | None = None
     residuals: ResidualStructure | None = None
     tried: tuple[TriedTerm, ...] = ()
@@ -309,7 +324,7 @@ class Calibration(ByValue, Displayed):
         return forward(self.robot, q) if self.beyond is None else _with_errors(self.beyond, np.asarray(q, float))
 
     def without_terms(self) -> Calibration:
-        """The same with the table alone."""
+        """The same with what a robot file holds: the table, and ratios."""
         return replace(self, beyond=None)
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
@@ -421,7 +436,7 @@ def _with_errors(model: Beyond, q: Reals) -> Reals:
 def calibrate(
     robot: Robot,
     measurements: Sequence[Measurement] | ReferenceSet,
-    fixed: Sequence[PlacementName] = (),
+    fixed: Sequence[FixedName] = (),
 ) -> Calibration:
     """Estimate corrections to a robot's table, base and tool from positions of its flange or tool.
 
@@ -431,8 +446,8 @@ def calibrate(
     ----------
     robot : the table to start from
     measurements : measured positions, or a reference set, whose key poses are used then
-    fixed : ``"base"``, ``"tool"``: to be taken from the robot's file. Reference sets fix both; the tool is fixed unless
-        its point was measured
+    fixed : ``"base"``, ``"tool"``, ``"ratios"``: to be taken from the robot's file. Reference sets fix all; the tool is
+        fixed unless its point was measured
 
     Raises
     ------
@@ -443,24 +458,25 @@ def calibrate(
     """
     observations = observed(measurements, robot, fixed)
     if isinstance(observations, PointObservations):
-        return _from_points(robot, observations)
+        return _from_points(robot, observations, "ratios" not in fixed)
     level = choose_level(robot, observations)
     found = fit(robot, level.kept, observations)
     return _result(robot, level, observations, found)
 
 
 def _result(robot: Robot, level: Level, observations: Observations, found: Fit) -> Calibration:
-    """What the table alone has of a calibration."""
+    """What the table, with ratios, has of a calibration."""
     covariance, quantiles = _covariance(observations, found)
-    error = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(error, error)
+    error, count = np.sqrt(np.diag(covariance)), len(found.kept)
+    correlation = (covariance / np.outer(error, error))[:count, :count]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
     kept, deviation = found.kept, observations.deviation_mm
     return Calibration(
-        robot=corrected(robot, kept, found.amounts),
+        robot=_with_ratios(corrected(robot, kept, found.amounts), found),
         level=level.name,
         estimates=_estimates(robot, found, error, quantiles),
         correlation=correlation,
+        ratios=_term_estimates(found, error),
         held=level.held,
         close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
         singular_values=level.subspace.singular_values,
@@ -497,8 +513,8 @@ def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tupl
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Points that are used, the table alone, and the table with the terms that are chosen (the same if there are
-    none)."""
+    """Points that are used, the table alone but for ratios, and the table with the terms that are chosen (the same if
+    there are none)."""
 
     observations: PointObservations
     level: Level
@@ -513,35 +529,48 @@ class _Model:
         return off
 
 
-def _model(robot: Robot, observations: PointObservations) -> _Model:
+def _with_ratios(robot: Robot, found: Fit) -> Robot:
+    return with_ratios(robot, {term.joint: float(c) for term, c in zip(found.terms, found.coefficients)})
+
+
+def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> _Model:
     level = choose_level(robot, observations)
     table = fit(robot, level.kept, observations)
     if not observations.deviation_known:
         observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
         table = fit(robot, level.kept, observations)
-    choice = choose_terms(robot, corrected(robot, table.kept, table.amounts), table.kept, observations)
+    here = corrected(robot, table.kept, table.amounts)
+    choice = choose_terms(robot, here, table.kept, observations)
     whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
+    if choice.terms and free_ratios:
+        ratios = choose_terms(robot, here, table.kept, observations, ("ratio",)).terms
+        table = fit(robot, level.kept, observations, ratios) if ratios else table
     return _Model(observations, level, table, choice, whole)
 
 
-def _from_points(robot: Robot, every: PointObservations) -> Calibration:
+def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> Calibration:
     used = _without_outliers(robot, every)
-    model = _model(robot, every.take(used))
+    model = _model(robot, every.take(used), free_ratios)
     for _ in range(OUTLIER_ROUNDS):
         again = _out_of(every, _off_mm(robot, every, model, used), model.off_mm) <= 1.0
         if (again == used).all() or (~again).mean() > MOST_OUT:
             break
-        used, model = again, _model(robot, every.take(again))
+        used, model = again, _model(robot, every.take(again), free_ratios)
     distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model, used) ** 2))
-    observations, terms = model.observations, model.choice.terms
+    observations, table = model.observations, _result(robot, model.level, model.observations, model.table)
+    ratios = JointErrors(robot, model.table.terms, model.table.coefficients)
+    moved = observations.shifted(ratios.amounts(observations.row_values, observations.points(robot)))
+    kept = model.table.kept
+    covariance = _covariance(observations, model.table)[0][: len(kept), : len(kept)]
     return replace(
-        _result(robot, model.level, observations, model.table),
+        table,
         deviation_mm=None if observations.deviation_known else float(observations.deviation_mm[0]),
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
+        bars=bar_lengths(corrected(robot, kept, model.table.amounts), kept, moved, covariance),
         left_out=_left_out(observations, model.table),
         residuals=_structure(robot, observations, model.table),
         tried=model.choice.tried,
-        beyond=_beyond(robot, observations, model.whole) if terms else None,
+        beyond=_beyond(robot, observations, model.whole) if model.whole.terms else None,
     )
 
 
@@ -613,22 +642,27 @@ def _structure(robot: Robot, observations: PointObservations, found: Fit) -> Res
     return structure_of(residuals, observations.row_values, observations.lines, effect)
 
 
+def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
+    own_error = error[len(found.kept) :]
+    return tuple(
+        TermEstimate(
+            term.kind,
+            term.joint,
+            tuple((1000 * found.coefficients[own]).tolist()),
+            tuple((1000 * own_error[own]).tolist()),
+            term.turns,
+        )
+        for term, own in zip(found.terms, places_of(found.terms))
+    )
+
+
 def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond:
     covariance, quantiles = _covariance(observations, found)
-    error, count = np.sqrt(np.diag(covariance)), len(found.kept)
+    error = np.sqrt(np.diag(covariance))
     return Beyond(
         robot=corrected(robot, found.kept, found.amounts),
         errors=JointErrors(robot, found.terms, found.coefficients),
-        terms=tuple(
-            TermEstimate(
-                term.kind,
-                term.joint,
-                tuple((1000 * found.coefficients[own]).tolist()),
-                tuple((1000 * error[count:][own]).tolist()),
-                term.turns,
-            )
-            for term, own in zip(found.terms, places_of(found.terms))
-        ),
+        terms=_term_estimates(found, error),
         estimates=_estimates(robot, found, error, quantiles),
         rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
         left_out=_left_out(observations, found),

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.calibration.observations import Observations, PointObservations
+from er3a.calibration.observations import Observations, PointObservations, directions, socket
 from er3a.calibration.outcomes import (
+    INTERVAL_95,
     CalibrationError,
     Held,
     MovesNothing,
@@ -40,6 +41,8 @@ SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE = 1e-6  # of the weighted differences, of measured points
 HALVINGS = 12
 LEAST_OWN = 1e-9
+OFF_CONE = 0.02
+"""By how much (root mean square) the directions of a bar have to be off a common cone to settle its length."""
 SLID = 10.0
 """Times what the table leaves of touched points that joints have to slide, to set the scale."""
 TURNS_ALL = Parameter("offset", 1)
@@ -203,6 +206,42 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     return np.asarray(C @ middle @ C, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
+@dataclass(frozen=True)
+class BarLength:
+    """A ball bar of unknown length: what it is (mm), and half of its 95 % interval; None if its points don't settle
+    it."""
+
+    name: str
+    length_mm: float | None
+    half_width_mm: float | None
+
+
+def bar_lengths(
+    robot: Robot, kept: Sequence[Parameter], observations: PointObservations, covariance: Reals
+) -> tuple[BarLength, ...]:
+    """The lengths of bars of unknown length, which are fitted beside the sockets.
+
+    Parameters
+    ----------
+    robot : as it was fitted; kept, covariance : of what was estimated, (k,) and (k, k), m and rad
+    """
+    found = []
+    for name, points in observations.unknown_bars():
+        xyz = points.positions(robot)
+        along, size = directions(xyz - socket(xyz, np.zeros(len(xyz))))
+        basis = np.column_stack([along, np.ones(len(xyz))])
+        if np.linalg.matrix_rank(basis, tol=OFF_CONE * len(xyz) ** 0.5) < basis.shape[1]:
+            found.append(BarLength(name, None, None))
+            continue
+        weights = np.linalg.pinv(basis)[-1]  # what the length takes of each distance, beside the socket
+        slopes = jacobian(robot, kept, points.as_coordinates()).reshape(len(xyz), 3, len(kept))
+        by_numbers = np.einsum("p,pi,pik->k", weights, along, slopes)
+        variance = (weights * points.deviation_mm) @ (weights * points.deviation_mm)
+        variance += by_numbers @ covariance @ by_numbers
+        found.append(BarLength(name, 1000 * float(size.mean()), INTERVAL_95 * float(np.sqrt(variance))))
+    return tuple(found)
+
+
 def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:
     """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
 
@@ -228,9 +267,9 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
     def slopes(here: Robot, coefficients: Reals) -> Reals:
         seen = with_errors(coefficients)
         J = jacobian(here, kept, seen) / deviation[:, None]
-        if not (terms and isinstance(observations, PointObservations)):
+        if not (terms and isinstance(observations, PointObservations) and isinstance(seen, PointObservations)):
             return J
-        by_terms = term_jacobian(here, robot, terms, observations) / deviation[:, None]
+        by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]
         return np.block([[J, by_terms], [np.zeros((len(prior), len(kept))), np.diag(prior)]])
 
     n, k = len(observations), len(kept)

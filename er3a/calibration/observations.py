@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.calibration.outcomes import PlacementName
+from er3a.calibration.outcomes import FixedName, PlacementName
 from er3a.calibration.parameters import MM, Parameter, moved, placed
 from er3a.errors import InputError
 from er3a.kinematics.chain import row_values
@@ -38,6 +38,8 @@ TouchKind = Literal["place", "plane", "pair", "bar"]
 LEAST_LENGTH = 1e-9
 SOCKET_STEPS = 50
 SOCKET_STEP = 1e-13  # m
+FLAT = 1e-3
+"""Share of the largest singular value below which points, as on a circle, don't say on which side their socket is."""
 AT_ONCE = 8_000  # poses of tables whose frames are held at once
 
 
@@ -146,7 +148,7 @@ class PointObservations:
         from the plane that fits them best, of a pair the distance of its points (with the first of them), of a bar's
         points their distance from the socket that fits them best, beside its mean if the length is unknown. Place,
         plane, socket and unknown length drop out
-    kinds : of each number
+    kinds, names : of each number
     """
 
     row_values: Reals
@@ -159,6 +161,7 @@ class PointObservations:
     free: tuple[PlacementName, ...]
     touched: Integers
     kinds: tuple[TouchKind, ...] = ()
+    names: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.values_mm)
@@ -167,6 +170,14 @@ class PointObservations:
         """Of each place, plane, pair and bar its kind and points."""
         numbers = np.unique(self.touched[self.touched >= 0])
         return [(self.kinds[number], np.flatnonzero(self.touched == number)) for number in numbers]
+
+    def unknown_bars(self) -> list[tuple[str, PointObservations]]:
+        """Of each bar of unknown length its name and points."""
+        return [
+            (self.names[self.touched[rows[0]]], self.take(np.isin(np.arange(len(self.touched)), rows)))
+            for kind, rows in self.groups()
+            if kind == "bar" and not self._lengths_mm(rows).any()
+        ]
 
     @property
     def dropped(self) -> int:
@@ -224,7 +235,7 @@ class PointObservations:
                 found[rows, 0] = (own[0] - own[-1]) @ apart / max(float(np.linalg.norm(apart)), LEAST_LENGTH)
             else:
                 lengths = self._lengths_mm(rows) / MM
-                along = _directions(here - socket(here, lengths))[0]
+                along = directions(here - socket(here, lengths))[0]
                 basis = along if lengths.any() else np.column_stack([along, np.ones(len(rows))])
                 longer = np.einsum("pi,pi->p", along, own)
                 found[rows, 0] = longer - basis @ np.linalg.lstsq(basis, longer, rcond=None)[0]
@@ -310,11 +321,18 @@ class PointObservations:
         """The flange at poses."""
         return self._at(robot, np.array(poses), np.zeros(len(poses), dtype=bool))
 
+    def as_coordinates(self) -> PointObservations:
+        """The same points as if their coordinates were measured."""
+        return self._coordinates(self.row_values, self.on_tool)
+
     def _at(self, robot: Robot, poses: Reals, on_tool: Flags) -> PointObservations:
-        count = len(poses)
+        return self._coordinates(row_values(robot, meant(robot, poses)), on_tool)
+
+    def _coordinates(self, row_values: Reals, on_tool: Flags) -> PointObservations:
+        count = len(row_values)
         return replace(
             self,
-            row_values=row_values(robot, meant(robot, poses)),
+            row_values=row_values,
             on_tool=on_tool,
             seen=np.ones((count, 3), dtype=bool),
             values_mm=np.zeros(3 * count),
@@ -335,7 +353,7 @@ def _off_plane(xyz: Reals, around: Reals) -> Reals:
     return found
 
 
-def _directions(apart: Reals) -> tuple[Reals, Reals]:
+def directions(apart: Reals) -> tuple[Reals, Reals]:
     """Unit vectors (P, 3) of vectors, and their lengths (P,)."""
     size = np.maximum(np.linalg.norm(apart, axis=1), LEAST_LENGTH)
     return apart / size[:, None], size
@@ -348,13 +366,13 @@ def socket(xyz: Reals, lengths: Reals) -> Reals:
     here = xyz - middle
     unknown = not lengths.any()
     squares = (here**2).sum(axis=1) - lengths**2
-    centre: Reals = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, rcond=None)[0][:3]
+    centre: Reals = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, FLAT)[0][:3]
     for _ in range(SOCKET_STEPS):
-        along, size = _directions(here - centre)
+        along, size = directions(here - centre)
         off = size - lengths
         if unknown:
             along, off = along - along.mean(axis=0), off - off.mean()
-        step = np.linalg.lstsq(along, off, rcond=None)[0]
+        step = np.linalg.lstsq(along, off, FLAT)[0]
         centre = centre + step
         if np.abs(step).max() < SOCKET_STEP:
             break
@@ -366,7 +384,7 @@ Observations = QuantityObservations | PointObservations
 
 
 def observed(
-    measurements: Sequence[Measurement] | ReferenceSet, robot: Robot, fixed: Sequence[PlacementName] = ()
+    measurements: Sequence[Measurement] | ReferenceSet, robot: Robot, fixed: Sequence[FixedName] = ()
 ) -> Observations:
     """Measurements coordinate by coordinate, or a reference set's coordinates at single poses.
 
@@ -420,6 +438,7 @@ def observed(
         ),
         touched=touched,
         kinds=tuple(kind for kind, _ in numbers),
+        names=tuple(name for _, name in numbers),
     )
 
 

@@ -14,6 +14,9 @@ LevelName = Literal["lengths", "lengths_and_offsets", "all_entries"]
 PlacementName = Literal["base", "tool"]
 """Where the arm stands, and which point of the tool was measured: estimated too, unless they are fixed."""
 
+FixedName = Literal["base", "tool", "ratios"]
+"""What can be taken as the robot's file has it: places, and by how much joints turn for what is commanded."""
+
 TermVerdict = Literal["taken", "not_lower", "noise", "wrong_way"]
 """Whether a term beyond the table was taken; or left, because poses left out are not met better with it, because noise
 may have made it, or because a load would have to lift the arm."""

@@ -6,7 +6,7 @@ Base and tool are corrected behind what the robot's file says of them: the base 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -114,6 +114,15 @@ def placed(parameters: Sequence[Parameter], amounts: Reals) -> tuple[Reals, Real
     x, y, z, rx, ry, rz = (by_column.get(column, 0.0) for column in BASE_COLUMNS)
     S = translation(x, y, z) @ rot_z(rz) @ rot_y(ry) @ rot_x(rx)
     return S, np.array([by_column.get(column, 0.0) for column in TOOL_COLUMNS])
+
+
+def with_ratios(robot: Robot, errors: Mapping[int, float]) -> Robot:
+    """The robot whose rows (from 1) move by ``1 + error`` times what they are meant to, by its coupling."""
+    factors = np.ones(robot.rows)
+    for row, error in errors.items():
+        factors[row - 1] += error
+    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+    return robot.replace(coupling=factors[:, None] * coupling) if errors else robot
 
 
 def corrected(robot: Robot, parameters: Sequence[Parameter], amounts: Reals) -> Robot:

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.calibration.fit import SCALE, held_with, jacobian, scale_of, subspace, without_scale
+from er3a.calibration.fit import SCALE, bar_lengths, held_with, jacobian, scale_of, subspace, without_scale
 from er3a.calibration.observations import (
     PLACEMENTS,
     Measurement,
@@ -27,7 +27,7 @@ from er3a.calibration.observations import (
     observed,
     socket,
 )
-from er3a.calibration.outcomes import INTERVAL_95, Held, PlacementName
+from er3a.calibration.outcomes import INTERVAL_95, FixedName, Held
 from er3a.calibration.parameters import Parameter, parameters_of, placements_of
 from er3a.calibration.terms import effects
 from er3a.collision.along import clearance
@@ -69,10 +69,11 @@ class OutOfMeasured:
 
 @dataclass(frozen=True)
 class Width:
-    """Half-width of a number's 95 % interval (mm or deg), with the measurements and with the proposals as well; None if
-    they don't settle it."""
+    """Half-width of a number's 95 % interval, with the measurements and with the proposals as well; None if they don't
+    settle it."""
 
-    parameter: Parameter
+    name: str
+    unit: Literal["mm", "deg"]
     now: float | None
     then: float | None
 
@@ -83,7 +84,8 @@ class Plan:
 
     Attributes
     ----------
-    settled : numbers that they tell apart; lacking : that measurements of this kind at more poses would
+    settled : numbers that they tell apart, ``bar_NAME`` a bar's length
+    lacking : those that measurements of this kind at more poses would
     held : why no poses settle the others
     proposals : poses, the one that adds most first
     beyond : where these go beyond the measured poses
@@ -101,7 +103,7 @@ class Plan:
 ASSUMED_MM = 0.1
 
 
-def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: Sequence[PlacementName] = ()) -> Plan:
+def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: Sequence[FixedName] = ()) -> Plan:
     """What positions settle of base, table and tool, and ``count`` poses, within limits and free of collision of the
     arm with itself, that would settle most of the rest.
 
@@ -118,18 +120,20 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
     parameters = (*placements_of(seen.free), *without_scale(parameters_of(robot, "all_entries"), scale))
     options = _options(robot, measurements, seen)
     every = _with(robot, measurements, [each for option in options for each in option], seen)
-    now, able = subspace(robot, parameters, seen), subspace(robot, parameters, every)
+    able = subspace(robot, parameters, every)
     kept = [parameters[k] for k in able.kept]
     chosen = [options[k] for k in _chosen(robot, kept, every, len(measurements), options, count)]
     proposals = tuple(each for option in chosen for each in option)
     then = _with(robot, measurements, proposals, seen)
+    now, new, ever = (_half_widths(robot, parameters, each) for each in (seen, then, every))
+    units = {each.name: each.unit for each in parameters}
     return Plan(
-        settled=tuple(parameters[k].name for k in now.kept),
-        lacking=tuple(parameters[k].name for k in able.kept if k not in now.kept),
+        settled=tuple(now),
+        lacking=tuple(name for name in ever if name not in now),
         held=(*able.held, *held_with(scale)),
         proposals=proposals,
         beyond=_beyond(measurements, proposals),
-        widths=_widths(robot, parameters, (seen, now.kept), then),
+        widths=tuple(Width(name, units.get(name, "mm"), now.get(name), width) for name, width in new.items()),
     )
 
 
@@ -283,26 +287,14 @@ def _beyond(measurements: Sequence[Measurement], proposals: Sequence[Proposal]) 
     return tuple(found)
 
 
-def _widths(
-    robot: Robot,
-    parameters: Sequence[Parameter],
-    now: tuple[PointObservations, tuple[int, ...]],
-    then: PointObservations,
-) -> tuple[Width, ...]:
-    kept = subspace(robot, parameters, then).kept
-    before, after = _errors(robot, parameters, *now), _errors(robot, parameters, then, kept)
-    return tuple(
-        Width(
-            parameters[k],
-            *(INTERVAL_95 * own[k] * parameters[k].in_unit if k in own else None for own in (before, after)),
-        )
-        for k in kept
-    )
-
-
-def _errors(
-    robot: Robot, parameters: Sequence[Parameter], seen: PointObservations, kept: tuple[int, ...]
-) -> dict[int, float]:
-    """Standard errors of those that are settled, m or rad."""
-    J = SCALE * jacobian(robot, [parameters[k] for k in kept], seen) / seen.deviation_mm[:, None]
-    return dict(zip(kept, SCALE * np.sqrt(np.diag(np.linalg.pinv(J.T @ J)))))
+def _half_widths(robot: Robot, parameters: Sequence[Parameter], seen: PointObservations) -> dict[str, float]:
+    """Of the numbers that are settled the half-widths of their 95 % intervals, mm or deg."""
+    kept = [parameters[k] for k in subspace(robot, parameters, seen).kept]
+    J = SCALE * jacobian(robot, kept, seen) / seen.deviation_mm[:, None]
+    covariance = np.asarray(SCALE**2 * np.linalg.pinv(J.T @ J), np.float64)
+    errors = np.sqrt(np.diag(covariance))
+    found = {each.name: INTERVAL_95 * float(error) * each.in_unit for each, error in zip(kept, errors)}
+    for bar in bar_lengths(robot, kept, seen, covariance):
+        if bar.half_width_mm is not None:
+            found[f"bar_{bar.name}"] = bar.half_width_mm
+    return found

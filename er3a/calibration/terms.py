@@ -132,13 +132,19 @@ class JointErrors(ByValue):
         return found
 
 
-def term_jacobian(here: Robot, robot: Robot, terms: Sequence[JointTerm], observations: PointObservations) -> Reals:
+def term_jacobian(
+    here: Robot,
+    robot: Robot,
+    terms: Sequence[JointTerm],
+    observations: PointObservations,
+    shifted: PointObservations | None = None,
+) -> Reals:
     """Derivative (n, c) of measured coordinates (mm) by the coefficients of terms, at a corrected robot ``here``;
-    ``robot`` as of :class:`JointErrors`."""
-    x = observations.row_values
-    by_row = effects(here, x, observations.points(here)) * 1000
+    ``robot`` as of :class:`JointErrors`, ``shifted`` the observations by these."""
+    x, shifted = observations.row_values, shifted or observations
+    by_row = effects(here, shifted.row_values, observations.points(here)) * 1000
     columns = JointErrors(robot, tuple(terms), np.empty(0)).columns(x, observations.points(robot))
-    around = observations.positions(here)
+    around = shifted.positions(here)
     shifts = [observations.relative_shift(values[:, None] * by_row[:, row], around) for row, values in columns]
     found = [shift[observations.seen] for shift in shifts]
     return np.stack(found, axis=1) if found else np.empty((len(observations), 0))

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 from er3a.calibration import calibrate as calibration
 from er3a.calibration.calibrate import Calibration
 from er3a.calibration.observations import PLACEMENTS, Measurement, TouchKind, check_poses
-from er3a.calibration.outcomes import PlacementName
+from er3a.calibration.outcomes import FixedName
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
@@ -213,7 +213,7 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
 
 
 def calibrate(
-    robot: Robot, measurements: Sequence[Measurement] | ReferenceSet | str | Path, fixed: Sequence[PlacementName] = ()
+    robot: Robot, measurements: Sequence[Measurement] | ReferenceSet | str | Path, fixed: Sequence[FixedName] = ()
 ) -> Calibration:
     """Estimate corrections to a robot's table, base and tool; see :func:`er3a.calibration.calibrate.calibrate`.
 
@@ -221,7 +221,7 @@ def calibrate(
     ----------
     measurements : a CSV file of measured positions (:func:`er3a.load_measurements`), its rows, or a reference set,
         whose key poses are used then
-    fixed : ``"base"``, ``"tool"``: to be taken as the robot's file has them; by default both are free
+    fixed : ``"base"``, ``"tool"``, ``"ratios"``: to be taken as the robot's file has them; by default all are free
 
     Returns
     -------
@@ -234,8 +234,8 @@ def calibrate(
     CalibrationError
         if the positions determine too little, or no corrections make the table fit
     """
-    if isinstance(fixed, str) or not set(fixed) <= set(PLACEMENTS):
-        raise ArgumentError("fixed", fixed, f"several of {', '.join(map(repr, PLACEMENTS))}")
+    if isinstance(fixed, str) or not set(fixed) <= set(get_args(FixedName)):
+        raise ArgumentError("fixed", fixed, f"several of {', '.join(map(repr, get_args(FixedName)))}")
     if isinstance(measurements, str | Path):
         path, measurements = measurements, load_measurements(measurements, robot)
         check_poses(measurements, robot, path)
@@ -243,6 +243,7 @@ def calibrate(
     text = f"Calibrated with {found.coordinates} measured coordinates, starting from the table of {robot.name}"
     source = Source(text, "inferred")
     named = ["dh", "zero"] + [name for name in PLACEMENTS if not np.array_equal(*_both(found.robot, robot, name))]
+    named += ["coupling"] if found.ratios else []
     return replace(found, robot=found.robot.replace(sources=dict(robot.sources) | dict.fromkeys(named, source)))
 
 

@@ -44,7 +44,7 @@ from er3a.kinematics.singularity import characteristic_length, conditioning, det
 from er3a.kinematics.wrist_partitioned import parallel_axes_arm, solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals, runs
 from er3a.numerics.jit import kernel
-from er3a.planning.moves import ToolPath, check_times
+from er3a.planning.moves import ToolPath
 from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
@@ -286,7 +286,13 @@ class Followed(ByValue, Displayed):
         return Sheet(found, columns, rows, left_out, ("a row for each time of yours: .joints(t), in rad",))
 
     def joints(self, t: Reals) -> Reals:
-        """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable."""
+        """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable.
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         return self.joints_at(self.line.progress(t)[0])
 
     def joints_at(self, progress: Reals) -> Reals:
@@ -433,9 +439,7 @@ def follow(
     NotWristPartitionedError
         if the arm has no closed form here
     """
-    t = np.asarray(t, float)
-    check_times(t, line.duration)
-    grid = branches_along(robot, line, t)
+    grid = branches_along(robot, line, np.asarray(t, float))
     q = np.full((len(grid.t), 6), np.nan)
     slot = np.full(len(grid.t), -1)
     before, jumps = q_start, []

@@ -29,17 +29,9 @@ from er3a.errors import Er3aError, PoseError
 from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
-from er3a.planning.profiles import Ends, FromRestToRest, Rates, TimeLaw, quintic
+from er3a.planning.profiles import BEYOND, Ends, FromRestToRest, Rates, TimeLaw, check_times, quintic
 
 HALF_TURN_TOLERANCE = 1e-9
-BEYOND = 1e-6  # by which times and shares may miss a motion's ends
-
-
-def check_times(t: Reals, duration: float) -> None:
-    """:class:`er3a.Er3aError` for times (...,) in s before 0 or behind the duration; NaN passes."""
-    slack = BEYOND * duration
-    if t.size and (t.min() < -slack or t.max() > duration + slack):
-        raise Er3aError(f"t runs from {t.min():g} to {t.max():g} s; the motion lasts from 0 to {duration:g} s")
 
 
 @runtime_checkable
@@ -109,7 +101,10 @@ class JointMove(ByValue):
     accelerations: Ends = (0.0, 0.0)
 
     def joints(self, t: Reals) -> tuple[Reals, Reals, Reals]:
-        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
+        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6).
+        :class:`er3a.Er3aError` beyond start and end."""
+        t = np.asarray(t, float)
+        check_times(t, 0.0, self.duration)
         return quintic(t, self.duration, self.start, self.end, self.velocities, self.accelerations)
 
     def polynomials(self) -> PiecewiseMotion:
@@ -181,8 +176,6 @@ class Segment(ByValue, ABC):
 
     def at(self, t: Reals) -> Reals:
         """T_base_tool (..., 4, 4) at times (...,) in s; :class:`er3a.Er3aError` beyond start and end."""
-        t = np.asarray(t, float)
-        check_times(t, self.duration)
         return self.poses(self.progress(t)[0])
 
     def poses(self, progress: Reals) -> Reals:

@@ -23,7 +23,7 @@ from numpy.polynomial import chebyshev
 
 from er3a.by_value import ByValue
 from er3a.numerics.arrays import Integers, Reals
-from er3a.planning.profiles import Rates
+from er3a.planning.profiles import Rates, check_times
 
 NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split; more break points do no harm
 TRIMMED = 1e-15  # of the largest coefficient
@@ -166,8 +166,10 @@ class PiecewiseMotion(ByValue):
         return np.einsum("mdn,dz->mn", self.acceleration, signs), self.acceleration.sum(axis=1)
 
     def rates(self, t: Reals) -> Rates:
-        """Angles, velocities and accelerations at times (...,), each (..., n)."""
+        """Angles, velocities and accelerations at times (...,), each (..., n); :class:`er3a.Er3aError` beyond start and
+        end."""
         t = np.asarray(t, float)
+        check_times(t, self.times[0], self.times[-1])
         if t.size <= TIMES_AT_ONCE:
             return self._rates_of_few(t)
         flat = t.reshape(-1)

@@ -15,11 +15,13 @@ from typing import Protocol
 import numpy as np
 import scipy
 
+from er3a.errors import Er3aError
 from er3a.numerics.arrays import Integers, Reals
 
 Rates = tuple[Reals, Reals, Reals]
 HALVINGS = 60
 SAME_SHARE = 1e-13
+BEYOND = 1e-6  # by which times and shares may miss a motion's ends, of the whole
 Ends = tuple[Reals | float, Reals | float]
 
 
@@ -35,6 +37,13 @@ class Times:
 
     times: Reals
     corner: Integers
+
+
+def check_times(t: Reals, start: float, end: float) -> None:
+    """:class:`er3a.Er3aError` for times (...,) in s before the start or behind the end of a motion; NaN passes."""
+    slack = BEYOND * (end - start)
+    if t.size and (t.min() < start - slack or t.max() > end + slack):
+        raise Er3aError(f"t runs from {t.min():g} to {t.max():g} s; the motion lasts from {start:g} to {end:g} s")
 
 
 def quintic(
@@ -91,7 +100,8 @@ def trapezoid(t: Reals, duration: float, ramp: float) -> Rates:
 
 
 class TimeLaw(Protocol):
-    """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time.
+    """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time;
+    :class:`er3a.Er3aError` beyond start and end.
 
     Attributes
     ----------
@@ -138,6 +148,7 @@ class FromRestToRest:
     def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
         t = np.asarray(t, float)
+        check_times(t, self.times[0], self.times[-1])
         i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)
         duration = self.times[i] - self.times[i - 1]
         tau = np.clip((t - self.times[i - 1]) / duration, 0.0, 1.0)
@@ -175,7 +186,9 @@ class Timetable:
 
     def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
-        t = np.clip(np.asarray(t, float), self.times[0], self.times[-1])
+        t = np.asarray(t, float)
+        check_times(t, self.times[0], self.times[-1])
+        t = np.clip(t, self.times[0], self.times[-1])
         i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)
         h, start = self.times[i] - self.times[i - 1], self.progress[i - 1]
         step, v0, v1 = self.progress[i] - start, h * self._slopes[i - 1], h * self._slopes[i]

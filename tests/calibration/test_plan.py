@@ -50,7 +50,7 @@ def test_proposed_poses_settle_what_a_calibration_settles_with_them(random):
     stated = [Measurement(r.row, r.pose, r.point, r.xyz_mm, 0.1) for r in (*rows, *more)]
     fitted = er3a.calibrate(bench.robot, stated)
     assert {each.name for each in fitted.estimates} == {*found.settled, *found.lacking}
-    widths = {each.parameter.name: each.then for each in found.widths}
+    widths = {each.name: each.then for each in found.widths}
     for each in fitted.estimates:
         assert each.half_width == pytest.approx(widths[each.name], rel=0.2)
 

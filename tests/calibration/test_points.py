@@ -14,6 +14,7 @@ import er3a
 from er3a.calibration.fit import Fit, covariance_by_poses
 from er3a.calibration.observations import Measurement, PointObservations
 from er3a.calibration.outcomes import NotToldApart
+from er3a.calibration.plan import plan
 from er3a.calibration.terms import JointErrors, JointTerm, candidates
 from er3a.dynamics.arm_model import arm_model
 from er3a.errors import Er3aError, InputError
@@ -21,7 +22,7 @@ from er3a.files.by_name import load_measurements
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.calibration import held_back_line
+from er3a.pipeline.messages.calibration import bar_texts, held_back_line
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import GRAVITY
 from testing.plain_calibration import distances, measured_arm, plain_fit
@@ -233,9 +234,9 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert "tried: J3 once a turn" in text
     alone = told["held_back"]["table_mean_mm"]
     assert alone > told["held_back"]["mean_mm"]
-    assert f"by the table alone, as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
+    assert f"as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
     table, model = told["left_out"]["mean_mm"], told["beyond"]["left_out"]["mean_mm"]
-    assert f"the table alone errs by {table:.3g} mm on average, with the terms by {model:.3g} mm." in text
+    assert f"it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm." in text
     assert load_robot(tmp_path / "mine.yaml").joints == 7
 
 
@@ -246,14 +247,19 @@ def test_a_worst_position_beyond_all_fitted_poses_is_named():
     assert held_back_line(rows, rows[:2], off).endswith("0.3 mm at worst (row 3)")
 
 
-def reached(bench: Bench, target: np.ndarray, normal: np.ndarray | None, count: int) -> np.ndarray:
-    """Joint values (count, 6) at which the real arm touches a point, m, or the plane through it."""
+def reached(bench: Bench, target: np.ndarray, normal: np.ndarray | None, count: int, length: float = 0.0) -> np.ndarray:
+    """Joint values (count, 6) at which the real arm touches a point, m, or the plane through it; or is at a length from
+    the point, in the plane if there is one."""
     found: list[np.ndarray] = []
     while len(found) < count:
         q = bench.joints(1)[0]
         for _ in range(60):
             off = target - er3a.forward(bench.truth, q)[:3, 3]
-            off = off if normal is None else normal * (off @ normal)
+            across = np.zeros(3) if normal is None else normal * (off @ normal)
+            if length:
+                off = off - length * (off - across) / np.linalg.norm(off - across)
+            elif normal is not None:
+                off = across
             if np.linalg.norm(off) < 1e-12:
                 break
             q = q + np.linalg.pinv(er3a.jacobian(bench.truth, q)[:3]) @ off * min(1.0, 0.1 / np.linalg.norm(off))
@@ -373,6 +379,32 @@ def test_distances_alone_correct_a_table_and_its_scale(kind, random, tmp_path):
         if each.name in ("a2", "a3"):
             true_mm = 1000 * bench.truth.a[each.parameter.joint - 1]
             assert each.nominal + each.correction == pytest.approx(true_mm, abs=3 * each.half_width)
+
+
+def test_a_bar_s_unknown_length_is_fitted_with_its_socket_where_its_points_settle_it(random):
+    """Two ball bars; scale bars set the scale. Points on a circle about a socket are a sphere's of any length."""
+    bench = Bench("six", random)
+    target, normal, length = np.array([0.4, 0.1, 0.3]), np.array([0, 0, 1.0]), 0.25
+    around = reached(bench, target, None, 30, length)
+    circle = reached(bench, target, normal, 20, length)
+    free = bench.joints(120)
+    q = np.concatenate([around, circle, free])
+    kinds = [{"bar": "ball"}] * 30 + [{"bar": "ring"}] * 20 + [{"pair": f"p{k // 2}"} for k in range(120)]
+    apart = np.linalg.norm(np.diff(bench.positions(free).reshape(-1, 2, 3), axis=1), axis=2).repeat(2)
+    lengths = [None] * 50 + (apart + random.normal(0, 0.01, 60).repeat(2)).tolist()
+    rows = [
+        Measurement(k, tuple(pose), "tool", (None,) * 3, 0.01, **kind, length_mm=own)
+        for k, (pose, kind, own) in enumerate(zip(np.degrees(q).tolist(), kinds, lengths), 2)
+    ]
+    found = er3a.calibrate(bench.robot, rows)
+    ball, ring = found.bars
+    assert ball.length_mm == pytest.approx(1000 * length, abs=ball.half_width_mm)
+    assert ball.half_width_mm < 0.1
+    assert (ring.name, ring.length_mm) == ("ring", None)
+    assert "The bar ball is 250.0" in "\n".join(bar_texts(found))
+    proposed = plan(bench.robot, rows, 10)
+    assert "bar_ball" in proposed.settled
+    assert "bar_ring" in proposed.lacking
 
 
 @pytest.mark.parametrize(

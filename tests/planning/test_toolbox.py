@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from spatialmath import SE3
 
 import er3a
+from er3a.planning.moves import JointMove
 
 T = np.linspace(0, 5, 50)
 GOAL = np.array([0.8, 0.5, -0.4, 1.0, -0.8, 1.6])
@@ -109,6 +110,13 @@ def test_another_unit_in_a_table_is_warned_of():
         (lambda arm, line: er3a.pose([0, 0, 0], quaternion=[0, 0, 0, 0]), "quaternion is 0"),
         (lambda arm, line: line.at(5.1), "lasts from 0 to 5 s"),
         (lambda arm, line: er3a.follow(arm, line, np.linspace(0, 6, 9)), "lasts from 0 to 5 s"),
+        (
+            lambda arm, line: er3a.follow(arm, line, T).joints([5.0, 7.0]),
+            "t runs from 5 to 7 s; .* lasts from 0 to 5 s",
+        ),
+        (lambda arm, line: er3a.follow(arm, line, T).rates([-1.0]), "lasts from 0 to 5 s"),
+        (lambda arm, line: JointMove(0 * GOAL, GOAL, 5.0).joints(7.0), "lasts from 0 to 5 s"),
+        (lambda arm, line: JointMove(0 * GOAL, GOAL, 5.0).polynomials().rates(7.0), "lasts from 0 to 5 s"),
         (lambda arm, line: er3a.jtraj(np.zeros(6), GOAL, 50), "expected times in s"),
         (lambda arm, line: er3a.jtraj(np.zeros(6), GOAL, T[::-1]), "does not rise"),
         (lambda arm, line: er3a.jtraj(np.zeros(5), GOAL, T), "q_end has shape"),

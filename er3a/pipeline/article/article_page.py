@@ -40,8 +40,10 @@ from er3a.pipeline.messages.workspace import change_text
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Provenance, input_records, read_stage, result_records
+from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathChecks
+from er3a.pipeline.stages.vision.model import GraspCounts
 from er3a.pipeline.study import ArticleTables, Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import house_style, new_figure
@@ -392,8 +394,39 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
     for stage in STATUS_OF_STAGES:
         head = _head(study, results, stage)
         parts[f"stage_{stage}"] = tr("This study does not examine it.") if head is None else head.text
-        parts |= {f"instead_{stage}": parts[f"stage_{stage}"]} if stage in ("vision", "dynamics") else {}
+    for stage, fields in (("vision", _grasps), ("dynamics", _torque)):
+        found = fields(study, results) if _head(study, results, stage) else None
+        parts |= found or {f"instead_{stage}": parts[f"stage_{stage}"]}
     return parts
+
+
+def _grasps(study: Study, results: Path) -> dict[str, Any] | None:
+    """What came of the real arm's simulated camera; None where its verdict is of another kind."""
+    assert study.article is not None
+    found = read_stage(results / study.article.real / "vision", STAGES["vision"]).results.summary.verdict.finding
+    if not isinstance(found, GraspCounts) or found.point_mm is None or not found.simulated:
+        return None
+    return {
+        "grasped": found.grasped,
+        "objects": found.objects,
+        "grasp_error_mm": found.point_mm,
+        "misplaced": len(found.demonstrations),
+        "poses_left_out": len(found.left_out),
+    }
+
+
+def _torque(study: Study, results: Path) -> dict[str, Any] | None:
+    """The real arm's greatest torque on a path; None where its verdict is of another kind."""
+    assert study.article is not None
+    found = read_stage(results / study.article.real / "dynamics", STAGES["dynamics"]).results.summary.verdict.finding
+    if not isinstance(found, NoLimits) or found.path is None or found.grade is None:
+        return None
+    return {
+        "torque_nm": found.torque,
+        "torque_tolerance_nm": found.tolerance,
+        "torque_joint": found.joint,
+        "massless": ", ".join(map(str, found.missing_links)) or "–",
+    }
 
 
 def _error(value: float) -> str:

@@ -23,7 +23,7 @@ from er3a.pipeline.stages.registry import STAGES
 
 if TYPE_CHECKING:
     from er3a.calibration.observations import Measurement
-    from er3a.calibration.outcomes import PlacementName
+    from er3a.calibration.outcomes import FixedName
     from er3a.robots.robot import Robot
 
 
@@ -32,6 +32,7 @@ class FixedPlacement(StrEnum):
 
     BASE = "base"
     TOOL = "tool"
+    RATIOS = "ratios"
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
@@ -144,9 +145,7 @@ def mesh(
     print(f"they stand out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
-def _print_plan(
-    arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[PlacementName], as_json: bool
-) -> None:
+def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[FixedName], as_json: bool) -> None:
     from er3a.calibration.plan import plan
     from er3a.pipeline.messages.calibration import plan_lines, plan_record
 
@@ -160,7 +159,7 @@ def calibrate(
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
     *,
     output: Annotated[Path | None, typer.Option(help="the robot file to write; none by default")] = None,
-    fixed: Annotated[list[FixedPlacement] | None, typer.Option(help="what the robot's file places right")] = None,
+    fixed: Annotated[list[FixedPlacement] | None, typer.Option(help="what the robot's file has right")] = None,
     held_back: Annotated[Path | None, typer.Option(help="a CSV of positions that the fit is not to see")] = None,
     plan: Annotated[int, typer.Option(min=0, max=100, help="only say what is settled, and N poses to add")] = 0,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
@@ -171,7 +170,7 @@ def calibrate(
     """Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot file.
 
     Errors of joints beyond the table (ratio, once and twice a turn, sag) are fitted where poses left out are met
-    better with them; the table in the file is the best without them.
+    better with them; the file has the table that is best without them, and such ratios as its coupling.
     """
     from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
@@ -206,7 +205,7 @@ def calibrate(
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
     name = output.stem if output else f"{arm.name}_calibrated"
-    alone = " (table without its terms)" if found.beyond else ""
+    alone = " (without terms beyond a robot file)" if found.beyond else ""
     corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated{alone}")
     if output:
         write_robot(corrected, output)

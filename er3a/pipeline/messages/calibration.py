@@ -55,12 +55,14 @@ def lines_of(found: Calibration) -> str:
             for each in found.outliers
         ),
     ]
+    lines += [f"{term_name(each)}: {_coefficients(each)}, in the robot file as its coupling" for each in found.ratios]
+    lines += bar_texts(found)
     if found.scatter > MUCH_SCATTER:
         lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
     if found.left_out:
-        lines.append(f"table alone, {_left_out_line(found.left_out)}")
+        lines.append(f"as in a robot file, {_left_out_line(found.left_out)}")
     if found.residuals:
-        lines.append(f"table alone, {_residual_line(found.residuals)}")
+        lines.append(f"as in a robot file, {_residual_line(found.residuals)}")
     lines += [_tried_line(each) for each in found.tried]
     if found.beyond:
         lines += _beyond_lines(found.beyond)
@@ -92,7 +94,7 @@ def plan_lines(found: Plan, robot: Robot) -> str:
     for width in found.widths:
         now = "not settled" if width.now is None else f"{width.now:.4f}"
         then = "not settled" if width.then is None else f"{width.then:.4f}"
-        lines.append(f"{width.parameter.name:<9}{now:>12}{then:>12} {width.parameter.unit}")
+        lines.append(f"{width.name:<9}{now:>12}{then:>12} {width.unit}")
     return "\n".join(lines)
 
 
@@ -104,10 +106,7 @@ def plan_record(found: Plan) -> dict[str, object]:
         "held": [say(reason) for reason in found.held],
         "proposals": [vars(each) for each in found.proposals],
         "beyond": [vars(each) for each in found.beyond],
-        "half_widths": [
-            {"name": each.parameter.name, "now": each.now, "then": each.then, "unit": each.parameter.unit}
-            for each in found.widths
-        ],
+        "half_widths": [vars(each) for each in found.widths],
     }
 
 
@@ -124,12 +123,27 @@ def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement],
 
 
 def held_back_lines(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
-    """Those by the model, and by the table alone if the model has terms."""
+    """Those by the model, and by what a robot file holds if the model has more terms."""
     lines = [held_back_line(fitted, others, found.distances_mm(others))]
     if found.beyond:
         alone = held_back_line(fitted, others, found.without_terms().distances_mm(others))
-        lines.append(f"by the table alone, as in a robot file, {alone}")
+        lines.append(f"as in a robot file, {alone}")
     return lines
+
+
+def bar_texts(found: Calibration) -> list[str]:
+    """How long the bars are whose lengths were unknown."""
+    return [
+        tr("The length of the bar {name} is not settled: its points lie to one side of its socket.", name=each.name)
+        if each.length_mm is None or each.half_width_mm is None
+        else tr(
+            "The bar {name} is {length:.3f} mm long, ± {half_width:.3f} mm (95 %).",
+            name=each.name,
+            length=each.length_mm,
+            half_width=each.half_width_mm,
+        )
+        for each in found.bars
+    ]
 
 
 def file_text(found: Calibration) -> str | None:
@@ -137,8 +151,8 @@ def file_text(found: Calibration) -> str | None:
     if found.beyond is None or found.left_out is None or found.beyond.left_out is None:
         return None
     return tr(
-        "No robot file can hold terms beyond the table: at poses left out the table alone errs by {table:.3g} mm on "
-        "average, with the terms by {model:.3g} mm.",
+        "A robot file can hold ratios of joints, as its coupling, and no other terms beyond the table: at poses left "
+        "out it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm.",
         table=found.left_out.mean_mm,
         model=found.beyond.left_out.mean_mm,
     )
@@ -218,7 +232,7 @@ def _beyond_lines(found: Beyond) -> list[str]:
         lines.append(f"with terms, {_left_out_line(found.left_out)}")
     if found.residuals:
         lines.append(f"with terms, {_residual_line(found.residuals)}")
-    lines.append("the terms are in --json and in found.forward(q) in Python, not in a robot file")
+    lines.append("all terms are in --json and in found.forward(q) in Python; a robot file holds ratios alone")
     return lines
 
 
@@ -246,6 +260,8 @@ def calibration_record(found: Calibration, others: Sequence[Measurement] = ()) -
         "entries": _entries(found.estimates),
         "held": [say(reason) for reason in found.held],
         "more": say(found.more) if found.more else None,
+        "ratios": [vars(each) for each in found.ratios],
+        "bars": [vars(each) for each in found.bars],
         "set_aside": [{"row": each.row, "distance_mm": each.distance_mm} for each in found.outliers],
         "left_out": vars(found.left_out) if found.left_out else None,
         "residuals": _residuals(found.residuals),

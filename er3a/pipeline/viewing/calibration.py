@@ -22,7 +22,7 @@ from er3a.files.robot_writer import robot_file, yaml_text
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.calibration import VERDICTS, file_text, residual_texts, term_kind
+from er3a.pipeline.messages.calibration import VERDICTS, bar_texts, file_text, residual_texts, term_kind
 from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import bracketed, say
@@ -39,7 +39,7 @@ from er3a.robots.robot import Robot
 BINS = 12
 LEAST_IN_BIN = 3
 AXES = ("x", "y", "z")
-MODELS = {"before": N_("before"), "table": N_("table alone"), "model": N_("with terms")}
+MODELS = {"before": N_("before"), "table": N_("robot file"), "model": N_("with terms")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,8 @@ def _texts(found: Calibration) -> list[str]:
             all=len(found.estimates) + len(found.held),
             coordinates=found.coordinates,
             poses=found.poses,
-        )
+        ),
+        *bar_texts(found),
     ]
     if found.more:
         texts.append(say(found.more))
@@ -300,7 +301,7 @@ SECONDS_A_POSE = 0.25
 MOST_SHOWN = 400
 ARROW = 0.1  # of the arm's size: the longest error's arrow
 COLOURS = {"before": REFERENCE, "table": MODEL, "model": HIGHLIGHT}
-NAMES = {"before": "before", "table": "table alone", "model": "with terms"}
+NAMES = {"before": "before", "table": "robot file", "model": "with terms"}
 
 
 def record_calibration(found: Calibration, errors: MeasuredErrors, output: Path) -> None:
