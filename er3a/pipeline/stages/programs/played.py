@@ -24,8 +24,8 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
         words = dict(zip(text.line.tolist(), text.text.tolist()))
         events = []
         for line, level, t0, t1 in stretches(rows):
-            label = tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";"))
-            events.append(PlayedEvent(t0, t1, label, WEIGHTS[level], touching(program, line)))
+            told = tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";"))
+            events.append(PlayedEvent(t0, t1, told, WEIGHTS[level], touching(program, line)))
         q = np.radians(rows.q_deg)
         motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=own_title(program.title)))
     return motions
