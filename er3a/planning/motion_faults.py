@@ -532,7 +532,6 @@ def _root(function: Callable[[float], float], t: Reals, values: Reals, a: int, b
 
 
 ELBOW_JOINT, WRIST_JOINT = 2, 4
-FORM_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
