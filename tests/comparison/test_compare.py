@@ -67,16 +67,26 @@ def test_wrong_entries_are_named(kind):
         assert er3a.compare(found.corrected, robot(other)).geometry.same
 
 
-def test_a_wrong_twist_that_makes_axes_parallel_accuses_no_length_along_them():
-    random = np.random.default_rng([3434, KINDS.index("offset_wrist"), 79])
-    arm = random_arm(random, "offset_wrist")
+@pytest.mark.parametrize(
+    ("kind", "seed", "case", "entries"),
+    [
+        ("offset_wrist", 3434, 79, {"alpha3", "alpha5"}),  # a wrong twist makes two axes parallel
+        ("parallel", 34029, 93, {"alpha2", "d7"}),  # parallel axes lean, and lengths along others are sums
+        ("generic", 34029, 61, {"a1", "alpha2", "alpha3"}),  # the sign of a length between nearly parallel axes
+        ("nearly_parallel", 34029, 190, {"a2", "a3"}),  # a normal far away, where a is 0 as printed
+    ],
+)
+def test_wrong_entries_beside_axes_that_are_or_nearly_are_parallel_are_named(kind, seed, case, entries):
+    random = np.random.default_rng([seed, KINDS.index(kind), case])
+    arm = random_arm(random, kind)
     defined_elsewhere(random, arm)
-    other, _ = with_wrong_entries(random, arm)
-    assert abs(np.sin(arm.alpha[4])) == pytest.approx(1)
-    assert np.sin(other.alpha[4]) == pytest.approx(0, abs=1e-9)
+    other, wrong = with_wrong_entries(random, arm)
+    assert {name(entry) for entry in wrong.entries} == entries
     assert random.random() < 0.7
-    found = er3a.compare(robot(arm), robot(defined_elsewhere(random, other)))
-    assert {each.entry for each in found.geometry.differences} == {"alpha3", "alpha5"}
+    other = robot(defined_elsewhere(random, other))
+    found = er3a.compare(robot(arm), other)
+    assert {each.entry for each in found.geometry.differences} == entries
+    assert er3a.compare(found.corrected, other).verdict == "equal"
 
 
 def article() -> er3a.Robot:
