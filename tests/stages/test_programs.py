@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from importlib import import_module
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.programs.compute import compute as compute_programs
 from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults, SomeProgramsFail
+from er3a.pipeline.stages.programs.played import faults
 from er3a.pipeline.stages.programs.record import record
 from er3a.pipeline.stages.programs.report import report
 from er3a.pipeline.stages.registry import STAGES
@@ -109,7 +111,18 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     assert "the tool TOOL_DATA[7] is not given" in html
     program = next(each for each in stored["er3a_c60"].results.summary.programs if each.name == "outside_limits")
     found = next(each for each in program.findings if each.finding.code == "above_limit")
-    assert f'data-play="outside_limits" data-t="{found.program_s}">{found.motion_s:.2f} s into this line' in html
+    said = f"from {found.motion_s:.2f} s into this line on"
+    assert f'data-play="outside_limits" data-t="{found.program_s}">{said}' in html
+    listed = faults(stored["er3a_c60"].results)
+    assert {each.name for each in listed if each.meant} == {
+        each.name for each in stored["er3a_c60"].results.summary.verdict.finding.demonstrations
+    }
+    for each in listed:  # what the index links to
+        name, t, place = re.fullmatch(r"programs\.html\?play=(\w+)&t=([\d.]+)#([\w-]+)", each.address).groups()
+        assert name == each.name
+        assert f'id="{place}"' in html
+        assert float(t) <= max(motion.take(motion.program == name).t_s, default=0.0) + 1e-9  # as it is rounded
+        assert each.to_do
     assert "Go there by a joint move to (" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 

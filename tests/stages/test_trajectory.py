@@ -16,6 +16,7 @@ from er3a.collision.pairs import LinkAndSolid, PairOverlaps
 from er3a.errors import InputError
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
+from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.trajectory import FIGURES, advice, cause_text, path_text
 from er3a.pipeline.results import (
@@ -40,6 +41,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectoryResults,
     TriedStrategy,
 )
+from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.stages.trajectory.record import record
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.study import Study, load_study
@@ -162,6 +164,18 @@ def test_samples_meet_the_poses_that_the_path_asks_for(study, results, name):
     np.testing.assert_allclose(tool, reached.xyz_mm, atol=1e-6)
     sizes = dict(zip(*np.unique(samples.path.astype(str), return_counts=True)))
     assert sizes == {path.name: path.samples for path in results[name].summary.paths}
+
+
+def test_a_path_that_leaves_the_reach_is_given_a_point_that_is_reached(study, results):
+    """As it is printed: before the first fault, on the path, and the arm has joint angles for it."""
+    robot, path = study.robot("er3a_c60"), by_name(results["er3a_c60"])["line_out"]
+    (fault,) = (each for each in faults(results["er3a_c60"]) if each.name == "line_out")
+    printed = r"wrong is at t = (.*?) s, the tool at x, y, z = (.*?), (.*?), (.*?) mm"
+    t, *xyz = map(float, re.search(printed, fault.to_do).groups())
+    assert 0 < t <= min(part.t0_s for part in (*path.too_fast, *path.unreachable))
+    assert xyz[1:] == [0.0, 400.0]
+    assert 350 < xyz[0] < 350 + 1000 * path.unreachable[0].s0_m
+    assert inverse(robot, transform(np.array(xyz) / 1000, [0, np.radians(135), 0])).within_limits.any()
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -19,6 +19,7 @@ from er3a.pipeline.stages.workspace.model import (
     VoidAtShoulder,
     VoidUncertain,
     VoidUnexpected,
+    WorkspaceSummary,
 )
 from er3a.workspace.causes import (
     Disappears,
@@ -365,11 +366,12 @@ def box_text(summary: Summary) -> str:
 
 def void_text(summary: Summary) -> str:
     """The largest void that the arm encloses, with its bounds, place and cause; empty where voids were not judged."""
-    if not isinstance(summary.verdict.finding, NoVoid | VoidAtShoulder | VoidUnexpected):
+    finding = summary.verdict.finding
+    if isinstance(finding, NoVoid | VoidUncertain):
+        return say(finding)
+    if not isinstance(summary, WorkspaceSummary) or not isinstance(finding, VoidAtShoulder | VoidUnexpected):
         return ""
-    voids = getattr(summary, "enclosed_voids", [])
-    if not voids:
-        return say(summary.verdict.finding)
+    voids = summary.enclosed_voids
     largest = max(voids, key=lambda void: void.volume_m3.upper)
     parts = {
         "lower": 1000 * largest.volume_m3.lower,

@@ -72,13 +72,14 @@ def faults(results: TrajectoryResults) -> list[Fault]:
         if path.verdict != "safe":
             where, t = _first_fault(path)
         todo = path_advice(path, results.checks.take(results.checks.path == path.name))
+        status, verdict = shown_verdict(path, near)
         found.append(
             Fault(
                 path.name,
                 own_title(path.title),
-                "caution" if path.verdict == "safe" else WEIGHTS[path.verdict],
-                tr("clear of assumed shapes only") if path.verdict == "safe" else outcome_word(path.verdict),
-                path.expect == path.verdict,
+                status,
+                verdict,
+                path.expect == path.verdict != "safe",
                 where,
                 sentence("finding", finding=todo) if todo else "",
                 address_of("trajectory", path.name, t, path.name),
@@ -106,6 +107,13 @@ def path_advice(path: PathSummary, rows: PathChecks) -> str | None:
     if not path.unreachable or not len(sound):
         return advice(path)
     return advice(path, (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())))
+
+
+def shown_verdict(path: PathSummary, near: str) -> tuple[Weight, str]:
+    """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
+    if path.verdict == "safe" and near:
+        return "caution", tr("clear of assumed shapes only")
+    return WEIGHTS[path.verdict], outcome_word(path.verdict)
 
 
 def near_assumed(path: PathSummary, summary: TrajectorySummary) -> str:

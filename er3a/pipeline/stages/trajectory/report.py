@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined
@@ -26,7 +25,14 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
-from er3a.pipeline.stages.trajectory.played import WEIGHTS, kinds, motions, near_assumed, path_advice, worst_first
+from er3a.pipeline.stages.trajectory.played import (
+    kinds,
+    motions,
+    near_assumed,
+    path_advice,
+    shown_verdict,
+    worst_first,
+)
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import readings
@@ -126,11 +132,11 @@ def _section(
     summary: model.TrajectorySummary,
 ) -> PathSection:
     near = near_assumed(path, summary)
-    only_assumed = WEIGHTS[path.verdict] == "plain" and near
+    status, verdict = shown_verdict(path, near)
     return PathSection(
         path=path,
-        status="caution" if only_assumed else WEIGHTS[path.verdict].replace("plain", "pass"),
-        verdict=tr("clear of assumed shapes only") if only_assumed else outcome_word(path.verdict),
+        status=status.replace("plain", "pass"),
+        verdict=verdict,
         kind=kind_word(path.kind),
         text=joined([path_text(path), near]),
         advice=path_advice(path, rows),
