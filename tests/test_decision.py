@@ -57,7 +57,7 @@ def test_a_short_verdict_and_one_without_clauses_stay_whole():
         ("fail", {}, {}, "arm/validation.html"),
         ("fail", {}, {"instead": "other", "same_arm": True}, "arm/validation.html"),
         ("caution", {"inverse": "inverse"}, {"measurement": "measure a1"}, "arm/inverse.html"),
-        ("caution", {}, {"measurement": "measure a1"}, "arm/validation.html#table-not-settled"),
+        ("caution", {}, {"measurement": "measure a1", "entry": "a1"}, "arm/validation.html#entry-a1"),
         ("no_reference", {}, {}, "arm/validation.html"),
     ],
 )

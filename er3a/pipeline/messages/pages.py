@@ -212,9 +212,11 @@ def next_step(
     instead: str | None = None,
     same_arm: bool = False,
     measurement: str = "",
+    entry: str = "",
 ) -> NextStep | None:
     """The step that helps most; None where nothing is open. ``failed``: titles of stages that failed, by name;
-    ``measurement``: the one that validation proposes; the others as of :func:`decision`."""
+    ``measurement``: the one that validation proposes, and ``entry``, what it settles; the others as of
+    :func:`decision`."""
     validation = f"{robot}/validation.html"
     if table == "fail" and same_arm:
         return NextStep(tr("Take the corrected table from the validation page."), validation)
@@ -228,7 +230,7 @@ def next_step(
     if table == "no_reference":
         text = tr("Gather the manufacturer's data, or compare the table with a URDF by er3a compare.")
         return NextStep(text, validation)
-    return NextStep(measurement, f"{validation}#table-not-settled") if measurement else None
+    return NextStep(measurement, f"{validation}#entry-{entry}") if measurement else None
 
 
 @dataclass(frozen=True)

@@ -218,7 +218,7 @@ TEXTS = texts(
         "target_not_given": "the target is not known: {reason}",
         "target_out_of_reach": "the target is out of reach: {reasons:; }",
         "target_out_of_reach.bare": "the target is out of reach",
-        "way_out_of_reach": "out of reach after {at_mm:.1f} mm: {reasons}",
+        "way_out_of_reach": "out of reach after {at_mm:.1f} mm; where it lacks most, {reasons}",
         "configuration_ends": (
             "the configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {angle_deg:.1f} {unit}"
         ),
@@ -239,8 +239,8 @@ TEXTS = texts(
         ),
         "motion_collides": "collision: {touches}",
         "motion_collides.more": "collision: {touches}; and more later",
-        "bodies_touch": "{pair} after {at_mm:.1f} mm, {depth_mm:.1f} mm deep",
-        "bodies_touch.joint": "{pair} after {t_s:.2f} s, {depth_mm:.1f} mm deep",
+        "bodies_touch": "{pair} after {at_mm:.1f} mm, up to {depth_mm:.1f} mm deep",
+        "bodies_touch.joint": "{pair} after {t_s:.2f} s, up to {depth_mm:.1f} mm deep",
         "arc_goes_on": "the arc ends after {angle_deg:g} deg, not at its target",
         "arc_goes_on.unknown": "the angle at which the arc ends is not known; the arc was not checked",
         "arc_goes_on.turns": (

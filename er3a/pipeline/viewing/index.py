@@ -582,7 +582,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding)
-    measurement = say(finding.next_measurement) if isinstance(finding, LeftOpen) and finding.next_measurement else ""
+    proposed = finding.next_measurement if isinstance(finding, LeftOpen) else None
     return {
         "robot": robot,
         "table": table,
@@ -606,7 +606,8 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             failed,
             instead=instead,
             same_arm=same_arm,
-            measurement=measurement and page.whole_sentence(measurement),
+            measurement=page.whole_sentence(say(proposed)) if proposed else "",
+            entry=proposed.entry.replace(" ", "") if proposed else "",
         ),
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
         "expected": expected,
@@ -629,7 +630,10 @@ def _settled(finding: object) -> tuple[bool, str]:
 def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str, str]]:
     """What is asked of an arm first: the question, its answer and where it is shown."""
     if "workspace" in heads:
-        yield tr("Tray or box"), box_text(heads["workspace"].summary), "workspace.html#placement"
+        box = box_text(heads["workspace"].summary)
+        if box and np.allclose(robot.tool, np.eye(4)):
+            box = joined([box, tr("The tool point is the flange's centre: no tool is given.")], " ")
+        yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if "workspace" in heads:

@@ -51,9 +51,8 @@ def faults(results: ProgramsResults) -> list[Fault]:
         if worst is None or program.outcome == "pass":
             continue
         where = say(worst.finding)
-        if worst.line and worst.motion_s is not None:
-            time = fixed(worst.motion_s, 2)
-            where = tr("line {line}, {time} s into it: {text}", line=worst.line, time=time, text=where)
+        if worst.line and worst.program_s is not None:
+            where = tr("line {line}, at {time} s: {text}", line=worst.line, time=fixed(worst.program_s, 2), text=where)
         elif worst.line:
             where = tr("line {line}: {text}", line=worst.line, text=where)
         place = line_id(program.name, worst.line if worst in of_line(program, worst.line) else 0)
