@@ -55,8 +55,8 @@ class ArmShapes:
 
     @property
     def assumed(self) -> bool:
-        """Whether no document gives them."""
-        return self.grade == "inferred"
+        """Whether no document gives them that a verdict may rest on."""
+        return self.grade in ("inferred", "claim")
 
 
 @derived

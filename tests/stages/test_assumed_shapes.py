@@ -22,16 +22,17 @@ from er3a.programs.languages import read_program
 HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
 
 
-def documented():
+def documented(grade="official"):
     """The ER3A-C60 as if a drawing gave its shapes."""
     robot = load_robot("er3a_c60")
     source = robot.sources["envelopes"]
-    return robot.replace(sources={**robot.sources, "envelopes": replace(source, grade="official")})
+    return robot.replace(sources={**robot.sources, "envelopes": replace(source, grade=grade)})
 
 
 def test_shapes_that_a_document_gives_need_no_word():
     inferred, drawn = load_robot("er3a_c60"), documented()
     assert arm_shapes(inferred).assumed
+    assert arm_shapes(documented("claim")).assumed  # what an article says, on which no verdict rests
     assert not arm_shapes(drawn).assumed
     assert shapes_assumed(drawn, 0.02, {"a": 0.001}) is None
     assert not shapes_assumed(inferred.replace(envelopes=()), 0.02, {}).given

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from lxml import etree
 
+from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.messages.trajectory import advice
 from er3a.pipeline.program_reports import programs_of
@@ -104,6 +106,21 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
     assert shorter.clearance.least_mm >= 20
     assert shorter.length_m == pytest.approx(path.clear_until.s_m, abs=2e-4)
     assert shorter.verdict == "safe"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("before_mm", [2, 20])
+def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_path, before_mm):
+    (path,) = paths_of(tmp_path, "line_out")
+    far = float(re.search(r"within reach up to t = \S+ s \(([\d.]+) mm of the path\): end it before", advice(path))[1])
+    (entry,) = (each for each in load_paths(f"data/paths/{ROBOT}.yaml").paths if each.name == "line_out")
+    start, end = np.array(entry.start.xyz_mm), np.array(entry.end.xyz_mm)
+    part = float((far - before_mm) / np.linalg.norm(end - start))
+    there = {"xyz_mm": (start + part * (end - start)).tolist(), "rpy_deg": list(entry.end.rpy_deg)}
+    (shorter,) = paths_of(tmp_path, "line_out", end=there, duration_s=4 * part)
+    assert path.verdict == "unreachable"
+    assert shorter.verdict == "safe"
+    assert shorter.clearance.least_mm >= 20
 
 
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):

@@ -31,7 +31,7 @@ from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, say, say_all, word
-from er3a.pipeline.results import AbsentResults, Provenance, Stored, read_stage, read_status
+from er3a.pipeline.results import AbsentResults, Provenance, Status, Stored, read_stage, read_status
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
@@ -176,7 +176,7 @@ class Head:
 
     robot: str
     stage: str
-    status: str
+    status: Status
     text: str
     figures: tuple[ShownFigure, ...]
     provenance: Provenance

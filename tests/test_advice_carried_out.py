@@ -1,0 +1,111 @@
+"""Each text that advises something names the test that carries it out, or stands among those that no test can."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import re
+from pathlib import Path
+
+from er3a.pipeline import messages
+from er3a.pipeline.messages import say
+from er3a.pipeline.messages.planning import STRATEGIES
+from er3a.pipeline.messages.programs import REMEDIES, SINGULAR, STOPPED
+
+for module in pkgutil.iter_modules(messages.__path__):
+    importlib.import_module(f"{messages.__name__}.{module.name}")
+
+ADVISES = re.compile(
+    r"(?:^|[:;,.)] |\bor |\band )(?:add|allow|ask|check|convert|correct|end|give|go|import|invert|jog|lead|leave|lower|"
+    r"make|map|measure|move|put|raise|read|remove|rotate|run|set|shift|spread|take|teach|tilt|time|turn|use|write)\b "
+    r"(?!\()",
+    re.IGNORECASE,
+)
+OF_PROGRAMS = "test_a_program_that_is_mended_as_advised_passes"
+BY_JOINT_MOVES = "test_joint_moves_that_are_advised_pass"
+OF_SETS = "test_a_set_that_is_mended_as_advised_gives_the_camera_and_no_warning"
+AT_PLACES = "test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice"
+MEASURED = "test_the_proposed_measurement_settles_or_contradicts"
+CARRIED_OUT = {
+    **dict.fromkeys(REMEDIES, OF_PROGRAMS),
+    **{f"singular.{kind}": OF_PROGRAMS for kind in ("wrist",)},
+    **{f"stopped.{kind}": OF_PROGRAMS for kind in STOPPED},
+    "whole_turn": BY_JOINT_MOVES,
+    "configuration_changes": BY_JOINT_MOVES,
+    "remedy.joint_move": BY_JOINT_MOVES,
+    "remedy.joint_moves": BY_JOINT_MOVES,
+    "remedy.zone_too_large": OF_PROGRAMS,
+    "remedy.limit#above": OF_PROGRAMS,
+    "remedy.limit#below": OF_PROGRAMS,
+    "remedy.collision#solid": OF_PROGRAMS,
+    "remedy.joint_jumps#stays": OF_PROGRAMS,
+    "remedy.slower": "test_a_line_at_the_pace_advised_passes",
+    "clear_of_assumed": "test_a_motion_that_passes_near_assumed_shapes_is_a_caution",
+    "pairs_unexamined": "test_shapes_in_error_are_an_error_of_the_shapes",
+    "zone_collides": "test_a_zone_that_allows_a_collision_is_a_caution",
+    "load_not_examined": "test_the_load_that_a_program_names_counts_for_its_stretches",
+    "load_above_payload": "test_a_load_is_named_once_and_one_above_the_payload_fails",
+    "frame_not_given#base": OF_PROGRAMS,
+    "frame_not_given#tool": OF_PROGRAMS,
+    **{f"strategy.{name}": "test_what_is_usable_ends_at_the_end_within_all_limits" for name in STRATEGIES},
+    "strategy.stop": "test_stop_rests_on_the_path_before_the_region",
+    "strategy.planned": "test_planned_motions_touch_nothing_and_keep_their_limits",
+    "advice.slower": "test_the_slower_pace_that_is_advised_keeps_the_limits",
+    "advice.clear_until": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
+    "advice.clear_until#links": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
+    "advice.within_reach": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
+    "turn_tool": "test_a_target_moved_or_turned_as_advised_is_reached_with_margin",
+    "shift_tool": "test_a_target_moved_or_turned_as_advised_is_reached_with_margin",
+    "move_obstacle": "test_the_obstacle_is_to_be_moved_only_where_the_arm_alone_keeps_its_margins",
+    **{f"box.put#{form}": AT_PLACES for form in ("on", "over", "free")},
+    **{f"{code}": OF_SETS for code in ("board_scale", "little_motion", "few_samples", "no_rotation", "angle_order")},
+    **{f"{code}": OF_SETS for code in ("transposed_rotations", "parallel_axes", "quaternion_order", "position_axes")},
+    "all_samples_equal#flange": OF_SETS,
+    **{f"measure_angle#{column}": MEASURED for column in ("offset", "alpha")},
+    **{f"measure_length#{column}": MEASURED for column in ("a", "d")},
+    "look_at_motion": "test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not",
+    "look_at_motion_from": "test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not",
+    "more_positions#request": "test_proposed_poses_settle_what_a_calibration_settles_with_them",
+    "collision.shapes_overlap": "test_shapes_in_error_are_an_error_of_the_shapes",
+    "wrong_limit#lower": "test_single_faults_are_named",
+}
+NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, or takes another picture
+    *("configuration_not_read", "program_not_simulated", "program_form_inferred", "external_axes_left_out"),
+    *("program_nothing_moves", "line_not_checked", "written_tool_not_given", "stopped.stopped"),
+    *("collision.base_in_solid", "centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
+    *("all_samples_equal#target", "ambiguous_tilt", "void_advice#cause", "void_advice#predicate"),
+    *("read_limit#lower", "read_limit#upper", "time_joint", "at_singularity#wrist", "other_direction#both"),
+    # ways that help in some cases only; what is sure to help, joint moves, is named before them
+    *("slide_exceeded", "combination_exceeded", "configuration_ends", "zone_not_settled"),
+    *("singular.elbow", "singular.shoulder", "singular.dependent_axes"),
+    *("remedy.collision#links", "remedy.joint_jumps#moves"),
+}
+NO_ADVICE = {f"not_of_this_arm#{why}" for why in ("no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns")}
+
+
+def advising() -> set[str]:
+    """Keys of all texts that advise something."""
+    found = {key for key in say._texts if any(ADVISES.search(form) for form in say.english(key))}
+    found |= {*REMEDIES, *(f"singular.{kind}" for kind in SINGULAR), *(f"stopped.{kind}" for kind in STOPPED)}
+    return (found | {f"strategy.{name}" for name in STRATEGIES}) - NO_ADVICE
+
+
+def test_every_text_that_advises_something_has_a_test_that_carries_it_out():
+    """A new advice has to be entered above, with the test that carries it out."""
+    assert advising() <= CARRIED_OUT.keys() | NOT_CARRIED_OUT
+    assert advising() >= NOT_CARRIED_OUT
+
+
+def test_the_tests_that_carry_advice_out_are_there():
+    written = "\n".join(file.read_text(encoding="utf-8") for file in Path(__file__).parent.rglob("test_*.py"))
+    named = {test for key, test in CARRIED_OUT.items() if key not in NOT_CARRIED_OUT}
+    assert [test for test in named if f"def {test}(" not in written] == []
+
+
+def test_each_program_that_is_mended_is_of_a_remedy_that_says_so():
+    from tests.program_check.test_remedies import MENDED
+
+    mended = {code.replace("not_followed_to_end", "stopped") for code in MENDED}
+    asked = {key for key, test in CARRIED_OUT.items() if test == OF_PROGRAMS} - NOT_CARRIED_OUT
+    by_code = {key for key in asked if not key.startswith(("remedy.", "frame_not_given#", "singular."))}
+    assert by_code <= mended
