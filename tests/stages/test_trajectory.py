@@ -486,6 +486,7 @@ def test_paths_that_are_nowhere_reached_have_a_page_too(study, tmp_path):
     assert "No path has a pose that can be reached" in (tmp_path / "page.html").read_text()
 
 
+@pytest.mark.long
 def test_path_that_goes_on_from_one_that_does_not_end_is_refused(study, tmp_path):
     far = LINE | {"end": {"xyz_mm": [5000, 0, 300], "rpy_deg": [180, 0, 0]}}
     after = {key: value for key, value in LINE.items() if key != "start"} | {"name": "next", "after": "line"}
