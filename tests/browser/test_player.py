@@ -187,6 +187,12 @@ def test_another_motion_starts_at_its_start(page):
     assert not page.find_element(By.CSS_SELECTOR, ".cursor").is_displayed()
 
 
+def test_the_page_s_address_names_a_moment(page):
+    page.get(page.current_url.split("#")[0] + "?play=still&t=0.5")
+    until(page, lambda: clock(page) == "t = 0.500 s of 1.000 s")
+    assert told(page) == "It stands."
+
+
 def test_it_stays_in_sight_beside_a_plot_far_down_the_page(page):
     page.execute_script("window.scrollTo(0, document.body.scrollHeight)")
     page.execute_script("document.querySelector('[data-t]').click()")
