@@ -75,8 +75,8 @@ STEP = 1e-6
 ROUND_DEG, ROUND_MM = 1e-6, 1e-6
 PARALLEL = 1 - 1e-6
 SCAN = math.pi / 4
-SCANNED_AT = 5  # poses
-KEPT_OF_SCAN = 16
+SCANNED_AT = 8  # poses at most
+KEPT_OF_SCAN = 24
 MOST_SCANNED = 7  # joints
 SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 
@@ -241,7 +241,7 @@ def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conv
     scanned = []
     for signs in itertools.product((1.0, -1.0), repeat=robot.joints):
         tables = many.with_column("direction", slice(None), table.direction * np.array(signs))
-        size = np.linalg.norm(gaps(tables, np.zeros((len(tables), 3)), SCANNED_AT), axis=1)
+        size = np.linalg.norm(gaps(tables, np.zeros((len(tables), 3)), min(SCANNED_AT, len(poses))), axis=1)
         best = np.argsort(size)[:KEPT_OF_SCAN]
         scanned.append((size[best], tables[best]))
     order = np.argsort(np.concatenate([size for size, _ in scanned]))[: KEPT_OF_SCAN**2]
