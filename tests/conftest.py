@@ -229,10 +229,9 @@ def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return shared
 
 
-def leave_one_robot(study: Path, stages: tuple[str, ...]) -> None:
-    """Take the other robots, and its other stages, out of a study file, and leave the rest of its text as it is."""
+def leave_one_robot(study: Path) -> None:
+    """Take the other robots out of a study file, and leave the rest of its text as it is."""
     text = study.read_text(encoding="utf-8")
-    text = text.replace(f"  {ROBOT}:\n", f"  {ROBOT}:\n    stages: [{', '.join(stages)}]\n")
     for name in ROBOTS:
         if name != ROBOT:
             text = re.sub(rf"^  {name}:\n(    .*\n)+", "", text, flags=re.MULTILINE)

@@ -23,7 +23,7 @@ from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
 from er3a.pipeline.results import FORMAT_VERSION, check_results, write_checksums
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
-from testing.small_study import STUDY, stages_of
+from testing.small_study import stages_of
 from tests.conftest import ALL_THERE
 
 STAGES = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
@@ -206,10 +206,10 @@ def test_bad_input_is_one_error_before_anything_runs(small_study):
     assert done.stderr.count("\n") == 1
 
 
-def test_two_runs_at_once_are_refused(call, small_study):
+def test_two_runs_at_once_are_refused(small_study):
     with open(small_study.folder / ".snakemake/er3a.lock") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        done = call("run", "--study", STUDY, folder=small_study.folder)
+        done = small_study.make_run(check=False)
     assert done.returncode == 2
     assert done.stderr == "error: another run is active in this folder; wait for its end, or stop it\n"
 
