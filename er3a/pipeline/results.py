@@ -108,6 +108,7 @@ LeftOutSubject = Literal[
     "unexamined_pairs",
     "allowed_pairs",
     "joined_pairs",
+    "scene_shapes",
     "shallow_overlaps",
     "own_speeds",
     "jerk",

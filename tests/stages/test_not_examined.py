@@ -82,7 +82,9 @@ def test_paths_name_what_their_settings_leave_out(study, tmp_path):
     more = subjects(trajectory(jerky, ROBOT))
     assert "jerk" not in more
     assert "strategies" not in more
-    assert ("obstacles" in more) == (study.scene(ROBOT, "trajectory") is None)
+    assert "scene_shapes" not in found
+    absent = "scene_shapes" if study.scene(ROBOT, "trajectory") is None else "obstacles"
+    assert {"scene_shapes", "obstacles"} - more.keys() == {absent}
 
 
 @pytest.mark.long

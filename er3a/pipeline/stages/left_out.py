@@ -41,7 +41,7 @@ def left_out_of_collisions(
         ("joined_pairs", pairs("joined")),
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]
-    obstacles = [LeftOut("obstacles")] if scene is None else []
+    obstacles = [LeftOut("obstacles" if scene is None else "scene_shapes")]
     carried = [] if scene is not None and scene.carried else [LeftOut("carried")]
     shallow = [] if tolerance_mm is None else [LeftOut("shallow_overlaps", amount=tolerance_mm)]
     return (*obstacles, *carried, *listed, *shallow)
