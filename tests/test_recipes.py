@@ -107,8 +107,8 @@ class HeightRow(Row):
     uncertainty_mm: float
 
     def scalars(self) -> Iterator[Scalar]:
-        quantity = PointCoordinate(ZERO_POSE, "flange", "z")
-        yield PointAtPose("zero", "flange", "z"), "zero_pose", quantity, self.height_mm, self.uncertainty_mm
+        quantity = quantities.PointCoordinate(quantities.ZERO_POSE, "flange", "z")
+        yield subjects.PointAtPose("zero", "flange", "z"), "zero_pose", quantity, self.height_mm, self.uncertainty_mm
 
 
 KINDS: dict'''
@@ -448,9 +448,8 @@ class PlanarFour('''
         "er3a/kinematics/classes/chain_solvers.py": (
             (
                 "    _as_scara,\n",
-                "    _as_scara,\n    lambda links, slide: Turntable(links) if slide.tolist() == [False] else None,\n",
+                "    _as_scara,\n    lambda links, slide: class_solvers.Turntable(links) if slide.tolist() == [False] else None,\n",
             ),
-            ("    ThreeSliding,\n", "    ThreeSliding,\n    Turntable,\n"),
         ),
     }
     script = """

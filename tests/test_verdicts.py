@@ -125,10 +125,10 @@ def test_part_of_a_study_has_verdicts_an_index_and_a_report(study, tmp_path, mon
     page = (reports / "index.html").read_text(encoding="utf-8")
     assert "Not examined yet: workspace, collision, inverse, trajectory, dynamics." in page
     assert re.findall(r'href="er3_600/(\w+)\.html', page) == [
+        "validation",
         "teach",
         "validation",
-        "validation",
-    ]  # next, cell
+    ]  # next, panel, cell
     skipped = etree.parse(reports / "junit.xml").findall(".//skipped")
     assert len(skipped) == len(others)
 
@@ -207,7 +207,7 @@ def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tm
                 assert "neither passed nor failed: 2 not examined" in done.stderr
         section = page.split(f'id="{name}"')[1].split("<section")[0]
         assert ("See why programs fails" in section) == bool(codes[1]), name
-        cells = [each for each in section.split("<li>") if f"{name}/programs.html" in each and "badge" in each]
+        cells = [each for each in section.split("<li>") if f'{name}/programs.html"' in each and "badge" in each]
         assert [f'badge {status}"' in each for each in cells] == [True] * (name != "not_run"), name
         assert ("as expected" in "".join(cells)) == (name == "fails_as_expected")
     whole = tmp_path / "study.yaml"

@@ -309,7 +309,7 @@ def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(result
     assert tiles["max_joint_speed"] == speed
     assert ratio == pytest.approx(speed / limit)
     assert tiles["colliding"] == sum(bool(path.collisions) for path in asked)
-    assert FIGURES["colliding"] == "Paths with a collision"
+    assert FIGURES["colliding"] == "Paths with a collision, of those meant to be safe"
 
 
 @pytest.mark.long

@@ -129,9 +129,11 @@ class PageTexts(HTMLParser):
         super().__init__()
         self.texts: list[str] = []
         self._silent: list[str] = []
+        self._breakable = False  # the word goes on behind a place where a line may end
         self.feed(html)
 
     def handle_starttag(self, tag, attrs):
+        self._breakable = tag == "wbr"
         if tag in ("style", "script", "code"):
             self._silent.append(tag)
             self._words = dict(attrs).get("type") == "application/json"
@@ -143,7 +145,7 @@ class PageTexts(HTMLParser):
 
     def handle_data(self, data):
         if not self._silent:
-            self.texts.append(data)
+            self.texts[-1:] = [self.texts[-1] + data] if self._breakable else [*self.texts[-1:], data]
         elif self._silent[-1] == "script" and self._words:
             self.texts += _words_of(json.loads(data))
 
