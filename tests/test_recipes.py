@@ -448,7 +448,8 @@ class PlanarFour('''
         "er3a/kinematics/classes/chain_solvers.py": (
             (
                 "    _as_scara,\n",
-                "    _as_scara,\n    lambda links, slide: class_solvers.Turntable(links) if slide.tolist() == [False] else None,\n",
+                "    _as_scara,\n"
+                "    lambda links, slide: class_solvers.Turntable(links) if slide.tolist() == [False] else None,\n",
             ),
         ),
     }

@@ -39,7 +39,7 @@ def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, pa
         assert {"sort", "tool", "scroll"} <= set(kinds)
 
 
-MOST_TABS = 60
+MOST_TABS = 80
 PAUSE = 5.0  # s to wait for what the page does at once on an idle machine
 HAS_TABLES = "return [...document.querySelectorAll('tbody')].some((body) => body.rows.length > 1)"
 CONTROLS = """

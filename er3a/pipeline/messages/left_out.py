@@ -19,7 +19,9 @@ TEXTS = texts(
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
         "left_out.allowed_pairs": "collisions of pairs that the robot's or scene's file allows",
-        "left_out.joined_pairs": "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined",
+        "left_out.joined_pairs": (
+            "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
+        ),
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
         "left_out.own_speeds": "speeds that the joints can really do: no document gives them, and others are assumed",

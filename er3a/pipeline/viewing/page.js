@@ -327,7 +327,7 @@ const BESIDE = "script, style, thead, .contents, .tools, .pickers"; // goes with
 // What a reader sees of an element, folded or not, in small letters.
 function allText(element) {
   if (element.nodeType === Node.TEXT_NODE) return element.data;
-  if (["SCRIPT", "STYLE", "CANVAS"].includes(element.tagName)) return "";
+  if (["SCRIPT", "STYLE", "CANVAS", "WBR"].includes(element.tagName)) return "";
   return `${element.alt ?? ""} ${[...element.childNodes].map(allText).join("")} `;
 }
 
