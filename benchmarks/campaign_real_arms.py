@@ -178,8 +178,9 @@ def _file_row(name: str, found: Calibration, run: Unseen) -> str:
     errors = [
         f"{each.without_terms().distances_mm(rows).mean():.4f} | {each.left_out.mean_mm:.4f} "
         f"| {each.left_out.far_mean_mm:.4f}"
-        for each in (alone, found)
         if each.left_out
+        else "– | – | –"
+        for each in (alone, found)
     ]
     share = np.mean(np.array(means) <= MOST_MEAN_MM)
     return f"| {TITLES[name]} | {ratios} | {' | '.join(errors)} | {share:.1%} |"

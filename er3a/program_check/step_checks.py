@@ -184,7 +184,9 @@ def _solved(placed: PlacedMotion, target: instructions.PoseTarget, pose: Reals, 
         rows = rows[met] if met.any() else rows
         findings += () if met.any() else (_branch_not_met(target, joint),)
     elif target.configuration and target.branch is None and joint and _different(rows) > 1:
-        words = (f"S {value}".removesuffix(".0") if key == "S" else f"{value}" for key, value in target.configuration)
+        words = (
+            f"{key} {value}" if isinstance(value, str) else f"{key} {value:g}" for key, value in target.configuration
+        )
         findings.append(found_in.ConfigurationNotRead(", ".join(words)))
     if reference is None and not findings and (different := _different(rows)) > 1:
         findings.append(found_in.ConfigurationGuessed(different))

@@ -300,9 +300,9 @@ class ProgramMemory:
     def forget(self, variable: str) -> None:
         """Nothing of a variable is known from here."""
         self.kept.clear()
-        for values in (self.local, self.shared):
-            for name in [each for each in values if each.startswith(variable) and root(each) == variable]:
-                values[name] = syntax.Unclear(name)
+        for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
+            for name in [each for each in (*values, *more) if root(each) == variable]:
+                values[name] = syntax.Unclear(f"{name}, changed")
 
     def _set_field(self, target: syntax.Member, value: syntax.Value) -> bool:
         """Give a field of a kept value a value; False if the field is kept under its whole name."""
@@ -437,7 +437,7 @@ class ProgramMemory:
         if not whole or self.functions.whole_division is False:
             return a / b
         if self.functions.whole_division is None and a % b:
-            return syntax.Unclear(f"{a:g}/{b:g}, of which no source tells whether it is a whole number")
+            return syntax.Unclear(f"{a:.0f}/{b:.0f}, of which no source tells whether it is a whole number")
         return int(a / b)
 
     def _computed(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value:

@@ -514,8 +514,7 @@ ITEMS = (
         N_(
             "{grasped} of {objects} objects that a camera in front of the real arm sees can be grasped; at the worst "
             "grasp 95 % of errors stay below {grasp_error_mm:.1f} mm. Objects placed where no grasp is possible, and "
-            "found so: {misplaced}. Poses that can't be right, and are left out of the camera's calibration: "
-            "{poses_left_out}."
+            "found so: {misplaced}. Samples left out of the camera's calibration: {poses_left_out}."
         ),
         N_("No real camera took part: what it sees is simulated."),
     ),

@@ -142,8 +142,8 @@ TEXTS = texts(
         ),
         "part_off": "{part}: {status} (the tool could be off by {mm:.0f} mm, {deg:.0f} deg)",
         "part": "{part}: {status}",
-        "look_at_motion_from": "jog +J{joint} from ({own_pose}) deg and see whether {motion} (seen along +x)",
-        "look_at_motion": "jog +J{joint} from the zero pose and see whether {motion} (seen along +x)",
+        "look_at_motion_from": "jog +J{joint} from ({own_pose}) deg and see whether {motion} (forward is +x)",
+        "look_at_motion": "jog +J{joint} from the zero pose and see whether {motion} (forward is +x)",
         "inconsistent_with_own_text": (
             "The table contradicts its own text ({against:; }): {entry} would have to be {needed:g} {unit} instead of "
             "{given:g}. That makes it agree with itself; it says nothing about any real robot."

@@ -254,7 +254,7 @@ const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times
 addEventListener("chosen", ({ detail }) => choose(detail));
 choose(decodeURIComponent(location.hash.slice(1)));
 const asked = new URLSearchParams(location.search);
-if (asked.has("play")) {
+if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
   goTo(asked.get("play"), Number(asked.get("t")));
   dock();
 }

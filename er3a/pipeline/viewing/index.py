@@ -629,25 +629,27 @@ def _settled(finding: object) -> tuple[bool, str]:
 
 def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str, str]]:
     """What is asked of an arm first: the question, its answer and where it is shown."""
-    if "workspace" in heads:
-        box = box_text(heads["workspace"].summary)
-        if box and np.allclose(robot.tool, np.eye(4)):
+    workspace = heads["workspace"].summary if "workspace" in heads else None
+    if workspace:
+        box = box_text(workspace)
+        if box and any(each.subject == "tool" for each in workspace.not_examined):
             box = joined([box, tr("The tool point is the flange's centre: no tool is given.")], " ")
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
-    if "workspace" in heads:
-        yield tr("Void"), void_text(heads["workspace"].summary), "workspace.html#table-voids"
+    if workspace:
+        place = "#table-voids" if getattr(workspace, "voids", ()) else ""
+        yield tr("Void"), void_text(workspace), f"workspace.html{place}"
 
 
 def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
     """How many paths or programs there are, how many may be run as they are, and why the others may not."""
     if isinstance(results, ProgramsResults):
-        count, unknown, faults = len(results.summary.programs), 0, program_faults(results)
+        followed, lost, faults = len(results.summary.programs), 0, program_faults(results)
     else:
-        count, unknown = len(results.summary.paths), len(results.summary.not_followed)
+        followed, lost = len(results.summary.paths), len(results.summary.not_followed)
         faults = path_faults(results)
-    return {"stage": stage, "count": count + unknown, "sound": count - len(faults), "faults": faults}
+    return {"stage": stage, "count": followed + lost, "lost": lost, "sound": followed - len(faults), "faults": faults}
 
 
 def _cell(head: Head) -> dict[str, Any]:

@@ -487,7 +487,7 @@ class KrlDialect(Dialect):
         ):
             return new
         missing = tuple(
-            (key, syntax.Unclear(f"{key} of {syntax.shown(new)}")) for key, _ in old.items if new.get(key) is None
+            (key, syntax.Unclear(f"left out of {syntax.shown(new)}")) for key, _ in old.items if new.get(key) is None
         )
         return syntax.Record(new.kind, (*new.items, *missing))
 

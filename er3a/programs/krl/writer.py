@@ -77,16 +77,20 @@ class KrlWriter(writing.Writer):
     def _target(self, ready: writing.ReadyMotion) -> str | None:
         target = ready.motion.target
         if ready.motion.kind == "joint":
-            turns = dict(target.configuration) if isinstance(target, instructions.PoseTarget) else {}
-            if isinstance(target, instructions.PoseTarget) and {"S", "T"} <= turns.keys() and self.own:
+            turns = self._turns(target)
+            if isinstance(target, instructions.PoseTarget) and {"S", "T"} <= turns.keys():
                 return _frame_text(target.pose, turns)
             if ready.joints is not None:
                 return _axes_text(ready.joints)
             return _axes_text(target.joints) if isinstance(target, instructions.JointTarget) else None
         if ready.pose is None:
             return None
-        turns = dict(target.configuration) if isinstance(target, instructions.PoseTarget) and self.own else {}
-        return _frame_text(ready.pose, turns)
+        return _frame_text(ready.pose, self._turns(target))
+
+    def _turns(self, target: instructions.Target) -> dict[str, int]:
+        """Status and Turn of a target that was read from KRL, as far as they are known."""
+        given = target.configuration if isinstance(target, instructions.PoseTarget) and self.own else ()
+        return {key: int(value) for key, value in given if key in ("S", "T") and not isinstance(value, str)}
 
     def _frame(self, variable: str, frame: instructions.NamedFrame) -> None:
         if frame.name.startswith(KNOWN_FRAMES):
@@ -169,9 +173,9 @@ def _axes_text(joints: Reals) -> str:
     return "{" + ",".join(parts) + "}"
 
 
-def _frame_text(pose: Reals, turns: dict[str, float | str] | None = None) -> str:
+def _frame_text(pose: Reals, turns: dict[str, int] | None = None) -> str:
     parts = [
         f"{key} {writing.fixed(value, DIGITS)}" for key, value in zip(FRAME_KEYS, instructions.numbers_of(pose, "kuka"))
     ]
-    parts += [f"{key} {int(float(value))}" for key, value in (turns or {}).items() if key in ("S", "T")]
+    parts += [f"{key} {value}" for key, value in (turns or {}).items()]
     return "{" + ",".join(parts) + "}"

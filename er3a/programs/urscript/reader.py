@@ -42,6 +42,8 @@ CHANGED = "%changed"
 LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
 
 
+BLOCK_HEAD = re.compile(r"(?!(?:else|elif|case|default)\b)(?:.*:|(?:def|thread|sec|if|while)\b.*)$")
+BLOCK_END = re.compile(r"end\s*[:;]*")
 OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
 """With what a line ends whose statement goes on in the next."""
 PLAIN = re.compile(
@@ -127,7 +129,8 @@ class _UrReader:
         self.routines: list[syntax.Routine] = []
         self.outermost: list[str] = []
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
-        self.unread: int | None = None  # columns before the head of the block that is not understood, while within one
+        self.unread: Place | None = None  # the head of the block that is not understood, while within one
+        self.within_unread = 0  # blocks open within it that begin no further in than it does
 
     def read(self) -> list[syntax.Routine]:
         """All routines; the one without a name holds what stands outside of others."""
@@ -137,6 +140,8 @@ class _UrReader:
                 self._statement(place, text)
             elif comment:
                 self.open[-1].remark(place, comment)
+        if self.unread is not None:
+            raise fault(self.unread, "this block has no end", "Close it with end")
         if len(self.open) > 1:
             builder = self.open[-1]
             if builder.blocks:
@@ -179,8 +184,13 @@ class _UrReader:
         builder = self.open[-1]
         if self.unread is not None:
             builder.unread(place, text)
-            if text == "end" and self._column(place) <= self.unread:
-                self.unread = None
+            if self._column(place) <= self._column(self.unread):
+                if BLOCK_END.fullmatch(text) is not None:
+                    self.within_unread -= 1
+                elif BLOCK_HEAD.match(text) is not None:
+                    self.within_unread += 1
+                if self.within_unread < 0:
+                    self.unread, self.within_unread = None, 0
             return
         if (plain := PLAIN.match(text)) is not None and plain[1] in MOTIONS and plain[3].count(",") == 5:
             builder.add(_plain_motion(place, plain))
@@ -191,11 +201,11 @@ class _UrReader:
         try:
             self._read(builder, UrWords(text.removesuffix(";")), place, text)
         except MisreadError:
-            if text.startswith(("else", "elif")):  # of a block that is open
+            if re.match(r"(else|elif)\b", text) is not None:  # of a block that is open
                 raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
             builder.unread(place, text)
             if text.endswith(":"):  # the head of a block, whose lines mean nothing without it
-                self.unread = self._column(place)
+                self.unread = place
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from er3a.collision.pairs import PENETRATION_TOLERANCE
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
@@ -28,7 +29,7 @@ class CollisionSettings(StrictModel):
     rounds: Annotated[int, Field(ge=0, le=1000)] = 4
     neighbours: Annotated[int, Field(ge=1, le=50)] = 8
     scene: Text | None = None
-    penetration_tolerance_mm: Annotated[float, Field(ge=0.01, le=100)] = 1.0
+    penetration_tolerance_mm: Annotated[float, Field(ge=0.01, le=100)] = 1000 * PENETRATION_TOLERANCE
 
 
 def _inputs(study: StudyFiles, robot: str) -> list[Path]:

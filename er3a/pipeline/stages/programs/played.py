@@ -50,12 +50,14 @@ def faults(results: ProgramsResults) -> list[Fault]:
         worst = worst_finding(program)
         if worst is None or program.outcome == "pass":
             continue
-        where = say(worst.finding)
-        if worst.line and worst.program_s is not None:
+        where, own = say(worst.finding), worst in of_line(program, worst.line)
+        if worst.line and not own:
+            where = tr("{file}, line {line}: {text}", file=worst.file, line=worst.line, text=where)
+        elif worst.line and worst.program_s is not None:
             where = tr("line {line}, at {time} s: {text}", line=worst.line, time=fixed(worst.program_s, 2), text=where)
         elif worst.line:
             where = tr("line {line}: {text}", line=worst.line, text=where)
-        place = line_id(program.name, worst.line if worst in of_line(program, worst.line) else 0)
+        place = line_id(program.name, worst.line if own else 0)
         found.append(
             Fault(
                 program.name,

@@ -89,10 +89,11 @@ def faults(results: TrajectoryResults) -> list[Fault]:
 
 
 def _first_fault(path: PathSummary) -> tuple[str, float]:
-    """What is wrong first with a path that is not safe, and when (s); how fast it is counts where nothing else is."""
+    """What is wrong first with a path that is not safe, and when (s); how fast it is counts where nothing else is,
+    singular poses before it."""
     found = [(part.t0_s, word, part) for word, parts in kinds(path) for part in parts]
     at_any_pace = [each for each in found if each[2] not in path.too_fast and each[2] not in path.undecided]
-    if found:
+    if at_any_pace or (found and path.verdict != "singular"):
         t, word, part = min(at_any_pace or found, key=lambda each: each[0])
         cause = say(part.cause.touches[0]) if isinstance(part.cause, BodiesOverlap) else cause_text(path, part)
         return tr("at t = {time} s: {text}", time=fixed(t, 2), text=f"{word}: {cause}"), t
