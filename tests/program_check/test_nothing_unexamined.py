@@ -13,13 +13,15 @@ from scipy.spatial.transform import Rotation
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Plane, Scene
+from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.instructions import ArmMotion, JointTarget, PoseTarget, UnresolvedTarget, numbers_of
-from er3a.programs.languages import read_program
+from er3a.programs.instructions import ArmMotion, JointTarget, Listing, PoseTarget, UnresolvedTarget, numbers_of
+from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
+from er3a.programs.writing import WriteOptions
 
 ROBOT = load_robot("er3a_c60")
 HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
@@ -166,6 +168,21 @@ def test_a_block_whose_head_is_not_understood_is_named_line_by_line_and_reading_
         (last, "note"),
         (last + 2, "fail"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("inner", "end"), [("if n == 2:\nm = 1\nend\n", "end"), ("case 1:\n", "end"), ("", "end;"), ("", "end:")]
+)
+def test_a_block_that_is_not_understood_ends_where_it_does_in_a_file_that_moves_nothing_in(tmp_path, inner, end):
+    text = f"def Main():\nn = 1\nswitch mode:\n{inner}movej([9,0,0,0,0,0])\n{end}\nmovej({NEAR_TEXT})\nend\n"
+    found = check(tmp_path, text)
+    assert [each.place.line for each in found.verdicts] == [text.count("\n") - 1]
+
+
+def test_a_block_that_is_not_understood_needs_an_end_and_names_may_begin_as_words_do(tmp_path):
+    with pytest.raises(InputError, match=r"line 2.*no end"):
+        check(tmp_path, f"movej({NEAR_TEXT})\nswitch mode:\n  movej({FAR_TEXT})\n")
+    assert codes(check(tmp_path, f"elsewhere = 1 2\nmovej({NEAR_TEXT})\n"))["may_move"] == [1]
 
 
 # threads and interrupts
@@ -601,6 +618,9 @@ def test_what_a_position_leaves_out_is_no_zero(tmp_path, lines, reason):
 def test_a_position_that_leaves_out_a_turn_the_variable_had_does_not_say_which_solution_is_meant(tmp_path):
     body = f"{FRAMES}DECL E6POS P\nP={pose_text(NEAR, ',S 2,T 0')}\nP={pose_text(NEAR)}\nPTP P"
     assert "configuration_not_read" in codes(check(tmp_path, krl(body), "a.src"))
+    listing = Listing("b", tuple(motions(tmp_path, krl(body), "a.src")), language="krl")
+    again = write_program(listing, "krl", WriteOptions(ROBOT))  # with the joints that it found, or without the turns
+    assert "left out" not in "".join(again.files.values())
 
 
 @pytest.mark.parametrize(
@@ -613,6 +633,7 @@ def test_a_position_that_leaves_out_a_turn_the_variable_had_does_not_say_which_s
         (["$BASE=BASE_DATA[1]", "$BASE.Z=100"], 0.1),
         ([f"$BASE=BASE_DATA[1]:{{X 0,Y 0,Z 100,{ZEROS}}}"], 0.15),
         (["BASE_DATA[1]=SEEN", "$BASE=BASE_DATA[1]"], None),
+        ([f"BASE_DATA[SEEN]={{X 0,Y 0,Z 9,{ZEROS}}}", "$BASE=BASE_DATA[1]"], None),
         (["BASE_DATA[1].Z=SEEN", "$BASE=BASE_DATA[1]"], None),
         (["$BASE=SEEN"], None),
     ],
