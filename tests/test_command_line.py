@@ -183,7 +183,7 @@ def test_pieces_of_work_share_what_is_left_of_the_time():
 
 def test_compiling_takes_none_of_the_time(monkeypatch):
     compiled = [5.0]
-    monkeypatch.setattr("er3a.pipeline.progress.compile_seconds", lambda: sum(compiled))
+    monkeypatch.setattr("er3a.numerics.jit.compile_seconds", lambda: sum(compiled))
     monkeypatch.setattr("er3a.pipeline.progress.time", SimpleNamespace(monotonic=lambda: 100.0 + sum(compiled)))
     budget = TimeBudget(30.0, 2)
     first = budget.next_piece()
