@@ -158,13 +158,11 @@ class Bodies:
     def free(self, q: Reals, margin: float = 0.0) -> Flags:
         """Whether nothing overlaps, (N,), in arms (N, n), and what no joint holds together is a margin (m) apart."""
         q = np.ascontiguousarray(q, float)
-        found = np.zeros((len(q), 1), bool)
-        which_overlap(self.layout, q, found)
-        clear = np.asarray(~found[:, 0])
-        if margin > 0:
-            near = np.zeros((int(clear.sum()), 1), bool)
-            which_overlap(_grown(self.layout, margin / 2), q[clear], near)
-            clear[clear] = ~near[:, 0]
+        clear = np.ones(len(q), bool)
+        for layout in (self.layout,) if margin <= 0 else _apart_by(self.layout, margin):
+            found = np.zeros((int(clear.sum()), 1), bool)
+            which_overlap(layout, q[clear], found)
+            clear[clear] = ~found[:, 0]
         return clear
 
     def surface_points(self, q: Reals, pair: int) -> Reals:
@@ -198,17 +196,16 @@ def _named(first: Body, second: Body) -> Pair:
     return LinkPair(first.link, second.link) if is_link[1] else CarriedAndLink(second.name, first.link)
 
 
-def _grown(layout: Layout, by: float) -> Layout:
-    """The pairs that no joint holds together, of bodies that are larger by so much (m) all around."""
-    solid, apart = layout.kind != HALF_SPACE, ~layout.joined
+def _apart_by(layout: Layout, margin: float) -> tuple[Layout, Layout]:
+    """The pairs that no joint holds together, of bodies larger by half a margin (m) all around, and the other pairs."""
+    solid, apart, by = layout.kind != HALF_SPACE, ~layout.joined, margin / 2
     points = layout.points.copy()
     points[layout.start[:-1][~solid] + 1, 0] += by
-    return layout._replace(
-        points=points,
-        radius=layout.radius + by * solid,
-        reach=layout.reach + by,
-        first=layout.first[apart],
-        second=layout.second[apart],
-        joined=layout.joined[apart],
-        inner=layout.inner[apart],
-    )
+    grown = layout._replace(points=points, radius=layout.radius + by * solid, reach=layout.reach + by)
+    return _of_pairs(grown, apart), _of_pairs(layout, layout.joined)
+
+
+def _of_pairs(layout: Layout, kept: Flags) -> Layout:
+    """A layout with some of its pairs."""
+    of_pairs = ("first", "second", "joined", "inner")
+    return layout._replace(**{name: getattr(layout, name)[kept] for name in of_pairs})

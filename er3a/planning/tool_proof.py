@@ -53,6 +53,7 @@ SHORTEST = 1e-9  # share of the duration
 SHORTEST_JERK = 2e-7  # share of the duration; below, jerks are differences of equal numbers
 SETTLED_ELSEWHERE = 1e-5  # share of the duration: shortest interval for what another interval breaks already
 BESIDE_EVENT = 2e-3, 1e-4  # shares of the duration: so near to a known singular pose no interval is made shorter
+# than that, nor where start, middle and end are singular
 MOST_INTERVALS = 240_000
 MANY_INTERVALS = 4_000  # beyond which means of jerks, which take two more poses each, pay
 FIRST_INTERVALS = 64
@@ -216,8 +217,10 @@ def prove(followed: Followed, required: ProofRequirements, singular: Reals) -> T
         least = np.where(broken, SETTLED_ELSEWHERE, SHORTEST) * duration
         least[4] = max(SHORTEST_JERK * duration, least[4])
         least[0] = (SETTLED_ELSEWHERE if broken.any() else SHORTEST) * duration
-        beside = _distance(singular, start, end) < BESIDE_EVENT[0] * duration
-        shortest = np.where(beside[:, None], np.maximum(least, BESIDE_EVENT[1] * duration), least)
+        hopeless = (_distance(singular, start, end) < BESIDE_EVENT[0] * duration) | _singular_throughout(
+            followed, found
+        )
+        shortest = np.where(hopeless[:, None], np.maximum(least, BESIDE_EVENT[1] * duration), least)
         again = (found.open & ((end - start)[:, None] > 2 * shortest)).any(axis=1) & (count <= MOST_INTERVALS)
         done.append(found.part(~again))
         middle = (start + end)[again] / 2
@@ -226,6 +229,15 @@ def prove(followed: Followed, required: ProofRequirements, singular: Reals) -> T
     for part in done:
         part.open[:, RATES] &= ~broken[RATES]
     return _proof(followed, done, singular)
+
+
+def _singular_throughout(followed: Followed, found: _Settled) -> Flags:
+    """Whether the Jacobian is singular at start, middle and end of intervals: halves of them are settled no better."""
+    throughout = np.isnan(found.rates[:, 0, 0]) & np.isfinite(found.q[:, 0])
+    share = followed.line.progress(np.stack([found.start[throughout], found.end[throughout]]))[0]
+    dq, _ = followed.through_jacobian(followed.joints_at(share).reshape(-1, found.q.shape[1]), share.ravel())
+    throughout[throughout] = np.isnan(dq[:, 0]).reshape(share.shape).all(axis=0)
+    return throughout
 
 
 def _acceleration_steps(followed: Followed) -> tuple[Reals, Reals]:
