@@ -124,6 +124,7 @@ class Tree:
             self.by_child[joint.child] = joint
             self.by_parent.setdefault(joint.parent, []).append(joint)
         self.links = {*self.by_parent, *self.by_child}
+        self.roots = sorted(set(self.by_parent) - set(self.by_child))
         self.moves: dict[str, bool] = {}  # of a joint: whether it or one behind it moves
         self.depth: dict[str, int] = {}  # most independent joints in a row from it on
         for joint in reversed(self._outwards()):
@@ -198,7 +199,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         if the file is no URDF, or names several arms (the candidates are named)
     """
     notes: list[str] = []
-    tree = Tree(path, [_joint(path, element, snap) for element in urdf_root(path).findall("joint")])
+    tree = tree_of(path, snap)
     for named, link in (("--base", base), ("--tip", tip)):
         if link is not None and link not in tree.links:
             raise InputError(path, named, f"there is no link '{link}'", f"Links: {_some(sorted(tree.links))}")
@@ -226,18 +227,16 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
     return UrdfChain(tuple(joints), tree.by_name, (*taken, *notes))
 
 
-def chain_ends(path: Path) -> list[str]:
-    """The links at which an arm may end, those that ``tip`` can name."""
-    tree = Tree(path, [_joint(path, element, False) for element in urdf_root(path).findall("joint")])
-    return [end for root in sorted(set(tree.by_parent) - set(tree.by_child)) for end in tree.ends(root)]
+def tree_of(path: Path, snap: bool) -> Tree:
+    """The joints of a URDF; :class:`InputError` if it is none."""
+    return Tree(path, [_joint(path, element, snap) for element in urdf_root(path).findall("joint")])
 
 
 def _root(tree: Tree) -> str:
-    roots = sorted(set(tree.by_parent) - set(tree.by_child))
-    if len(roots) != 1:
-        problem = f"{len(roots)} root links ({_some(roots) or 'a closed loop'})"
+    if len(tree.roots) != 1:
+        problem = f"{len(tree.roots)} root links ({_some(tree.roots) or 'a closed loop'})"
         raise InputError(tree.path, "joint", problem, "A serial chain has exactly one; name it by --base")
-    return roots[0]
+    return tree.roots[0]
 
 
 def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
