@@ -31,7 +31,7 @@ from er3a.files.kept_files import given_file
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import FORMS, POSITION, Orientation
 from er3a.files.units import JointsDeg, PositionMm, Triple, check_degrees, check_millimetres, joint_rates, joint_values
-from er3a.files.yaml_file import StrictModel, load, read_yaml
+from er3a.files.yaml_file import StrictModel, check_own_names, load, read_yaml
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -604,10 +604,9 @@ class PathFile(StrictModel):
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
         names = [entry.name for entry in self.paths]
-        for i, name in enumerate(names):
-            if name in names[:i]:
-                raise ValueError(f"paths[{i}].name: '{name}' names an earlier path too | Give each path its own name")
-            after = getattr(self.paths[i], "after", None)
+        check_own_names("paths", names)
+        for i, entry in enumerate(self.paths):
+            after = getattr(entry, "after", None)
             if after and after not in names[:i]:
                 raise ValueError(f"paths[{i}].after: no earlier path is named '{after}' | Name one that stands above")
         return self

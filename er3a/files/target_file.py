@@ -22,7 +22,7 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Name
 from er3a.files.units import JointsDeg, PositionMm, Triple, as_degrees, joint_values
-from er3a.files.yaml_file import StrictModel, load, parse
+from er3a.files.yaml_file import StrictModel, check_own_names, load, parse
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
@@ -241,10 +241,7 @@ class TargetFile(StrictModel):
 
     @model_validator(mode="after")
     def _own_names(self):
-        places: dict[str, int] = {}
-        for i, target in enumerate(self.targets):
-            if (first := places.setdefault(target.name, i)) != i:
-                raise ValueError(f"targets[{i}].name: '{target.name}' is also that of targets[{first}] | Rename it")
+        check_own_names("targets", [target.name for target in self.targets])
         return self
 
 
