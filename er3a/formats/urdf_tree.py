@@ -773,8 +773,9 @@ def _obj(points: Reals, faces: Integers) -> str:
 def _sizes(path: Path, where: str, shape: ElementTree.Element | None) -> Reals:
     """Sizes, m, of a box along x, y and z, of a cylinder (radius, length) or of a sphere (radius), none below 0."""
     kind = "" if shape is None else shape.tag
-    keys = {"box": {"size": (1.0, 1.0, 1.0)}, "cylinder": {"radius": None, "length": None}}.get(kind, {"radius": None})
-    sizes = np.concatenate([_numbers(path, where, shape, key, default) for key, default in keys.items()])
+    keys = {"box": ("size",), "cylinder": ("radius", "length")}.get(kind, ("radius",))
+    default = (1.0, 1.0, 1.0) if kind == "box" else None
+    sizes = np.concatenate([_numbers(path, where, shape, key, default) for key in keys])
     if (sizes < 0).any():
         raise InputError(path, where, f"a size of {sizes.min():g} m is below 0", "Write sizes above 0")
     return sizes

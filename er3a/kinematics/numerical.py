@@ -32,9 +32,19 @@ import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.geometry.transforms import check_poses
-from er3a.kinematics import solutions
 from er3a.kinematics.chain import arm_length, constant_links, joint_starts, multiply_rigid, post_rotate_z
 from er3a.kinematics.forward import checked_joints, jacobian
+from er3a.kinematics.solutions import (
+    BadGuess,
+    Iteration,
+    LimitBound,
+    NearestMiss,
+    NotFound,
+    PoseUnsolved,
+    SingularEnd,
+    Solutions,
+    Unreachable,
+)
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel, parallel_for
@@ -512,7 +522,7 @@ def solve(
     rotation_tolerance: float = TOLERANCE,
     seed: int = 0,
     threads: int = 1,
-) -> solutions.Solutions:
+) -> Solutions:
     """Solve poses by iteration from a start guess, then from random ones.
 
     Parameters
@@ -550,9 +560,7 @@ def solve(
     return search.solutions(T, q0, respect_limits, restarts, threads, explained=True)
 
 
-def nearest_arm(
-    robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: bool, restarts: int
-) -> solutions.Solutions:
+def nearest_arm(robot: Robot, T: Reals, q0: Reals, mask: Reals, respect_limits: bool, restarts: int) -> Solutions:
     """What :func:`solve` gives for one pose (4, 4), without the reason where it finds none: that takes ten times as
     long as the search."""
     search = _Search(robot, mask, np.full(2, TOLERANCE), seed=0)
@@ -585,24 +593,24 @@ class _Search:
 
     def solutions(
         self, T: Reals, q0: Reals, respect: bool, restarts: int, threads: int, *, explained: bool
-    ) -> solutions.Solutions:
+    ) -> Solutions:
         """Of poses (..., 4, 4) from starts (n,) or (..., n)."""
         robot, shape = self.robot, T.shape[:-2]
         poses = T.reshape(-1, 4, 4)
         starts_at = np.broadcast_to(q0, (*shape, robot.joints)).reshape(-1, robot.joints)
         q, error, starts = self.run(poses, starts_at, respect, restarts, threads)
         unsolved = tuple(
-            solutions.PoseUnsolved(int(n), self.explain(poses[n], q[n], error[n], respect, restarts))
+            PoseUnsolved(int(n), self.explain(poses[n], q[n], error[n], respect, restarts))
             for n in (np.flatnonzero(starts == 0) if explained else ())
         )
         q = q.reshape(*shape, robot.joints)
-        return solutions.Solutions(
+        return Solutions(
             robot,
             q,
             solved=(starts > 0).reshape(shape),
             within_limits=(starts > 0).reshape(shape) & within(robot, q),
             branch=np.full(shape, -1),
-            method=solutions.Iteration(1 + restarts),
+            method=Iteration(1 + restarts),
             unsolved=unsolved,
             position_error=error[:, 0].reshape(shape),
             rotation_error=error[:, 1].reshape(shape),
@@ -642,25 +650,25 @@ class _Search:
         low, high = np.where(robot.slides, middle - half, -np.pi), np.where(robot.slides, middle + half, np.pi)
         return low, high
 
-    def explain(self, T: Reals, q: Reals, error: Reals, respect: bool, restarts: int) -> solutions.NotFound:
+    def explain(self, T: Reals, q: Reals, error: Reals, respect: bool, restarts: int) -> NotFound:
         """Why one pose was not solved: its nearest arm and a search without what may have hindered it."""
-        miss = solutions.NearestMiss(float(error[0] * 1000), float(np.degrees(error[1])))
+        miss = NearestMiss(float(error[0] * 1000), float(np.degrees(error[1])))
         if restarts < DIAGNOSIS_RESTARTS:
             _, _, starts = self.run(T[None], q[None], respect, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
-                return solutions.BadGuess(miss, "other_starts")
+                return BadGuess(miss, "other_starts")
         if respect:
             free, _, starts = self.run(T[None], q[None], False, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
                 exceeded = limits_exceeded(self.robot, nearest_equivalent(self.robot, free[0], q))
-                return solutions.LimitBound(miss, exceeded) if exceeded else solutions.BadGuess(miss, "without_limits")
+                return LimitBound(miss, exceeded) if exceeded else BadGuess(miss, "without_limits")
         length = arm_length(self.robot)
         J = jacobian(self.robot, q)
         J[:3] /= length
         singular = np.linalg.svd(J[self.mask > 0], compute_uv=False)[-1] < RANK
         if singular and max(error[0] / length, error[1]) < NEARLY:
-            return solutions.SingularEnd(miss)
-        return solutions.Unreachable(miss)
+            return SingularEnd(miss)
+        return Unreachable(miss)
 
 
 def _checked_mask(mask: Reals | None) -> Reals:
