@@ -136,7 +136,6 @@ def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, posi
 
 
 STREAM_SAMPLES = 60
-MOST_SAMPLES = 2000
 SHOWN_HEADER = 60
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
