@@ -5,19 +5,17 @@ Of references that contradict each other, either may be right, so they ask for n
 open. Extremes over the joint limits are followed along with where they are attained: their derivative with respect to
 the table is that at the maximiser (envelope theorem).
 
-How far many tables are off what references state, component by component: as each quantity says it
-(:meth:`~er3a.references.quantities.Quantity.off`), those of one kind at once.
+In this order:
 
-Kernels that climb to the largest or smallest value of a measure of one arm, from where it was attained before.
-
-Newton's method with Levenberg's damping within the joint limits; bounds that are in the way are held. Derivatives are
-central differences.
-
-The largest value of a smooth function over a box of joint angles.
-
-Points spread evenly over the box and its corners are looked at in one batch; from the best of them Newton's method with
-the bounds that are in the way held, its Hessian made definite by the absolute values of its eigenvalues. Nothing is
-random.
+- :class:`Components`: how far many tables are off what references state, as each quantity says it
+  (:meth:`~er3a.references.quantities.Quantity.off`), those of one kind at once;
+- :func:`climber`: kernels that climb to the largest or smallest value of a measure of one arm, from where it was
+  attained before, by Newton's method with Levenberg's damping; bounds that are in the way are held, derivatives are
+  central differences;
+- :func:`peak`: the largest value of any smooth function over a box of joint angles. Points spread evenly over the box
+  and its corners are looked at in one batch; from the best of them Newton's method, its Hessian made definite by the
+  absolute values of its eigenvalues. Nothing is random;
+- :class:`Asked`: what is asked of a table, and by how much tables miss it.
 """
 
 from __future__ import annotations
