@@ -353,13 +353,18 @@ class ZeroRow(OfOneJoint):
     direction_origin: Name | None = None
 
 
-class JointLimitRow(OfOneJoint):
-    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a revolute joint without end."""
+class Ends(StrictModel):
+    """Limits in degrees, or in mm of what slides."""
 
     lower_deg: float | None = None
     upper_deg: float | None = None
     lower_mm: float | None = None
     upper_mm: float | None = None
+
+
+class JointLimitRow(Ends, OfOneJoint):
+    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a revolute joint without end."""
+
     continuous: bool = False
 
 
@@ -383,13 +388,8 @@ class WeightedJoints(StrictModel):
         return self
 
 
-class CombinedLimitRow(WeightedJoints):
+class CombinedLimitRow(Ends, WeightedJoints):
     """Limits of a sum of joints, such as J2 + J3; in mm if all of them are prismatic."""
-
-    lower_deg: float | None = None
-    upper_deg: float | None = None
-    lower_mm: float | None = None
-    upper_mm: float | None = None
 
 
 class CouplingRow(WeightedJoints):

@@ -35,6 +35,7 @@ FORMS: dict[str, tuple[str, ...]] = {
     "quaternion_wxyz": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
 }
+KNOWN_FORMS = "; or ".join(", ".join(names[:4]) + (" ..." if len(names) > 4 else "") for names in FORMS.values())
 TEXTS = ("note", "expect")
 REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MOST_JOINTS + 1))
 
@@ -52,10 +53,7 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     present = set(header)
     forms = [form for form, columns in FORMS.items() if present & set(columns)]
     if len(forms) != 1:
-        known = "; or ".join(
-            ", ".join(columns[:4]) + (" ..." if len(columns) > 4 else "") for columns in FORMS.values()
-        )
-        raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {known}")
+        raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {KNOWN_FORMS}")
     form = forms[0]
     columns = {"name": CsvColumn(str)} | {name: CsvColumn() for name in (*POSITION, *FORMS[form])}
     columns |= {name: CsvColumn(str, optional=True) for name in TEXTS if name in present}
