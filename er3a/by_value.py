@@ -168,6 +168,18 @@ class Sheet:
     left_out: int = 0
     facts: tuple[str, ...] = ()
 
+    @classmethod
+    def of_table(
+        cls,
+        heading: str,
+        columns: tuple[str, ...],
+        rows: Iterable[Sequence[Any]],
+        count: int,
+        facts: tuple[str, ...] = (),
+    ) -> Sheet:
+        """With the first of ``count`` rows of values."""
+        return cls(heading, columns, *first_rows(rows, count), facts)
+
 
 class Displayed(ABC):
     """Anything that shows itself as a sheet, to ``repr`` and ``print`` as well as to a notebook."""

@@ -16,8 +16,8 @@ from er3a.collision.along import clearance
 from er3a.files.kept_files import ROOT
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
+from er3a.geometry.transforms import inverted, moved, posed
 from er3a.kinematics.forward import forward
-from er3a.vision.calibration_set import inverted, moved, posed
 from er3a.vision.next_view import FieldOfView, board_visible
 
 SEED = 20261120

@@ -16,7 +16,7 @@ import numpy as np
 
 from er3a.errors import InputError
 from er3a.formats.urdf import UrdfImport, import_urdf
-from er3a.formats.urdf_tree import chain_ends
+from er3a.formats.urdf_tree import tree_of
 from er3a.robots.robot import Robot
 
 FAR = 10.0  # m or rad: the range that stands in for joints whose source tells none
@@ -133,6 +133,12 @@ def _make_packages_known(data: Path) -> None:
         packages.update_package_cache({folder.name if folder.name != "urdf" else folder.parent.name: folder})
     for folder in (*data.glob("xacro/*"), *data.glob("xacro/*/*"), *data.glob("armer_xarm/data/xacro")):
         packages.update_package_cache({folder.name: folder})
+
+
+def chain_ends(path: Path) -> list[str]:
+    """The links of a URDF at which an arm may end, those that ``tip`` can name."""
+    tree = tree_of(path, False)
+    return [end for root in tree.roots for end in tree.ends(root)]
 
 
 def chains_of(file: UrdfFile, most: int = 8) -> Iterator[tuple[str, UrdfImport] | tuple[str, InputError]]:

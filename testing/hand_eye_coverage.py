@@ -8,9 +8,10 @@ import numpy as np
 from scipy.stats import t as student
 
 from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import moved
 from er3a.kinematics.forward import forward
 from er3a.robots.robot import Robot
-from er3a.vision.calibration_set import CalibrationSet, moved
+from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import mean_pose, motions, park
 from er3a.vision.likelihood import PoseObservations, refine
 from er3a.vision.table_corrections import TableCorrections, correct_table

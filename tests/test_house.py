@@ -138,3 +138,10 @@ def test_docstrings_name_modules_that_are_there():
         for reference in re.findall(r":mod:`[~.]*([\w.]+)`", (ROOT / path).read_text(encoding="utf-8"))
     }
     assert [each for each in sorted(named) if each[1].split(".")[-1] not in names] == []
+
+
+def test_a_rooms_face_that_names_its_modules_names_all():
+    for face in (ROOT / "er3a").rglob("__init__.py"):
+        modules = {path.stem for path in face.parent.glob("*.py")} - {"__init__"}
+        named = set(re.findall(r"``(\w+)``", ast.get_docstring(ast.parse(face.read_text(encoding="utf-8"))) or ""))
+        assert len(named & modules) < 2 or modules <= named, (face, modules - named)

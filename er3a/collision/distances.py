@@ -626,42 +626,6 @@ def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: i
     return result, looked
 
 
-@kernel
-def judge_polyline(layout: Layout, q: Reals, depth: float, states: Integers) -> int:
-    """Whether each straight move (N - 1,) between neighbours of joint vectors (N, n) is FREE, MEETS or UNDECIDED.
-
-    A stretch of many moves is proven at once where the box about its middle that holds it is. ``depth`` is as for
-    :func:`free_between`; how many arms were looked at is returned.
-    """
-    room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-    n = q.shape[1]
-    placed = (np.empty(layout.links.shape), np.empty(layout.points.shape), np.empty(layout.centre.shape))
-    stack, half = np.empty((DEEPEST, 2), np.int64), np.empty(n)
-    stack[0, 0], stack[0, 1] = 0, len(q) - 1
-    height, looked = 1, 0
-    while height:
-        height -= 1
-        low, high = stack[height, 0], stack[height, 1]
-        if high - low == 1:
-            states[low], more = free_between(layout, q[low], q[high], depth, 10_000)
-            looked += more
-            continue
-        at = (low + high) // 2
-        half[:] = 0.0
-        for i in range(low, high + 1):
-            for j in range(n):
-                half[j] = max(half[j], abs(q[i, j] - q[at, j]))
-        state, _ = _box_state(layout, q[at], half, placed, room, near)
-        looked += 1
-        if state == FREE:
-            states[low:high] = FREE
-            continue
-        stack[height, 0], stack[height, 1] = at, high
-        stack[height + 1, 0], stack[height + 1, 1] = low, at
-        height += 2
-    return looked
-
-
 @inner_kernel
 def _set_box(box: Reals, low: Reals, high: Reals) -> None:
     """Written out: numba's assignment of a slice brings its error message with it, a second of compiling."""

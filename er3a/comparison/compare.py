@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -533,7 +533,8 @@ def _corrected(
     joint_zeros: Reals,
 ) -> Robot:
     """A's table with what differs taken from B, rounded; what agrees stays as it is printed."""
-    columns = {key: np.array(getattr(robot_a, key)) for key in ("a", "alpha", "beta", "d", "offset", "direction")}
+    named = "a", "alpha", "beta", "d", "offset", "direction"
+    columns: dict[str, Any] = {key: np.array(getattr(robot_a, key)) for key in named}
     for each in found.differences:
         angle = each.column in ("alpha", "beta", "theta")
         column = "offset" if each.column == "theta" else each.column
@@ -587,12 +588,7 @@ def _corrected(
         coupling=robot_a.coupling,
         zero_pose=robot_b.zero_pose,
         sources=sources,
-        a=columns["a"],
-        alpha=columns["alpha"],
-        beta=columns["beta"],
-        d=columns["d"],
-        offset=columns["offset"],
-        direction=columns["direction"],
+        **columns,
     )
 
 

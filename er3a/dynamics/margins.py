@@ -331,11 +331,9 @@ def load_diagram(
     if behind is None or not (wrist.moment or wrist.inertia):
         return None
     last, before = [np.full((len(mass), 1), np.inf) for _ in range(2)]
-    for joint, allowed in wrist.moment:
-        lever = allowed / (mass[:, None] * gravity)
-        last, before = (np.minimum(last, lever), before) if joint == robot.rows else (last, np.minimum(before, lever))
-    for joint, allowed in wrist.inertia:
-        lever = np.sqrt(allowed / mass[:, None])
+    levers_of = [(joint, allowed / (mass[:, None] * gravity)) for joint, allowed in wrist.moment]
+    levers_of += [(joint, np.sqrt(allowed / mass[:, None])) for joint, allowed in wrist.inertia]
+    for joint, lever in levers_of:
         last, before = (np.minimum(last, lever), before) if joint == robot.rows else (last, np.minimum(before, lever))
     with np.errstate(invalid="ignore"):
         across = np.minimum(np.sqrt(before**2 - (behind + along) ** 2), last)

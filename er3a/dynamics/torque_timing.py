@@ -19,7 +19,6 @@ References
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,15 +65,10 @@ def fastest_under_torques(model: ArmModel, q: Reals, speed: Reals, peak: Reals) 
         if there is no such time law
     """
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0) / speed, axis=1))])
-    kept = np.flatnonzero(np.concatenate([[True], np.diff(way) > timing.SAME_NODE]))
-    if len(kept) < 2:
+    if (path := timing.path_through(q, way)) is None:
         timed = timing.standing(q[-1], 0.0)
         return TimedTorques(timed, holding_torques(model, timed.q), 0.0)
-    kept[-1] = len(way) - 1
-    q, way = q[kept], way[kept]
-    if len(way) == 2:
-        q, way = np.linspace(q[0], q[1], timing.STRAIGHT_NODES), np.linspace(0.0, way[1], timing.STRAIGHT_NODES)
-    spline = scipy.interpolate.CubicSpline(way, q)
+    _, way, spline = path
     along = TorquesAlong.along(model, way, spline, speed, peak)
     least, ceiling = along.least_time()
     pace, t = along.fastest(ceiling)
@@ -170,28 +164,20 @@ class TorquesAlong:
 
     def _solved(self, rows: Rows, ceiling: Reals) -> tuple[Reals, Reals]:
         """Speeds s', at most ``ceiling``, and times (s) at the nodes (N,); rows hold at both ends of each step."""
-        toppra, way = _library(), self.way
+        constraint, way = timing.toppra_library().constraint, self.way
 
-        class Torques(toppra.constraint.LinearConstraint):  # type: ignore[misc, name-defined]
+        class Torques(constraint.LinearConstraint):  # type: ignore[misc, name-defined]
             def get_dof(self) -> int:
                 return count
 
             def compute_constraint_params(self, path: Any, gridpoints: Any) -> Any:
-                collocated = toppra.constraint.linear_constraint.canlinear_colloc_to_interpolate
+                collocated = constraint.linear_constraint.canlinear_colloc_to_interpolate
                 squares = np.stack([np.zeros(len(way)), ceiling**2], axis=1)
                 return collocated(*rows, None, squares, gridpoints, identical=False)
 
         count = len(self.speed)
-        speeds = toppra.constraint.JointVelocityConstraint(np.stack([-self.speed, self.speed], axis=1))
-        path = _path(way, self.spline)
-        solver = toppra.algorithm.TOPPRA([speeds, Torques()], path, gridpoints=way, solver_wrapper="seidel")
-        _, pace, _ = solver.compute_parameterization(0, 0)
-        if pace is None or not np.isfinite(pace).all():
-            raise timing.TimingError(timing.NoTimeLawFound())
-        between = (pace[:-1] + pace[1:]) / 2
-        if (between <= 0).any():
-            raise timing.TimingError(timing.MustStandStill())
-        return np.asarray(pace, float), np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
+        speeds = constraint.JointVelocityConstraint(np.stack([-self.speed, self.speed], axis=1))
+        return timing.solved(timing.toppra_path(way, self.spline, AT_REST), way, [speeds, Torques()])
 
 
 def _torque_rows(
@@ -206,43 +192,8 @@ def _torque_rows(
         whole: Reals = (rigid + model.tool_torques(q[None]))[0] + armature * qdd
         return whole
 
-    constraint = _library().constraint.JointTorqueConstraint(
+    constraint = timing.toppra_library().constraint.JointTorqueConstraint(
         torques, np.stack([-peak, peak], axis=1), known(drives.coulomb)
     )
-    a, b, c = constraint.compute_constraint_params(_path(way, spline), way)[:3]
+    a, b, c = constraint.compute_constraint_params(timing.toppra_path(way, spline, AT_REST), way)[:3]
     return a, b, c
-
-
-def _path(way: Reals, spline: scipy.interpolate.CubicSpline) -> Any:
-    """The path as toppra takes it; a joint whose slope is rounding alone is at rest and has no friction."""
-    count: int = spline.c.shape[-1]
-
-    class Path(_library().interpolator.AbstractGeometricPath):  # type: ignore[misc]
-        dof, waypoints = count, None
-        path_interval = np.array([way[0], way[-1]])
-
-        def __call__(self, at: Reals, order: int = 0) -> Any:
-            values = spline(at, order)
-            return np.where(np.abs(values) > AT_REST, values, 0.0) if order == 1 else values
-
-    return Path()
-
-
-def _library() -> Any:
-    """The module ``toppra``.
-
-    Raises
-    ------
-    TimingError
-        if it is not installed
-    """
-    try:
-        with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
-            warnings.simplefilter("ignore")
-            import toppra
-            import toppra.algorithm
-            import toppra.constraint.linear_constraint
-            import toppra.interpolator
-    except ModuleNotFoundError:
-        raise timing.TimingError(timing.ToppraMissing()) from None
-    return toppra

@@ -13,14 +13,13 @@ import scipy
 
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
 from er3a.dynamics.pose_bound import Bounded, Size, bounded_torque, max_over_poses
-from er3a.errors import RobotError, ShapeError
+from er3a.errors import ShapeError
 from er3a.kinematics.forward import checked_joints
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, Load
 from er3a.robots.robot import Robot
 
-SINGULAR = 1e-12
 """A mass matrix whose smallest eigenvalue is less than that of its greatest has none that can be inverted."""
 
 AT_REST = 1e-5
@@ -91,26 +90,6 @@ def gravity(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
     """Torques (..., n) in N m (N) that hold the arm at rest, forces at the tool included; errors as :func:`torques`."""
     (q,), shape = _flat(robot, {"q": q})
     return holding_torques(arm_model(robot, load), q).reshape(shape)
-
-
-def accelerations(robot: Robot, q: Reals, qd: Reals, tau: Reals, load: Load | None = None) -> Reals:
-    """Accelerations (..., n) under drive torques (..., n): the forward dynamics, by the mass matrix.
-
-    Raises
-    ------
-    RobotError
-        if the mass matrix can't be inverted: the link of a joint has no inertia, so any torque would turn it endlessly
-    """
-    (q, qd, tau), shape = _flat(robot, {"q": q, "qd": qd, "tau": tau})
-    M = mass_matrix(robot, q, load)
-    values, vectors = np.linalg.eigh(M)
-    weak = values[:, 0] <= SINGULAR * values[:, -1]
-    if weak.any():
-        joint = int(np.abs(vectors[weak][0, :, 0]).argmax()) + 1
-        raise RobotError(robot.name, f"joint {joint} moves nothing that has inertia, so accelerations have no value")
-    rest = torque_parts(arm_model(robot, load), q, qd, np.zeros_like(q)).total
-    found: Reals = np.asarray(np.linalg.solve(M, (tau - rest)[..., None])[..., 0], dtype=float).reshape(shape)
-    return found
 
 
 def torque_parts(model: ArmModel, q: Reals, qd: Reals, qdd: Reals) -> TorqueParts:

@@ -108,19 +108,17 @@ def write_urdf_references(
     *,
     base: str | None = None,
     tip: str | None = None,
-    title: str = "",
-    half_widths: tuple[float, float] = (LEAST_MM, LEAST_DEG),
 ) -> list[Path]:
     """Write axes, flange poses with orientation, limits and speeds as a URDF has them, with their document.
 
-    The flange is the tip; half-widths follow from the digits that the URDF prints. What it does not state is left out:
-    limits of continuous joints, and those of prismatic joints, which references don't know.
+    The flange is the tip; half-widths follow from the digits that the URDF prints, and are no less than those of a
+    printed table. What it does not state is left out: limits of continuous joints, and those of prismatic joints, which
+    references don't know.
 
     Parameters
     ----------
-    path : a URDF; base, tip : links at which the arm begins and ends; title : of the document
+    path : a URDF; base, tip : links at which the arm begins and ends
     folder : made if it is not there
-    half_widths : mm and deg, the least
 
     Returns
     -------
@@ -131,11 +129,11 @@ def write_urdf_references(
         raise InputError(folder, None, f"holds references already ({', '.join(held)})", "Name an empty or a new folder")
     found = urdf_statements(path, base=base, tip=tip)
     document = robot_name(path)
-    mm = max(half_widths[0], float(np.ceil(found.half_width_m * MM * 1e3)) / 1e3)
-    deg = max(half_widths[1], float(np.ceil(np.degrees(found.half_width_rad) * 1e3)) / 1e3)
+    mm = max(LEAST_MM, float(np.ceil(found.half_width_m * MM * 1e3)) / 1e3)
+    deg = max(LEAST_DEG, float(np.ceil(np.degrees(found.half_width_rad) * 1e3)) / 1e3)
     behind = (f"{path.name}, chain to the tip", "export", document)
     tables: dict[str, Table] = {
-        FILE: [("name", "title", "publisher", "derived_from"), (document, title or f"URDF {path.name}", path.name, "")],
+        FILE: [("name", "title", "publisher", "derived_from"), (document, f"URDF {path.name}", path.name, "")],
         "axes.csv": _axes(found, (mm, deg), behind),
         "positions.csv": _positions(found, (mm, deg), behind),
         "limits.csv": _limits(found, behind),

@@ -29,13 +29,13 @@ from er3a.files.robot_file import Text
 from er3a.files.target_file import FORMS as TARGET_FORMS
 from er3a.files.units import METRES_BELOW_MM, WIDEST_IN_RADIANS
 from er3a.files.yaml_file import StrictModel, load
-from er3a.geometry.transforms import transform
+from er3a.geometry.transforms import exp_rotation, posed, transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
-from er3a.vision.calibration_set import CalibrationSet, Stream, TimeOffset, exp_rotation, paired, posed, time_offset
+from er3a.vision.calibration_set import CalibrationSet, Stream, TimeOffset, paired, time_offset
 
 FORMS: dict[str, tuple[str, ...]] = {
     **{name: TARGET_FORMS[name] for name in ("quaternion_wxyz", "rpy_deg", "matrix")},
@@ -136,7 +136,6 @@ def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, posi
 
 
 STREAM_SAMPLES = 60
-MOST_SAMPLES = 2000
 SHOWN_HEADER = 60
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"

@@ -29,9 +29,9 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.kept_files import given_file
 from er3a.files.robot_file import Name, Text
-from er3a.files.target_file import FORMS, POSITION, Orientation
+from er3a.files.target_file import FORMS, KNOWN_FORMS, POSITION, Orientation
 from er3a.files.units import JointsDeg, PositionMm, Triple, check_degrees, check_millimetres, joint_rates, joint_values
-from er3a.files.yaml_file import StrictModel, load, read_yaml
+from er3a.files.yaml_file import StrictModel, check_own_names, load, read_yaml
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -97,11 +97,8 @@ def read_path_table(path: str | Path) -> PathTable:
             path, "header", f"two forms of orientation, {forms[0]} and {forms[1]}", "Keep the columns of one"
         )
     if not of_joints and not forms:
-        known = "; or ".join(
-            ", ".join(columns[:4]) + (" ..." if len(columns) > 4 else "") for columns in FORMS.values()
-        )
         problem = "no orientation" if header & set(POSITION) else "neither joint angles nor poses"
-        remedy = f"Give the columns x_mm, y_mm, z_mm with {known}; or q1_deg .. qn_deg"
+        remedy = f"Give the columns x_mm, y_mm, z_mm with {KNOWN_FORMS}; or q1_deg .. qn_deg"
         raise InputError(path, "header", f"the table has {problem}", remedy)
     columns = own if of_joints else (*POSITION, *FORMS[forms[0]])
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
@@ -604,10 +601,9 @@ class PathFile(StrictModel):
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
         names = [entry.name for entry in self.paths]
-        for i, name in enumerate(names):
-            if name in names[:i]:
-                raise ValueError(f"paths[{i}].name: '{name}' names an earlier path too | Give each path its own name")
-            after = getattr(self.paths[i], "after", None)
+        check_own_names("paths", names)
+        for i, entry in enumerate(self.paths):
+            after = getattr(entry, "after", None)
             if after and after not in names[:i]:
                 raise ValueError(f"paths[{i}].after: no earlier path is named '{after}' | Name one that stands above")
         return self

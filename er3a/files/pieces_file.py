@@ -1,4 +1,4 @@
-"""Files of convex pieces (:mod:`er3a.files.pieces_file`); studies need neither the mesh nor what reads it."""
+"""Files of convex pieces, as ``er3a mesh`` writes them; studies need neither the mesh nor what reads it."""
 
 from __future__ import annotations
 

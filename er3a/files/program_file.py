@@ -8,9 +8,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from er3a.files.robot_file import Name, Placement, Text, check_placement
-from er3a.files.robot_library import placement_transform
 from er3a.files.units import JointsDeg, joint_values
-from er3a.files.yaml_file import StrictModel, load
+from er3a.files.yaml_file import StrictModel, check_own_names, load
 from er3a.numerics.arrays import Reals
 from er3a.programs.syntax import ProgramOutcome
 from er3a.robots.robot import Robot
@@ -44,10 +43,7 @@ class ProgramsFile(StrictModel):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        names = [entry.name for entry in self.programs]
-        for i, name in enumerate(names):
-            if name in names[:i]:
-                raise ValueError(f"programs[{i}].name: '{name}' names an earlier program too | Give each its own name")
+        check_own_names("programs", [entry.name for entry in self.programs])
         return self
 
     @model_validator(mode="after")
@@ -58,7 +54,7 @@ class ProgramsFile(StrictModel):
 
     def transforms(self) -> dict[str, Reals]:
         """The frames (4, 4) in m by name."""
-        return {name: placement_transform(placement) for name, placement in self.frames.items()}
+        return {name: placement.transform() for name, placement in self.frames.items()}
 
 
 def load_programs(path: str | Path) -> ProgramsFile:

@@ -71,7 +71,7 @@ class Format:
     columns : without source, grade, origin and what its uncertainties are, which every table has
     digits, sliding_digits : where a line gives no uncertainty, it is half the last digit of these columns; the latter
         of a prismatic joint
-    gather : from a line's fields to those of the row
+    gather : makes a line's fields, which it may change, to those of the row
     faults : what is wrong with a line
     coarse : the uncertainty where a line gives none, of tables without digits
     mixed_lengths, mixed_limits : whether single lines in metres, or limits in radians, beside others are refused
@@ -98,12 +98,11 @@ class Format:
 
 
 def _axis_fields(fields: Fields) -> Fields:
-    values = dict(fields)
-    values["direction"] = tuple(values.pop(name) for name in _DIRECTION)
-    point = tuple(values.pop(name) for name in _XYZ)
-    values["point_mm"] = None if None in point else point
-    values["signed"] = values["signed"] == "yes"
-    return values
+    fields["direction"] = tuple(fields.pop(name) for name in _DIRECTION)
+    point = tuple(fields.pop(name) for name in _XYZ)
+    fields["point_mm"] = None if None in point else point
+    fields["signed"] = fields["signed"] == "yes"
+    return fields
 
 
 def _axis_faults(fields: Fields) -> Iterator[Fault]:
@@ -116,13 +115,12 @@ def _axis_faults(fields: Fields) -> Iterator[Fault]:
 
 
 def _position_fields(fields: Fields) -> Fields:
-    values = dict(fields)
-    values["pose"] = _pose(values)
-    values["xyz_mm"] = tuple(values.pop(name) for name in _XYZ)
-    values["orientation"] = _orientation(values)
+    fields["pose"] = _pose(fields)
+    fields["xyz_mm"] = tuple(fields.pop(name) for name in _XYZ)
+    fields["orientation"] = _orientation(fields)
     for name in ORIENTATION_COLUMNS:
-        del values[name]
-    return values
+        del fields[name]
+    return fields
 
 
 def _written_as(fields: Fields) -> list[tuple[str, ...]]:
@@ -184,16 +182,14 @@ def _pose(fields: Fields) -> Pose:
 
 
 def _observation_fields(fields: Fields) -> Fields:
-    values = dict(fields)
-    values["pose"] = _pose(values)
-    return values
+    fields["pose"] = _pose(fields)
+    return fields
 
 
 def _envelope_fields(fields: Fields) -> Fields:
-    values = dict(fields)
-    corner = (values.pop("q2_deg"), values.pop("q3_deg"))
-    values["corner_deg"] = None if corner == (None, None) else corner
-    return values
+    corner = (fields.pop("q2_deg"), fields.pop("q3_deg"))
+    fields["corner_deg"] = None if corner == (None, None) else corner
+    return fields
 
 
 def _envelope_faults(fields: Fields) -> Iterator[Fault]:

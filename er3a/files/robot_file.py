@@ -20,6 +20,7 @@ from er3a.numerics.si_units import in_si
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
 from er3a.robots.robot import MOST_JOINTS, Grade, PairRule, Robot, Visual
 
+NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 HEAVIEST_LINK_KG = 20_000.0
 HEAVIEST_PAYLOAD_KG = 2_500.0
 """The strongest arms carry 2.3 t."""
@@ -48,11 +49,32 @@ def _mass(value: float) -> float:
     return value
 
 
+Text = Annotated[str, Field(min_length=1, max_length=2000)]
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 JointNumber = Annotated[int, Field(ge=1, le=MOST_JOINTS)]
 Mass = Annotated[float, AfterValidator(_mass)]
 Positive = Annotated[float, AfterValidator(_positive)]
 NotNegative = Annotated[float, Field(ge=0)]
 SixMoments = Annotated[list[float], Field(min_length=6, max_length=6)]
+
+
+class Sourced(StrictModel):
+    """A group of values with its source and grade; ``origin``: its document, by its name in the reference sets."""
+
+    source: Text
+    grade: Grade
+    origin: Name | None = None
+
+
+class Placement(StrictModel):
+    """A rigid transform: position, and roll-pitch-yaw with R = Rz(yaw) Ry(pitch) Rx(roll)."""
+
+    xyz_mm: Triple = [0.0, 0.0, 0.0]
+    rpy_deg: Triple = [0.0, 0.0, 0.0]
+
+    def transform(self) -> np.ndarray:
+        """(4, 4), m."""
+        return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
 
 
 class BodyFields(StrictModel):
@@ -89,12 +111,10 @@ class LinkRow(BodyFields):
     link: Annotated[int, Field(ge=0, le=MOST_JOINTS)]
 
 
-class JointOrigin(StrictModel):
+class JointOrigin(Placement):
     """Where a URDF has a joint's frame, in the frame of the link before."""
 
     joint: JointNumber
-    xyz_mm: Triple = [0.0, 0.0, 0.0]
-    rpy_deg: Triple = [0.0, 0.0, 0.0]
 
     @model_validator(mode="after")
     def _in_degrees(self):
@@ -102,7 +122,7 @@ class JointOrigin(StrictModel):
         return self
 
 
-class InertiaFields(StrictModel):
+class Inertia(Sourced):
     """Bodies of the links, in one of three kinds of frames.
 
     ``joint``: on the axis of the link's joint and moving with it, as for the envelopes. ``dh``: the frame of the
@@ -148,7 +168,7 @@ class DriveRow(StrictModel):
     peak_n: Positive | None = None
 
 
-class DriveFields(StrictModel):
+class DriveGroup(Sourced):
     """One row for each joint of which something is known."""
 
     rows: Annotated[list[DriveRow], Field(min_length=1, max_length=MOST_JOINTS)]
@@ -162,14 +182,14 @@ class WristRow(StrictModel):
     inertia_kg_m2: Positive | None = None
 
 
-class WristLoadFields(StrictModel):
+class WristLoadGroup(Sourced):
     """Rated payload, and allowed moments and inertias at the wrist's axes."""
 
     payload_kg: Positive | None = None
     rows: Annotated[list[WristRow], Field(max_length=MOST_JOINTS)] = []
 
 
-class WeightFields(StrictModel):
+class Weight(Sourced):
     """The weight of the whole arm, as its manufacturer states it."""
 
     kg: Positive
@@ -180,7 +200,7 @@ SLIDING = ("armature_kg", "coulomb_n", "viscous_n_s_m", "rated_n", "peak_n")
 
 
 def check_masses(
-    inertia: InertiaFields | None, drives: DriveFields | None, wrist: WristLoadFields | None, slides: Sequence[bool]
+    inertia: Inertia | None, drives: DriveGroup | None, wrist: WristLoadGroup | None, slides: Sequence[bool]
 ) -> None:
     """Reject links and joints the arm does not have, and units of the other type of joint: ``ValueError``."""
     rows: list[tuple[str, Sequence[DriveRow | WristRow]]] = [("drives", drives.rows if drives else [])]
@@ -205,10 +225,10 @@ def check_masses(
 
 def masses_of(
     robot: Robot,
-    inertia: InertiaFields | None,
-    drives: DriveFields | None,
-    wrist: WristLoadFields | None,
-    weight: WeightFields | None,
+    inertia: Inertia | None,
+    drives: DriveGroup | None,
+    wrist: WristLoadGroup | None,
+    weight: Weight | None,
 ) -> Masses:
     """The library's data of a robot's groups; ``robot`` is the arm with its table, for the frames."""
     return Masses(
@@ -219,7 +239,7 @@ def masses_of(
     )
 
 
-def link_masses(robot: Robot, inertia: InertiaFields) -> tuple[LinkMass, ...]:
+def link_masses(robot: Robot, inertia: Inertia) -> tuple[LinkMass, ...]:
     """Bodies in the frames that move with the joints."""
     placed = robot.replace(base=np.eye(4), masses=Masses())
     at_zero = np.array([np.eye(4), *(_at_zero(placed, constant_links(placed)[: k + 1]) for k in range(robot.rows))])
@@ -230,7 +250,7 @@ def link_masses(robot: Robot, inertia: InertiaFields) -> tuple[LinkMass, ...]:
             stated[k] = _at_zero(placed, links[:-1]) @ links[-1]
     T = np.eye(4)
     for origin in inertia.origins:
-        T = T @ transform(np.array(origin.xyz_mm) / 1000, np.radians(origin.rpy_deg))
+        T = T @ origin.transform()
         stated[origin.joint] = T
     own = np.linalg.inv(at_zero) @ stated
     return tuple(LinkMass(row.link, moved(row.body, own[row.link])) for row in inertia.links)
@@ -244,7 +264,7 @@ def _at_zero(robot: Robot, links: np.ndarray) -> np.ndarray:
     return T
 
 
-def _drives(robot: Robot, group: DriveFields) -> Drives:
+def _drives(robot: Robot, group: DriveGroup) -> Drives:
     columns = {key: np.full(robot.joints, np.nan) for key in ("armature", "coulomb", "viscous", "rated", "peak")}
     ratio = np.full(robot.joints, np.nan)
     for row in group.rows:
@@ -255,7 +275,7 @@ def _drives(robot: Robot, group: DriveFields) -> Drives:
     return Drives(gear_ratio=ratio, **columns)
 
 
-def _wrist(group: WristLoadFields) -> WristLoad:
+def _wrist(group: WristLoadGroup) -> WristLoad:
     return WristLoad(
         payload=np.nan if group.payload_kg is None else group.payload_kg,
         moment=tuple((row.joint, row.moment_n_m) for row in group.rows if row.moment_n_m is not None),
@@ -263,7 +283,6 @@ def _wrist(group: WristLoadFields) -> WristLoad:
     )
 
 
-NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 SHORTEST_PLAIN_LENGTH_MM = 2.0
 LONGEST_LENGTH_MM = 20_000.0
 FAR_NORMAL_MM = 5_000.0
@@ -275,8 +294,6 @@ FASTEST_DEG_S = 36_000.0
 FASTEST_MM_S = 100_000.0
 MOST_FACTOR = 100.0
 
-Text = Annotated[str, Field(min_length=1, max_length=2000)]
-Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 JointType = Literal["revolute", "prismatic"]
 
 
@@ -289,14 +306,6 @@ def _inside_the_study(value: str) -> str:
 
 PiecesPath = Annotated[Text, AfterValidator(_inside_the_study)]
 """A file that ``er3a mesh`` wrote, below the folder that the study is run in."""
-
-
-class Sourced(StrictModel):
-    """A group of values with its source and grade; ``origin``: its document, by its name in the reference sets."""
-
-    source: Text
-    grade: Grade
-    origin: Name | None = None
 
 
 class OfOneJoint(StrictModel):
@@ -344,13 +353,18 @@ class ZeroRow(OfOneJoint):
     direction_origin: Name | None = None
 
 
-class JointLimitRow(OfOneJoint):
-    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a revolute joint without end."""
+class Ends(StrictModel):
+    """Limits in degrees, or in mm of what slides."""
 
     lower_deg: float | None = None
     upper_deg: float | None = None
     lower_mm: float | None = None
     upper_mm: float | None = None
+
+
+class JointLimitRow(Ends, OfOneJoint):
+    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a revolute joint without end."""
+
     continuous: bool = False
 
 
@@ -374,13 +388,8 @@ class WeightedJoints(StrictModel):
         return self
 
 
-class CombinedLimitRow(WeightedJoints):
+class CombinedLimitRow(Ends, WeightedJoints):
     """Limits of a sum of joints, such as J2 + J3; in mm if all of them are prismatic."""
-
-    lower_deg: float | None = None
-    upper_deg: float | None = None
-    lower_mm: float | None = None
-    upper_mm: float | None = None
 
 
 class CouplingRow(WeightedJoints):
@@ -429,13 +438,6 @@ class Coupling(Sourced):
     rows: Annotated[list[CouplingRow], Field(min_length=1, max_length=MOST_JOINTS)]
 
 
-class Placement(StrictModel):
-    """A rigid transform: position, and roll-pitch-yaw with R = Rz(yaw) Ry(pitch) Rx(roll)."""
-
-    xyz_mm: Triple = [0.0, 0.0, 0.0]
-    rpy_deg: Triple = [0.0, 0.0, 0.0]
-
-
 class SourcedPlacement(Placement, Sourced):
     pass
 
@@ -458,13 +460,11 @@ class Capsule(StrictModel):
         return values
 
 
-class LinkPieces(StrictModel):
+class LinkPieces(Placement):
     """Convex pieces of a mesh (``pieces``: a file written by ``er3a mesh``), placed in the frame of joint ``link``."""
 
     link: Annotated[int, Field(ge=0)]
     pieces: PiecesPath
-    xyz_mm: Triple = [0.0, 0.0, 0.0]
-    rpy_deg: Triple = [0.0, 0.0, 0.0]
 
 
 class LinkHull(StrictModel):
@@ -559,22 +559,6 @@ class CollisionPairs(StrictModel):
                     problem = "is decided twice" if pair in seen else "is one body with itself"
                     raise ValueError(f"{where}: the pair {' and '.join(entry.pair)} {problem} | Remove it")
                 seen.add(pair)
-
-
-class Inertia(InertiaFields, Sourced):
-    pass
-
-
-class DriveGroup(DriveFields, Sourced):
-    pass
-
-
-class WristLoadGroup(WristLoadFields, Sourced):
-    pass
-
-
-class Weight(WeightFields, Sourced):
-    pass
 
 
 class RobotFile(StrictModel):

@@ -15,9 +15,8 @@ from er3a.files import robot_file
 from er3a.files.dh_table import read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.pieces_file import load_pieces
-from er3a.files.units import Triple
 from er3a.files.yaml_file import StrictModel, load
-from er3a.geometry.transforms import rot_x, rot_y, transform, translation
+from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
 from er3a.robots.robot import (
@@ -201,7 +200,7 @@ def _hulls(group: robot_file.Envelopes | None) -> tuple[ConvexPiece, ...]:
     """Hulls that are written in the file, and those of files of convex pieces."""
     found: list[ConvexPiece] = []
     for mesh in group.meshes if group else ():
-        content, T = load_pieces(own_or_shipped(mesh.pieces)), placement_transform(robot_file.Placement(**_place(mesh)))
+        content, T = load_pieces(own_or_shipped(mesh.pieces)), mesh.transform()
         found += [_hull(mesh.link, p @ T[:3, :3].T + T[:3, 3], content.uncovered_mm / 1000) for p in content.pieces()]
     for hull in group.hulls if group else ():
         found.append(_hull(hull.link, np.array(hull.points_mm) / 1000, hull.margin_mm / 1000))
@@ -212,29 +211,21 @@ def _hull(link: int, points: Reals, margin: float) -> ConvexPiece:
     return ConvexPiece(link, tuple((float(x), float(y), float(z)) for x, y, z in points), margin)
 
 
-def _place(mesh: robot_file.LinkPieces) -> dict[str, list[float]]:
-    return {"xyz_mm": mesh.xyz_mm, "rpy_deg": mesh.rpy_deg}
-
-
 def placement_transform(placement: robot_file.Placement | None) -> np.ndarray:
     """The (4, 4) transform of a placement in mm and degrees; the identity for None."""
-    if placement is None:
-        return np.eye(4)
-    return transform(np.array(placement.xyz_mm) / 1000, np.radians(placement.rpy_deg))
+    return np.eye(4) if placement is None else placement.transform()
 
 
 THREE_ZEROS = [0.0, 0.0, 0.0]
 Newton = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=3, max_length=3)]
 
 
-class MeshMass(StrictModel):
+class MeshMass(robot_file.Placement):
     """A body from a closed mesh: ``unit_mm`` is what a unit of the file is in mm; placed in the flange's frame."""
 
     file: Annotated[str, Field(min_length=1, max_length=1000)]
     density_kg_m3: Annotated[float, Field(ge=1, le=25_000)]
     unit_mm: Annotated[float, Field(ge=1e-3, le=1e4)] = 1.0
-    xyz_mm: Triple = THREE_ZEROS
-    rpy_deg: Triple = THREE_ZEROS
 
 
 class LoadFields(StrictModel):
@@ -278,15 +269,7 @@ def load_of(loads: list[LoadFields]) -> Load | None:
     body = together([_body(each) for each in loads])
     force, moment = (np.sum([getattr(each, key) for each in loads], axis=0) for key in ("force_n", "moment_n_m"))
     (fx, fy, fz), (mx, my, mz) = force.tolist(), moment.tolist()
-    return Load(
-        body.mass,
-        body.centre,
-        body.inertia,
-        body.mass_tolerance,
-        body.centre_tolerance,
-        force=(fx, fy, fz),
-        moment=(mx, my, mz),
-    )
+    return Load(**vars(body), force=(fx, fy, fz), moment=(mx, my, mz))
 
 
 def _body(load: LoadFields) -> MassBody:
@@ -315,4 +298,4 @@ def mesh_body(given: MeshMass) -> MassBody:
         raise InputError(given.file, None, robot_file.IMPOSSIBLE[problem], "Check the mesh")
     if body.mass > robot_file.HEAVIEST_PAYLOAD_KG:
         raise InputError(given.file, None, f"makes {body.mass:g} kg", "Check unit_mm: 1 for mm, 1000 for m")
-    return moved(body, transform(np.array(given.xyz_mm) / 1000, np.radians(given.rpy_deg)))
+    return moved(body, given.transform())

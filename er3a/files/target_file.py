@@ -22,7 +22,7 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Name
 from er3a.files.units import JointsDeg, PositionMm, Triple, as_degrees, joint_values
-from er3a.files.yaml_file import StrictModel, load, parse
+from er3a.files.yaml_file import StrictModel, check_own_names, load, parse
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
@@ -35,6 +35,7 @@ FORMS: dict[str, tuple[str, ...]] = {
     "quaternion_wxyz": ("qw", "qx", "qy", "qz"),
     "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
 }
+KNOWN_FORMS = "; or ".join(", ".join(names[:4]) + (" ..." if len(names) > 4 else "") for names in FORMS.values())
 TEXTS = ("note", "expect")
 REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MOST_JOINTS + 1))
 
@@ -52,10 +53,7 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     present = set(header)
     forms = [form for form, columns in FORMS.items() if present & set(columns)]
     if len(forms) != 1:
-        known = "; or ".join(
-            ", ".join(columns[:4]) + (" ..." if len(columns) > 4 else "") for columns in FORMS.values()
-        )
-        raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {known}")
+        raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {KNOWN_FORMS}")
     form = forms[0]
     columns = {"name": CsvColumn(str)} | {name: CsvColumn() for name in (*POSITION, *FORMS[form])}
     columns |= {name: CsvColumn(str, optional=True) for name in TEXTS if name in present}
@@ -241,10 +239,7 @@ class TargetFile(StrictModel):
 
     @model_validator(mode="after")
     def _own_names(self):
-        places: dict[str, int] = {}
-        for i, target in enumerate(self.targets):
-            if (first := places.setdefault(target.name, i)) != i:
-                raise ValueError(f"targets[{i}].name: '{target.name}' is also that of targets[{first}] | Rename it")
+        check_own_names("targets", [target.name for target in self.targets])
         return self
 
 

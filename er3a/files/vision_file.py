@@ -11,11 +11,10 @@ from pydantic import Field, model_validator
 
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import Positive, StandardDeviations
-from er3a.files.robot_file import Name, Text
+from er3a.files.robot_file import Name, Placement, Text
 from er3a.files.target_file import UNIT_LENGTH_TOLERANCE, Line
 from er3a.files.units import PositionMm, RpyDeg, Triple
-from er3a.files.yaml_file import StrictModel, load
-from er3a.geometry.transforms import transform
+from er3a.files.yaml_file import StrictModel, check_own_names, load
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.robot import Robot
@@ -81,7 +80,7 @@ class GripperEntry(StrictModel):
     tolerance_deg: Tolerances
 
 
-class GraspEntry(StrictModel):
+class GraspEntry(Placement):
     """The tool in the object's frame; its z axis is the direction of approach."""
 
     name: Name
@@ -90,7 +89,7 @@ class GraspEntry(StrictModel):
 
     def grasp(self) -> Grasp:
         """In the units of the library."""
-        return Grasp(self.name, transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg)))
+        return Grasp(self.name, self.transform())
 
 
 class ObjectEntry(StrictModel):
@@ -156,12 +155,7 @@ class VisionFile(StrictModel):
 
     @model_validator(mode="after")
     def _own_names(self) -> Self:
-        names = [each.name for each in self.objects]
-        for i, name in enumerate(names):
-            if name in names[:i]:
-                raise ValueError(
-                    f"objects[{i}].name: '{name}' is also that of objects[{names.index(name)}] | Rename it"
-                )
+        check_own_names("objects", [each.name for each in self.objects])
         return self
 
 

@@ -161,6 +161,14 @@ def load(model: type[Model], path: str | Path) -> Model:
     return parse(model, read_yaml(path), path)
 
 
+def check_own_names(field: str, names: list[str]) -> None:
+    """Refuse a name that an earlier entry of a list has too, as ``ValueError`` that names the entry."""
+    places: dict[str, int] = {}
+    for i, name in enumerate(names):
+        if (first := places.setdefault(name, i)) < i:
+            raise ValueError(f"{field}[{i}].name: '{name}' is also that of {field}[{first}] | Rename it")
+
+
 def _dotted(loc: tuple[int | str, ...]) -> str:
     text = ""
     for part in loc:

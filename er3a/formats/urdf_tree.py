@@ -124,6 +124,7 @@ class Tree:
             self.by_child[joint.child] = joint
             self.by_parent.setdefault(joint.parent, []).append(joint)
         self.links = {*self.by_parent, *self.by_child}
+        self.roots = sorted(set(self.by_parent) - set(self.by_child))
         self.moves: dict[str, bool] = {}  # of a joint: whether it or one behind it moves
         self.depth: dict[str, int] = {}  # most independent joints in a row from it on
         for joint in reversed(self._outwards()):
@@ -198,7 +199,7 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
         if the file is no URDF, or names several arms (the candidates are named)
     """
     notes: list[str] = []
-    tree = Tree(path, [_joint(path, element, snap) for element in urdf_root(path).findall("joint")])
+    tree = tree_of(path, snap)
     for named, link in (("--base", base), ("--tip", tip)):
         if link is not None and link not in tree.links:
             raise InputError(path, named, f"there is no link '{link}'", f"Links: {_some(sorted(tree.links))}")
@@ -226,18 +227,16 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
     return UrdfChain(tuple(joints), tree.by_name, (*taken, *notes))
 
 
-def chain_ends(path: Path) -> list[str]:
-    """The links at which an arm may end, those that ``tip`` can name."""
-    tree = Tree(path, [_joint(path, element, False) for element in urdf_root(path).findall("joint")])
-    return [end for root in sorted(set(tree.by_parent) - set(tree.by_child)) for end in tree.ends(root)]
+def tree_of(path: Path, snap: bool) -> Tree:
+    """The joints of a URDF; :class:`InputError` if it is none."""
+    return Tree(path, [_joint(path, element, snap) for element in urdf_root(path).findall("joint")])
 
 
 def _root(tree: Tree) -> str:
-    roots = sorted(set(tree.by_parent) - set(tree.by_child))
-    if len(roots) != 1:
-        problem = f"{len(roots)} root links ({_some(roots) or 'a closed loop'})"
+    if len(tree.roots) != 1:
+        problem = f"{len(tree.roots)} root links ({_some(tree.roots) or 'a closed loop'})"
         raise InputError(tree.path, "joint", problem, "A serial chain has exactly one; name it by --base")
-    return roots[0]
+    return tree.roots[0]
 
 
 def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
@@ -336,8 +335,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     name, kind = element.get("name", "?"), element.get("type", "")
     where = f"joint {name}"
     origin, axis, limit, mimic = (element.find(tag) for tag in ("origin", "axis", "limit", "mimic"))
-    xyz = _numbers(path, where, origin, "xyz", (0.0, 0.0, 0.0))
-    rpy = _numbers(path, where, origin, "rpy", (0.0, 0.0, 0.0))
+    xyz, rpy = _origin(path, where, origin)
     notes: list[str] = []
     if snap:
         rpy = _snapped(rpy, where, notes)
@@ -380,19 +378,28 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
 
 
 def _numbers(
-    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...]
+    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
 ) -> Reals:
+    """Finite numbers of an attribute, as many as its default has; one where it has none and has to be there."""
     text = element.get(key) if element is not None else None
     if text is None:
+        if default is None:
+            raise InputError(path, where, f"has no {key}", f"Add {key} to it")
         return np.array(default)
+    wanted = 1 if default is None else len(default)
     try:
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.array([math.nan])
-    if len(values) != len(default) or not np.isfinite(values).all():
-        count = f"{len(default)} finite numbers with blanks between them" if len(default) > 1 else "a finite number"
+    if len(values) != wanted or not np.isfinite(values).all():
+        count = f"{wanted} finite numbers with blanks between them" if wanted > 1 else "a finite number"
         raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not {count}", "Write so many, and nothing else")
     return values
+
+
+def _origin(path: Path, where: str, origin: ElementTree.Element | None) -> tuple[Reals, Reals]:
+    xyz, rpy = (_numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    return xyz, rpy
 
 
 def _snapped(rpy: Reals, where: str, notes: list[str]) -> Reals:
@@ -605,23 +612,21 @@ def collision_shapes(
     T_link, link = place
     origin, geometry = collision.find("origin"), collision.find("geometry")
     where = f"collision of link {name}"
-    xyz, rpy = (numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    xyz, rpy = _origin(path, where, origin)
     T = T_link @ transform(xyz, rpy)
     shape = geometry[0] if geometry is not None and len(geometry) else None
     core = None
     match shape.tag if shape is not None else "":
         case "box":
-            size = _sizes(path, where, numbers(path, where, shape, "size", (1.0, 1.0, 1.0)))
-            pieces = ConvexPieces((CORNERS * size,), 0.0, 0.0)
+            pieces = ConvexPieces((CORNERS * _sizes(path, where, shape),), 0.0, 0.0)
         case "cylinder":
-            given = [numbers(path, where, shape, key, None) for key in ("radius", "length")]
-            radius, length = _sizes(path, where, np.concatenate(given)).tolist()
+            radius, length = _sizes(path, where, shape).tolist()
             ends = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
             pieces = ConvexPieces((cylinder_points(ends, radius, PRISM_SIDES),), 0.0, 0.0)
             core = ends @ T[:3, :3].T + T[:3, 3]
         case "sphere":
             x, y, z = T[:3, 3].tolist()
-            radius = float(_sizes(path, where, numbers(path, where, shape, "radius", None))[0])
+            radius = float(_sizes(path, where, shape)[0])
             if radius < SMALLEST_SPHERE_M:
                 notes.append(
                     f"{where}: a sphere of {1000 * radius:g} mm is taken as one of {1000 * SMALLEST_SPHERE_M:g} mm"
@@ -636,7 +641,7 @@ def collision_shapes(
             notes.append(f"{where}: <{tag}> is no shape that er3a reads; it is left out")
             return []
     placed = (piece @ T[:3, :3].T + T[:3, 3] for piece in pieces.pieces)
-    stated = float(numbers(path, where, collision, "margin", None)[0]) if "margin" in collision.attrib else 0.0
+    stated = float(_numbers(path, where, collision, "margin", None)[0]) if "margin" in collision.attrib else 0.0
     margin = pieces.uncovered + max(stated, 0.0)
     made = [ConvexPiece(link, tuple((x, y, z) for x, y, z in piece.tolist()), margin) for piece in placed]
     if core is None:
@@ -656,20 +661,17 @@ def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[
     import trimesh  # takes a while
 
     where, origin, shape = f"visual of link {name}", visual.find("origin"), visual.find("geometry/*")
-    xyz, rpy = (numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    xyz, rpy = _origin(path, where, origin)
     match shape.tag if shape is not None else "":
         case "box":
-            made = trimesh.creation.box(_sizes(path, where, numbers(path, where, shape, "size", (1.0, 1.0, 1.0))))
+            made = trimesh.creation.box(_sizes(path, where, shape))
         case "cylinder":
-            given = [numbers(path, where, shape, key, None) for key in ("radius", "length")]
-            radius, length = _sizes(path, where, np.concatenate(given)).tolist()
+            radius, length = _sizes(path, where, shape).tolist()
             made = trimesh.creation.cylinder(radius, length, PRISM_SIDES)
         case "sphere":
-            made = trimesh.creation.icosphere(
-                2, float(_sizes(path, where, numbers(path, where, shape, "radius", None))[0])
-            )
+            made = trimesh.creation.icosphere(2, float(_sizes(path, where, shape)[0]))
         case "mesh" if shape is not None and (file := mesh_of(path, shape.get("filename", ""))):
-            points, faces, _ = read_link_mesh(file, numbers(path, where, shape, "scale", (1.0, 1.0, 1.0)))
+            points, faces, _ = read_link_mesh(file, _numbers(path, where, shape, "scale", (1.0, 1.0, 1.0)))
             made = trimesh.Trimesh(points, faces, process=False)
         case _:
             raise InputError(path, where, "no shape was found", "Give a box, cylinder, sphere or mesh")
@@ -768,8 +770,12 @@ def _obj(points: Reals, faces: Integers) -> str:
     return "".join(f"{kind} {x!r} {y!r} {z!r}\n" for kind, x, y, z in lines)
 
 
-def _sizes(path: Path, where: str, sizes: Reals) -> Reals:
-    """Sizes of a shape, m, none of them below 0."""
+def _sizes(path: Path, where: str, shape: ElementTree.Element | None) -> Reals:
+    """Sizes, m, of a box along x, y and z, of a cylinder (radius, length) or of a sphere (radius), none below 0."""
+    kind = "" if shape is None else shape.tag
+    keys = {"box": ("size",), "cylinder": ("radius", "length")}.get(kind, ("radius",))
+    default = (1.0, 1.0, 1.0) if kind == "box" else None
+    sizes = np.concatenate([_numbers(path, where, shape, key, default) for key in keys])
     if (sizes < 0).any():
         raise InputError(path, where, f"a size of {sizes.min():g} m is below 0", "Write sizes above 0")
     return sizes
@@ -783,7 +789,7 @@ def _mesh(
     if file is None:
         notes.append(f"{where}: the mesh {name} was not found; the link has no shape of it")
         return None
-    scale = numbers(path, where, shape, "scale", (1.0, 1.0, 1.0))
+    scale = _numbers(path, where, shape, "scale", (1.0, 1.0, 1.0))
     if split is not None:
         split(file)
         try:
@@ -814,24 +820,6 @@ def mesh_of(path: Path, name: str) -> Path | None:
     if name.startswith("package://"):
         places = [place for parent in path.resolve().parents for place in (parent / package / rest, parent / rest)]
     return next((place for place in places if place.is_file()), None)
-
-
-def numbers(
-    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
-) -> np.ndarray:
-    """Finite numbers of an attribute: three where there is a default, else one; :class:`InputError` otherwise."""
-    text = element.get(key) if element is not None else None
-    if text is None:
-        if default is None:
-            raise InputError(path, where, f"has no {key}", f"Add {key} to it")
-        return np.array(default)
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.array([math.nan])
-    if len(values) != (3 if default else 1) or not np.isfinite(values).all():
-        raise InputError(path, f"{where}, {key}", f"'{text[:60]}' is not what stands there", "Write finite numbers")
-    return values
 
 
 COMMENT = re.compile("<!--.*?-->", re.DOTALL)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from er3a.robots.robot import Robot
 
 MOST_TOGETHER = 4
 PATTERNS_UP_TO = 6
+MOST_FLIPS = 3  # in a combination that is the same robot
 SOME_DEG = 1e-6
 
 
@@ -173,12 +174,12 @@ class Alternative(ByValue):
         return tuple(name for name, _ in self.entries)
 
 
-def gauge_flips(tool: ToolRange, flips: Sequence[Flip], most: int = 3) -> list[tuple[str, ...]]:
+def gauge_flips(tool: ToolRange, flips: Sequence[Flip]) -> list[tuple[str, ...]]:
     """Minimal combinations of discrete changes that are the same robot."""
     own = tool.signature(tool.table)[0]
     found: list[tuple[int, ...]] = []
     basic = [i for i, flip in enumerate(flips) if not flip.about_deg]
-    for chosen in _levels(flips, most):
+    for chosen in islice(sets_of(flips), MOST_FLIPS):
         sets = [each for each in chosen if set(each) <= set(basic) and not _holds(each, found)]
         if sets:
             same = np.abs(_signatures(tool, tool.table, flips, sets) - own).max(axis=1) < SAME_TOOL
@@ -292,10 +293,6 @@ class _AlternativeSearch:
             if self.flips[i].about_deg:
                 entries.append((f"offset{entry.joint}", float(np.degrees(table.offset[0, entry.joint - 1]))))
         return Alternative(tuple(entries), off, table, repairs)
-
-
-def _levels(flips: Sequence[Flip], most: int) -> list[list[tuple[int, ...]]]:
-    return [chosen for _, chosen in zip(range(most), sets_of(flips))]
 
 
 def _signatures(tool: ToolRange, table: Tables, flips: Sequence[Flip], sets: Sequence[tuple[int, ...]]) -> Reals:

@@ -1,4 +1,4 @@
-"""TableNumber by entry: what independent documents settle of a table, what they leave open, and what they exclude."""
+"""Evidence, entry by entry: what independent documents settle of a table, what they leave open, what they exclude."""
 
 from __future__ import annotations
 

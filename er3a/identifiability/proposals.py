@@ -7,7 +7,7 @@ what else is open. A length or an angle is measured by itself, as finely as its 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, cast
 
 import numpy as np
@@ -17,14 +17,11 @@ from er3a.identifiability.entry_evidence import EntryEvidence, Evidence
 from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import join, tables_of
 from er3a.numerics.arrays import Reals
-from er3a.references.predict import predict, predict_tables
-from er3a.references.quantities import FRAME_OF_POINT, Limit, Point, Pose, Quantity, Side, Speed
-from er3a.references.reference import Reference
-from er3a.references.seen import COARSE_DEG, SEEN, Manner, Seen, SeenMotion, TableEntry
-from er3a.references.subjects import EntryOfTable, JointLimit, JointSpeed, MotionOfJoint, ReferenceSubject
+from er3a.references.predict import predict_tables
+from er3a.references.quantities import FRAME_OF_POINT, Point, Pose, Side
+from er3a.references.seen import SEEN, Manner, Seen, SeenMotion
 from er3a.robots.robot import Robot
 
-MEASURED = "measured"
 PLAIN_DEG = 50.0  # of the direction that is named, within which a motion is plain to see
 BENT_DEG = 45.0
 LENGTH_MM, ANGLE_DEG, LIMIT_DEG, SPEED_SHARE = 1.0, 0.5, 0.5, 0.02
@@ -110,49 +107,6 @@ def proposals_of(evidence: Evidence) -> dict[str, Proposal]:
         if proposal := _proposal(evidence, each, entry, tool):
             found[each.entry] = proposal
     return found
-
-
-def measured(proposal: Proposal, arm: Robot, origin: str = MEASURED) -> Reference:
-    """What the proposed measurement shows on an arm, as a reference."""
-    subject, quantity, group = _about(proposal)
-    expected = float(predict(arm, [_plain(quantity, subject, group)])[0])
-    width = COARSE_DEG
-    if isinstance(proposal, LookAtMotion):
-        if expected > 90.0 and isinstance(quantity, SeenMotion):
-            quantity = replace(quantity, seen=opposite(proposal.seen))
-            subject = replace(cast(MotionOfJoint, subject), seen=quantity.seen)
-        expected = 0.0
-    elif isinstance(proposal, MeasureLength):
-        width = proposal.half_width_mm
-    elif isinstance(proposal, TimeJoint):
-        width = proposal.half_width_deg_s
-    else:
-        width = proposal.half_width_deg
-    return Reference(subject, group, quantity, expected, width, origin, "measured", origin)
-
-
-def opposite(seen: Seen) -> Seen:
-    """What is seen if the joint turns the other way."""
-    turned = {"up": "down", "left": "right", "forward": "back"}
-    turned |= {other: one for one, other in turned.items()}
-    stem, _, last = seen.rpartition("_")
-    return cast(Seen, f"{stem}_{turned[last]}" if stem else turned[last])
-
-
-def _about(proposal: Proposal) -> tuple[ReferenceSubject, Quantity, str]:
-    joint = proposal.joint
-    if isinstance(proposal, LookAtMotion):
-        motion = SeenMotion(proposal.pose_deg, joint, proposal.point, proposal.seen)
-        return MotionOfJoint(joint, proposal.point, proposal.seen), motion, "key_poses"
-    if isinstance(proposal, ReadLimit):
-        return JointLimit(joint, proposal.side), Limit(joint, proposal.side), "limits"
-    if isinstance(proposal, TimeJoint):
-        return JointSpeed(joint), Speed(joint), "speeds"
-    return EntryOfTable(proposal.column, joint), TableEntry(proposal.column, joint), "axes"
-
-
-def _plain(quantity: Quantity, subject: ReferenceSubject, group: str) -> Reference:
-    return Reference(subject, group, quantity, 0.0, 1.0, MEASURED, "measured")
 
 
 def _proposal(evidence: Evidence, each: EntryEvidence, entry: TableNumber, tool: ToolRange) -> Proposal | None:

@@ -5,19 +5,17 @@ Of references that contradict each other, either may be right, so they ask for n
 open. Extremes over the joint limits are followed along with where they are attained: their derivative with respect to
 the table is that at the maximiser (envelope theorem).
 
-How far many tables are off what references state, component by component: as each quantity says it
-(:meth:`~er3a.references.quantities.Quantity.off`), those of one kind at once.
+In this order:
 
-Kernels that climb to the largest or smallest value of a measure of one arm, from where it was attained before.
-
-Newton's method with Levenberg's damping within the joint limits; bounds that are in the way are held. Derivatives are
-central differences.
-
-The largest value of a smooth function over a box of joint angles.
-
-Points spread evenly over the box and its corners are looked at in one batch; from the best of them Newton's method with
-the bounds that are in the way held, its Hessian made definite by the absolute values of its eigenvalues. Nothing is
-random.
+- :class:`Components`: how far many tables are off what references state, as each quantity says it
+  (:meth:`~er3a.references.quantities.Quantity.off`), those of one kind at once;
+- :func:`climber`: kernels that climb to the largest or smallest value of a measure of one arm, from where it was
+  attained before, by Newton's method with Levenberg's damping; bounds that are in the way are held, derivatives are
+  central differences;
+- :func:`peak`: the largest value of any smooth function over a box of joint angles. Points spread evenly over the box
+  and its corners are looked at in one batch; from the best of them Newton's method, its Hessian made definite by the
+  absolute values of its eigenvalues. Nothing is random;
+- :class:`Asked`: what is asked of a table, and by how much tables miss it.
 """
 
 from __future__ import annotations
@@ -25,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -33,34 +32,12 @@ from er3a.kinematics.table_batch import Tables, fill_frames, frames_of, kernel_c
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.numerics.quasi_random import quasi_random_points
+from er3a.references import quantities
 from er3a.references.predict import TablesState
-from er3a.references.quantities import (
-    COORDINATES,
-    FRAME_OF_POINT,
-    FROM_UPRIGHT,
-    MM,
-    AxisAngle,
-    AxisCoordinate,
-    AxisDistance,
-    Extreme,
-    FlangeTurn,
-    Limit,
-    ModelState,
-    PointCoordinate,
-    PoseOutside,
-    Quantity,
-    SectionCoordinate,
-    SectionExtent,
-    SegmentAngle,
-    Speed,
-    TurnedApart,
-    nearest_on_line,
-    rotation_vectors_deg,
-)
 from er3a.references.reference import Reference, conflicts
 from er3a.robots.robot import Robot
 
-Reader = Callable[[ModelState], Reals]
+Reader = Callable[[quantities.ModelState], Reals]
 """Components (H, n, k) of n quantities of one kind."""
 
 
@@ -76,17 +53,23 @@ class Components:
     sizes : (n,), how many components each has
     """
 
-    def __init__(self, robot: Robot, quantities: Sequence[Quantity], expected: Sequence[float]):
-        self._state = TablesState(robot, quantities)
-        kinds: dict[str, list[int]] = {}
-        for i, (quantity, value) in enumerate(zip(quantities, expected)):
-            kinds.setdefault(_kind(quantity, value) or f"alone {i}", []).append(i)
+    def __init__(self, robot: Robot, asked: Sequence[quantities.Quantity], expected: Sequence[float]):
+        self._state = TablesState(robot, asked)
+        kinds: dict[type[quantities.Quantity] | int, list[int]] = {}
+        for i, (quantity, value) in enumerate(zip(asked, expected)):
+            together = type(quantity) in READERS and not (
+                value and isinstance(quantity, quantities.AxisAngle | quantities.SegmentAngle)
+            )
+            kinds.setdefault(type(quantity) if together else i, []).append(i)
         self._readers = [
-            (own, _reader([quantities[i] for i in own], np.array([expected[i] for i in own]), self._state))
-            for own in kinds.values()
+            (
+                own,
+                READERS.get(kind, _alone)([asked[i] for i in own], np.array([expected[i] for i in own]), self._state),
+            )
+            for kind, own in kinds.items()
         ]
         own_state = self._state.of(tables_of(robot))
-        self.sizes = np.zeros(len(quantities), dtype=np.int64)
+        self.sizes = np.zeros(len(asked), dtype=np.int64)
         for own, reader in self._readers:
             self.sizes[own] = reader(own_state).shape[-1]
         starts = (np.cumsum(self.sizes) - self.sizes)[:, None]
@@ -101,40 +84,17 @@ class Components:
         return off
 
 
-def _kind(quantity: Quantity, expected: float) -> str:
-    """What is read together; nothing for what is read alone."""
-    if isinstance(quantity, AxisAngle):
-        return "" if expected else "angle"
-    if isinstance(quantity, SegmentAngle):
-        return "" if expected else "segment"
-    kinds = {AxisCoordinate: "axis", FlangeTurn: "turn", PointCoordinate: "point", SectionCoordinate: "section"}
-    return kinds.get(type(quantity), "")
+def _alone(asked: list[quantities.Quantity], expected: Reals, states: TablesState) -> Reader:
+    return lambda state: asked[0].off(state, float(expected[0]))[:, None]
 
 
-def _reader(quantities: list[Quantity], expected: Reals, states: TablesState) -> Reader:
-    first = quantities[0]
-    if isinstance(first, AxisAngle) and not expected.any():
-        return _angles([each for each in quantities if isinstance(each, AxisAngle)])
-    if isinstance(first, SegmentAngle) and not expected.any():
-        return _segments([each for each in quantities if isinstance(each, SegmentAngle)])
-    if isinstance(first, AxisCoordinate):
-        return _axis_points([each for each in quantities if isinstance(each, AxisCoordinate)], expected)
-    if isinstance(first, FlangeTurn):
-        return _turns([each for each in quantities if isinstance(each, FlangeTurn)], expected, states)
-    if isinstance(first, PointCoordinate):
-        return _points([each for each in quantities if isinstance(each, PointCoordinate)], expected, states)
-    if isinstance(first, SectionCoordinate):
-        return _sections([each for each in quantities if isinstance(each, SectionCoordinate)], expected, states)
-    return lambda state: first.off(state, float(expected[0]))[:, None]
+def _angles(asked: list[quantities.AxisAngle], expected: Reals, states: TablesState) -> Reader:
+    joints = np.array([each.joint - 1 for each in asked])
+    toward = np.array([each.toward for each in asked])
+    signed = np.array([each.signed for each in asked])
+    turned = quantities.TurnedApart(toward)
 
-
-def _angles(quantities: list[AxisAngle]) -> Reader:
-    joints = np.array([each.joint - 1 for each in quantities])
-    toward = np.array([each.toward for each in quantities])
-    signed = np.array([each.signed for each in quantities])
-    turned = TurnedApart(toward)
-
-    def read(state: ModelState) -> Reals:
+    def read(state: quantities.ModelState) -> Reals:
         axis = state.frames[:, 0][:, joints][..., :3, 2] * state.direction[:, joints, None]
         backward = ~signed & (np.einsum("hni,ni->hn", axis, toward) < 0)
         return turned.from_these(np.where(backward[..., None], -axis, axis))
@@ -142,77 +102,87 @@ def _angles(quantities: list[AxisAngle]) -> Reader:
     return read
 
 
-def _segments(quantities: list[SegmentAngle]) -> Reader:
-    def read(state: ModelState) -> Reals:
-        return FROM_UPRIGHT.from_these(np.stack([each.direction(state) for each in quantities], axis=1))
+def _segments(asked: list[quantities.SegmentAngle], expected: Reals, states: TablesState) -> Reader:
+    def read(state: quantities.ModelState) -> Reals:
+        return quantities.FROM_UPRIGHT.from_these(np.stack([each.direction(state) for each in asked], axis=1))
 
     return read
 
 
-def _axis_points(quantities: list[AxisCoordinate], expected: Reals) -> Reader:
-    joints = np.array([each.joint - 1 for each in quantities])
-    near = np.array([each.point_mm for each in quantities])
-    coordinates = np.array([COORDINATES.index(each.coordinate) for each in quantities])
-    every = np.arange(len(quantities))
+def _axis_points(asked: list[quantities.AxisCoordinate], expected: Reals, states: TablesState) -> Reader:
+    joints = np.array([each.joint - 1 for each in asked])
+    near = np.array([each.point_mm for each in asked])
+    coordinates = np.array([quantities.COORDINATES.index(each.coordinate) for each in asked])
+    every = np.arange(len(asked))
 
-    def read(state: ModelState) -> Reals:
+    def read(state: quantities.ModelState) -> Reals:
         T = state.frames[:, 0][:, joints]
         axis = T[..., :3, 2] * state.direction[:, joints, None]
-        value = nearest_on_line(axis, T[..., :3, 3] * MM, near)[:, every, coordinates]
+        value = quantities.nearest_on_line(axis, T[..., :3, 3] * quantities.MM, near)[:, every, coordinates]
         off: Reals = (value - expected)[..., None]
         return off
 
     return read
 
 
-def _points(quantities: list[PointCoordinate], expected: Reals, states: TablesState) -> Reader:
-    places = np.array([states.index[each.pose] for each in quantities])
-    frames = np.array([FRAME_OF_POINT[each.point] for each in quantities])
-    coordinates = np.array([COORDINATES.index(each.coordinate) for each in quantities])
+def _points(asked: list[quantities.PointCoordinate], expected: Reals, states: TablesState) -> Reader:
+    places = np.array([states.index[each.pose] for each in asked])
+    frames = np.array([quantities.FRAME_OF_POINT[each.point] for each in asked])
+    coordinates = np.array([quantities.COORDINATES.index(each.coordinate) for each in asked])
 
-    def read(state: ModelState) -> Reals:
-        off: Reals = (state.frames[:, places, frames, coordinates, 3] * MM - expected)[..., None]
+    def read(state: quantities.ModelState) -> Reals:
+        off: Reals = (state.frames[:, places, frames, coordinates, 3] * quantities.MM - expected)[..., None]
         return off
 
     return read
 
 
-def _turns(quantities: list[FlangeTurn], expected: Reals, states: TablesState) -> Reader:
-    seen = [(states.index[each.pose], each.stated) for each in quantities]
+def _turns(asked: list[quantities.FlangeTurn], expected: Reals, states: TablesState) -> Reader:
+    seen = [(states.index[each.pose], each.stated) for each in asked]
     turns = list(dict.fromkeys(seen))
     places, stated = np.array([place for place, _ in turns]), np.array([each for _, each in turns])
     which = np.array([turns.index(each) for each in seen])
-    coordinates = np.array([COORDINATES.index(each.coordinate) for each in quantities])
+    coordinates = np.array([quantities.COORDINATES.index(each.coordinate) for each in asked])
 
-    def read(state: ModelState) -> Reals:
-        R = state.frames[:, places, FRAME_OF_POINT["flange"], :3, :3] @ stated.transpose(0, 2, 1)
-        off: Reals = (rotation_vectors_deg(R)[:, which, coordinates] - expected)[..., None]
+    def read(state: quantities.ModelState) -> Reals:
+        R = state.frames[:, places, quantities.FRAME_OF_POINT["flange"], :3, :3] @ stated.transpose(0, 2, 1)
+        off: Reals = (quantities.rotation_vectors_deg(R)[:, which, coordinates] - expected)[..., None]
         return off
 
     return read
 
 
-def _sections(quantities: list[SectionCoordinate], expected: Reals, states: TablesState) -> Reader:
-    places = np.array([states.index[each.pose] for each in quantities])
-    along_x = np.array([each.coordinate == "x" for each in quantities])
-    unsigned = np.array([each.unsigned for each in quantities])
+def _sections(asked: list[quantities.SectionCoordinate], expected: Reals, states: TablesState) -> Reader:
+    places = np.array([states.index[each.pose] for each in asked])
+    along_x = np.array([each.coordinate == "x" for each in asked])
+    unsigned = np.array([each.unsigned for each in asked])
     rows, origins = np.where(along_x, 0, 2), np.where(along_x, 0, 1)  # x is counted from axis 1, z from axis 2
-    wrist = FRAME_OF_POINT["wrist_centre"]
+    wrist = quantities.FRAME_OF_POINT["wrist_centre"]
 
-    def read(state: ModelState) -> Reals:
-        value = (state.frames[:, places, wrist, rows, 3] - state.frames[:, places, origins, rows, 3]) * MM
+    def read(state: quantities.ModelState) -> Reals:
+        value = (state.frames[:, places, wrist, rows, 3] - state.frames[:, places, origins, rows, 3]) * quantities.MM
         off: Reals = (np.where(unsigned, np.abs(value), value) - expected)[..., None]
         return off
 
     return read
 
 
+READERS: dict[type[quantities.Quantity] | int, Callable[[Any, Reals, TablesState], Reader]] = {
+    quantities.AxisAngle: _angles,
+    quantities.SegmentAngle: _segments,
+    quantities.AxisCoordinate: _axis_points,
+    quantities.FlangeTurn: _turns,
+    quantities.PointCoordinate: _points,
+    quantities.SectionCoordinate: _sections,
+}
+"""Quantities that are read together; angles only if they are to be 0."""
+
 STEP = 1e-4
 STEPS = 40
 LONGEST_STEP = 0.5
 ENOUGH_M = 1e-9
 DISTANCE, SECTION_X, SECTION_Z = 0, 1, 2
-FLANGE = FRAME_OF_POINT["flange"]
+FLANGE = quantities.FRAME_OF_POINT["flange"]
 
 Columns = tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]
 Ends = tuple[Reals, Reals]
@@ -221,12 +191,12 @@ What = tuple[int, int, int, float]
 """Measure, axis, frame and sign."""
 
 
-def measure_code(quantity: Extreme) -> tuple[int, int, int] | None:
+def measure_code(quantity: quantities.Extreme) -> tuple[int, int, int] | None:
     """Which measure, of which axis and frame; None for one that the kernels don't know."""
-    frame = FRAME_OF_POINT[quantity.point]
-    if isinstance(quantity, AxisDistance):
+    frame = quantities.FRAME_OF_POINT[quantity.point]
+    if isinstance(quantity, quantities.AxisDistance):
         return DISTANCE, quantity.axis - 1, frame
-    if isinstance(quantity, SectionExtent):
+    if isinstance(quantity, quantities.SectionExtent):
         return (SECTION_X if quantity.coordinate == "x" else SECTION_Z), 0, frame
     return None
 
@@ -520,7 +490,7 @@ class Requirement:
     references : places of the references that ask for it
     """
 
-    quantity: Quantity
+    quantity: quantities.Quantity
     expected: float
     half_width: float
     gaussian: bool
@@ -532,7 +502,8 @@ def requirements_of(references: Sequence[Reference]) -> list[Requirement]:
     asked = {
         i: reference
         for i, reference in enumerate(references)
-        if reference.expected is not None and not isinstance(reference.quantity, Limit | Speed | PoseOutside)
+        if reference.expected is not None
+        and not isinstance(reference.quantity, quantities.Limit | quantities.Speed | quantities.PoseOutside)
     }
     rivals: dict[int, set[int]] = {}
     for i, j in conflicts(references):
@@ -554,7 +525,7 @@ def requirements_of(references: Sequence[Reference]) -> list[Requirement]:
 def _hull(references: Sequence[Reference], places: list[int]) -> Requirement:
     first = references[places[0]]
     stated = [_stated(references[i]) for i in places]
-    if all(type(references[i].quantity).apart is Quantity.apart for i in places):
+    if all(type(references[i].quantity).apart is quantities.Quantity.apart for i in places):
         low = min(value - references[i].uncertainty for value, i in zip(stated, places))
         high = max(value + references[i].uncertainty for value, i in zip(stated, places))
         return Requirement(first.quantity, (low + high) / 2, (high - low) / 2, False, tuple(places))
@@ -590,10 +561,10 @@ class _Spread:
 class FollowedExtreme:
     """An extreme over the joint limits, and where it was attained last."""
 
-    def __init__(self, quantity: Extreme, robot: Robot):
+    def __init__(self, quantity: quantities.Extreme, robot: Robot):
         self.quantity, self.robot = quantity, robot
         self.count = len(robot.a)
-        moving = FRAME_OF_POINT[quantity.point] % (self.count + 1)
+        moving = quantities.FRAME_OF_POINT[quantity.point] % (self.count + 1)
         self.joints = list(range(1, min(moving, self.count)))  # none of the measures changes with joint 1
         self.sign = 1.0 if quantity.extreme == "greatest" else -1.0
         self.q = np.zeros(self.count)
@@ -620,7 +591,7 @@ class FollowedExtreme:
                     break
                 value, last = now, np.concatenate([self.q[None], spread.across(self.q)])
             self.known = True
-            return self.sign * value * MM
+            return self.sign * value * quantities.MM
         lower, upper = table.lower[0, self.joints], table.upper[0, self.joints]
         lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
 
@@ -637,7 +608,7 @@ class FollowedExtreme:
         else:
             q, value = peak(measured, lower, upper)
         self.q, self.known = self._whole(q), True
-        return self.sign * value * MM
+        return self.sign * value * quantities.MM
 
     def _spread_of(self, table: Tables) -> _Spread:
         """Where to look, for the limits of a table: those of the last one, as a rule."""
@@ -660,7 +631,7 @@ class FollowedExtreme:
 
     def along(self, tables: Tables) -> Reals:
         """The measure (H,) in mm of many tables where the extreme was attained last."""
-        measured: Reals = self._measure(tables, self.q[None])[:, 0] * MM
+        measured: Reals = self._measure(tables, self.q[None])[:, 0] * quantities.MM
         return measured
 
     def _measure(self, tables: Tables, q: Reals) -> Reals:
@@ -684,12 +655,14 @@ class Asked:
 
     def __init__(self, robot: Robot, requirements: Sequence[Requirement]):
         self.robot, self.requirements = robot, tuple(requirements)
-        self.plain = [each for each in requirements if not isinstance(each.quantity, Extreme)]
+        self.plain = [each for each in requirements if not isinstance(each.quantity, quantities.Extreme)]
         self._components = Components(
             robot, [each.quantity for each in self.plain], [each.expected for each in self.plain]
         )
         self.extreme = [
-            (each, FollowedExtreme(each.quantity, robot)) for each in requirements if isinstance(each.quantity, Extreme)
+            (each, FollowedExtreme(each.quantity, robot))
+            for each in requirements
+            if isinstance(each.quantity, quantities.Extreme)
         ]
         self.order = (*self.plain, *(each for each, _ in self.extreme))
         half_widths = np.array([each.half_width for each in self.order])

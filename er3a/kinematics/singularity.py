@@ -29,7 +29,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import Displayed, Sheet, first_rows
+from er3a.by_value import Displayed, Sheet
 from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import arm_length, axes_at_zero_theta, constant_links, row_values
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
@@ -67,9 +67,8 @@ class Conditioning(Displayed):
     def sheet(self) -> Sheet:
         """One row for each arm."""
         measures = [np.ravel(getattr(self, each.name)) for each in fields(self)]
-        rows, left_out = first_rows(zip(*measures), len(measures[0]))
-        columns = tuple(each.name.replace("_", " ") for each in fields(self))
-        return Sheet(f"Conditioning at {len(measures[0])} joint vector(s)", columns, rows, left_out)
+        columns, count = tuple(each.name.replace("_", " ") for each in fields(self)), len(measures[0])
+        return Sheet.of_table(f"Conditioning at {count} joint vector(s)", columns, zip(*measures), count)
 
 
 @dataclass(frozen=True, eq=False)

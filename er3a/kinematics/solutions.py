@@ -18,7 +18,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import MOST_ROWS, ByValue, Displayed, Sheet, first_rows, shortly
+from er3a.by_value import MOST_ROWS, ByValue, Displayed, Sheet, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver, to_rows
@@ -34,7 +34,7 @@ from er3a.kinematics.wrist_partitioned import (
     wrist_partitioned_arm,
 )
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.robots.joint_limits import LimitsExceeded, but_for_turns, limits_exceeded
+from er3a.robots.joint_limits import LimitsExceeded, but_for_turns, joint_columns, limits_exceeded, shown
 from er3a.robots.robot import Robot, derived
 
 Side = Literal["front", "back"]
@@ -340,15 +340,14 @@ class Solutions(ByValue, Displayed):
         rows = (
             (row, label, *angles, bool(inside), why)
             for row, label, angles, inside, why in zip(
-                range(len(self.q)), self.label, _shown(self.robot, self.q), self.within_limits, self.reason
+                range(len(self.q)), self.label, shown(self.robot, self.q), self.within_limits, self.reason
             )
         )
-        shown, left_out = first_rows(rows, len(self.q))
-        return Sheet(
+        return Sheet.of_table(
             f"Solutions of one pose of {self.robot.name}: {self._counted()} ({self.method.code})",
-            ("row", "branch", *_angles(self.robot), "within", "reason"),
-            shown,
-            left_out,
+            ("row", "branch", *joint_columns(self.robot), "within", "reason"),
+            rows,
+            len(self.q),
             facts=(
                 *(f"self-motion: {family!r}" for family in self.families),
                 *(f"unsolved: {shortly(why)}" for why in self.unsolved),
@@ -357,15 +356,13 @@ class Solutions(ByValue, Displayed):
 
     def _sheet_of_batch(self) -> Sheet:
         solved, inside = (each.sum(axis=-1) for each in (self.solved, self.within_limits))
-        shown, left_out = first_rows(zip(range(len(self.q)), solved, inside), len(self.q))
-        columns = ("pose", "solutions", "within the limits")
-        return Sheet(
-            f"Solutions of {len(self.q)} poses of {self.robot.name}: {self._counted()}", columns, shown, left_out
-        )
+        columns, rows = ("pose", "solutions", "within the limits"), zip(range(len(self.q)), solved, inside)
+        heading = f"Solutions of {len(self.q)} poses of {self.robot.name}: {self._counted()}"
+        return Sheet.of_table(heading, columns, rows, len(self.q))
 
     def _sheet_of_search(self) -> Sheet:
         q, solved = self.q.reshape(-1, self.robot.joints), self.solved.reshape(-1)
-        first = _shown(self.robot, q[:MOST_ROWS])
+        first = shown(self.robot, q[:MOST_ROWS])
         errors = [np.asarray(error).reshape(-1) for error in (self.position_error, self.rotation_error)]
         rows = (
             (pose, bool(done), *angles, 1000 * position, turn)
@@ -373,22 +370,13 @@ class Solutions(ByValue, Displayed):
                 range(len(q)), solved, first, errors[0], np.degrees(errors[1])
             )
         )
-        shown, left_out = first_rows(rows, len(q))
-        return Sheet(
+        return Sheet.of_table(
             f"Search for {len(q)} pose{'s' * (len(q) != 1)} of {self.robot.name}: {np.count_nonzero(solved)} solved",
-            ("pose", "solved", *_angles(self.robot), "off_mm", "off_deg"),
-            shown,
-            left_out,
+            ("pose", "solved", *joint_columns(self.robot), "off_mm", "off_deg"),
+            rows,
+            len(q),
             facts=tuple(f"unsolved: {shortly(why)}" for why in self.unsolved[:MOST_ROWS]),
         )
-
-
-def _angles(robot: Robot) -> tuple[str, ...]:
-    return tuple(f"q{joint + 1}_{'mm' if slides else 'deg'}" for joint, slides in enumerate(robot.slides))
-
-
-def _shown(robot: Robot, q: Reals) -> Reals:
-    return q * np.where(robot.slides, 1000.0, np.degrees(1.0))
 
 
 MANY_TARGETS = 1000

@@ -9,7 +9,7 @@ from pydantic import Field
 from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE
 from er3a.files.robot_file import Text
 from er3a.files.yaml_file import StrictModel
-from er3a.planning.names import StrategyName
+from er3a.planning.names import ACCELERATION_TIME, StrategyName
 from er3a.programs.syntax import LanguageName
 from er3a.robots.robot import MOST_JOINTS
 
@@ -36,7 +36,7 @@ class TrajectorySettings(StrictModel):
         list[Annotated[float, Field(gt=0, le=10_000)]], Field(min_length=1, max_length=MOST_JOINTS)
     ] = [180, 180, 180, 360, 360, 360]
     assumed_speed_mm_s: Annotated[float, Field(gt=0, le=100_000)] = 500
-    acceleration_time_s: Annotated[float, Field(gt=0, le=10)] = 0.25
+    acceleration_time_s: Annotated[float, Field(gt=0, le=10)] = ACCELERATION_TIME
     acceleration_deg_s2: Annotated[list[Annotated[float, Field(gt=0, le=1e6)]], Field(min_length=1)] | None = None
     jerk_deg_s3: Annotated[list[Annotated[float, Field(gt=0, le=1e9)]], Field(min_length=1)] | None = None
     scene: Text | None = None

@@ -34,7 +34,7 @@ from itertools import product
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, first_rows
+from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.errors import PoseError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import arm_length
@@ -280,10 +280,10 @@ class Followed(ByValue, Displayed):
 
     def sheet(self) -> Sheet:
         """Times, and joints in degrees."""
-        rows, left_out = first_rows(np.column_stack([self.t, np.degrees(self.q)]), len(self.t))
+        rows = np.column_stack([self.t, np.degrees(self.q)])
         found = f"Joints along a line: {len(self.t)} rows over {self.line.duration:g} s, {len(self.jumps)} jump(s)"
         columns = ("t (s)", *(f"J{joint + 1} (deg)" for joint in range(self.q.shape[1])))
-        return Sheet(found, columns, rows, left_out, ("a row for each time of yours: .joints(t), in rad",))
+        return Sheet.of_table(found, columns, rows, len(rows), ("a row for each time of yours: .joints(t), in rad",))
 
     def joints(self, t: Reals) -> Reals:
         """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable.

@@ -22,11 +22,10 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-import scipy
 
 from er3a.by_value import ByValue
 from er3a.errors import Er3aError, PoseError
-from er3a.geometry.transforms import check_poses
+from er3a.geometry.transforms import check_poses, exp_rotation, log_rotation, posed
 from er3a.numerics.arrays import Reals
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import BEYOND, Ends, FromRestToRest, Rates, TimeLaw, check_times, quintic
@@ -250,7 +249,7 @@ def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None 
     PoseError
         if ``half_turn_axis`` can't choose
     """
-    rotation = scipy.spatial.transform.Rotation.from_matrix(T_end[:3, :3] @ T_start[:3, :3].T).as_rotvec()
+    rotation = log_rotation(T_end[:3, :3] @ T_start[:3, :3].T)
     angle = np.linalg.norm(rotation)
     half_turn = bool(abs(angle - np.pi) < HALF_TURN_TOLERANCE)
     if half_turn_axis is not None and not half_turn:
@@ -262,16 +261,7 @@ def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None 
 
 def turning_poses(T_start: Reals, points: Reals, rotation: Reals, progress: Reals) -> Reals:
     """T_base_tool (..., 4, 4) at points (..., 3), turned from ``T_start`` by shares (...,) of a rotation vector."""
-    turns = (
-        scipy.spatial.transform.Rotation.from_rotvec(progress.reshape(-1, 1) * rotation)
-        .as_matrix()
-        .reshape(*progress.shape, 3, 3)
-    )
-    T = np.zeros((*progress.shape, 4, 4))
-    T[..., :3, :3] = turns @ T_start[:3, :3]
-    T[..., :3, 3] = points
-    T[..., 3, 3] = 1.0
-    return T
+    return posed(exp_rotation(progress[..., None] * rotation) @ T_start[:3, :3], points)
 
 
 def _sense(axis: Reals, wanted: Reals | None) -> float:

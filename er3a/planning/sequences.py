@@ -24,11 +24,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy
 
 from er3a.by_value import ByValue
 from er3a.errors import PathError, PoseError
-from er3a.geometry.transforms import check_poses
+from er3a.geometry.transforms import check_poses, exp_rotation, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.moves import Segment, rotation_between
 from er3a.planning.piecewise import MotionInParts, PiecewiseMotion, polynomial_motion
@@ -306,16 +305,7 @@ class SegmentPath(ByValue):
         progress = np.asarray(progress, float)
         values = self._values(progress)[0]
         i = self.curve.piece(progress)[0]
-        turns = (
-            scipy.spatial.transform.Rotation.from_rotvec(values[..., 3:].reshape(-1, 3))
-            .as_matrix()
-            .reshape(*progress.shape, 3, 3)
-        )
-        T = np.zeros((*progress.shape, 4, 4))
-        T[..., :3, :3] = turns @ self.origins[i]
-        T[..., :3, 3] = values[..., :3]
-        T[..., 3, 3] = 1.0
-        return T
+        return posed(exp_rotation(values[..., 3:]) @ self.origins[i], values[..., :3])
 
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
         """See :class:`er3a.planning.moves.ToolPath`."""

@@ -24,7 +24,7 @@ import scipy
 
 from er3a.by_value import ByValue
 from er3a.errors import Er3aError
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.motion_faults import OVER, RateLimit
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import Rates
@@ -215,24 +215,38 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
         if there is no such time law
     """
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0) / limits.speed).max(axis=1))])
-    kept = np.flatnonzero(np.concatenate([[True], np.diff(way) > SAME_NODE]))
-    if len(kept) > 1:
-        kept[-1] = len(way) - 1  # the end stays the end
     elapsed = 0.0 if programmed is None else float(programmed[-1] - programmed[0])
-    if len(kept) < 2:
+    if (path := path_through(q, way)) is None:
         return standing(q[-1], elapsed)
+    kept, way, spline = path
+    cap = None if programmed is None or len(kept) == 2 else np.gradient(way, programmed[kept])
+    constraint = toppra_library().constraint
+    speeds, accelerations = (np.stack([-most, most], axis=1) for most in (limits.speed, limits.acceleration))
+    scheme = constraint.DiscretizationType.Interpolation  # at both ends of each step
+    constraints = [
+        constraint.JointVelocityConstraint(speeds),
+        constraint.JointAccelerationConstraint(accelerations, discretization_scheme=scheme),
+        *([] if cap is None else [_programmed_speed(cap, q.shape[1])]),
+    ]
+    speed, t = solved(toppra_path(way, spline), way, constraints)
+    return within_limits(polynomial_motion(run_along(way, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
+
+
+def path_through(q: Reals, way: Reals) -> tuple[Integers, Reals, scipy.interpolate.CubicSpline] | None:
+    """The spline through nodes (N, n) that stand at ``way`` (N,), without those of one place; None of a single place.
+
+    Returns
+    -------
+    kept : which nodes are left; way : (k,), where they stand, or more places on a way between two; spline
+    """
+    kept = np.flatnonzero(np.concatenate([[True], np.diff(way) > SAME_NODE]))
+    if len(kept) < 2:
+        return None
+    kept[-1] = len(way) - 1  # the end stays the end
     q, way = q[kept], way[kept]
     if len(way) == 2:
         q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
-        programmed = None
-    spline = scipy.interpolate.CubicSpline(way, q)
-    cap = None if programmed is None else np.gradient(way, programmed[kept])
-    speed = _toppra(way, spline, limits, cap)
-    pace = (speed[:-1] + speed[1:]) / 2
-    if (pace <= 0).any():
-        raise TimingError(MustStandStill())
-    t = np.concatenate([[0.0], np.cumsum(np.diff(way) / pace)])
-    return within_limits(polynomial_motion(run_along(way, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
+    return kept, way, scipy.interpolate.CubicSpline(way, q)
 
 
 def within_limits(curve: PiecewiseMotion, limits: JointLimits, least: float = 0.0) -> Timed:
@@ -290,49 +304,66 @@ def _stacked(series: list[Reals]) -> Reals:
     return np.concatenate([np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in series])
 
 
-def _toppra(way: Reals, spline: scipy.interpolate.CubicSpline, limits: JointLimits, cap: Reals | None) -> Reals:
-    """Speed along the way at its nodes (N,)."""
+def toppra_library() -> Any:
+    """The module ``toppra``.
+
+    Raises
+    ------
+    TimingError
+        if it is not installed
+    """
     try:
         with warnings.catch_warnings():  # of escapes in docstrings, when Python compiles the library
             warnings.simplefilter("ignore")
-            from toppra.algorithm import TOPPRA
-            from toppra.constraint import (
-                DiscretizationType,
-                JointAccelerationConstraint,
-                JointVelocityConstraint,
-                LinearConstraint,
-            )
-            from toppra.interpolator import AbstractGeometricPath
+            import toppra
+            import toppra.algorithm
+            import toppra.constraint.linear_constraint
+            import toppra.interpolator
     except ModuleNotFoundError:
         raise TimingError(ToppraMissing()) from None
+    return toppra
 
+
+def toppra_path(way: Reals, spline: scipy.interpolate.CubicSpline, at_rest: float = 0.0) -> Any:
+    """The path as toppra takes it; a joint whose slope is no more than ``at_rest`` is at rest and has no friction."""
     count: int = spline.c.shape[-1]
 
-    class Way(AbstractGeometricPath):  # type: ignore[misc]
+    class Path(toppra_library().interpolator.AbstractGeometricPath):  # type: ignore[misc]
         dof, waypoints = count, None
         path_interval = np.array([way[0], way[-1]])
 
         def __call__(self, at: Reals, order: int = 0) -> Any:
-            return spline(at, order)
+            values = spline(at, order)
+            return np.where(np.abs(values) > at_rest, values, 0.0) if order == 1 and at_rest else values
 
-    most = np.empty(0) if cap is None else cap**2
+    return Path()
 
-    class Programme(LinearConstraint):  # type: ignore[misc]
-        """The programme's speed along the way as an upper bound."""
 
+def _programmed_speed(cap: Reals, joints: int) -> Any:
+    """The programme's speed along the way at its nodes (N,) as an upper bound."""
+
+    class Programme(toppra_library().constraint.LinearConstraint):  # type: ignore[misc]
         def get_dof(self) -> int:
-            return count
+            return joints
 
         def compute_constraint_params(self, path: Any, gridpoints: Any) -> tuple[Reals | None, ...]:
-            return None, None, None, None, None, None, np.stack([np.zeros_like(most), most], axis=1)
+            return None, None, None, None, None, None, np.stack([np.zeros_like(cap), cap**2], axis=1)
 
-    speeds, accelerations = (np.stack([-most, most], axis=1) for most in (limits.speed, limits.acceleration))
-    at_both_ends = JointAccelerationConstraint(accelerations, discretization_scheme=DiscretizationType.Interpolation)
-    constraints = [JointVelocityConstraint(speeds), at_both_ends]
-    if cap is not None:
-        constraints.append(Programme())
-    solver = TOPPRA(constraints, Way(), gridpoints=way, solver_wrapper="seidel")
+    return Programme()
+
+
+def solved(path: Any, way: Reals, constraints: list[Any]) -> tuple[Reals, Reals]:
+    """Speeds along the way and times (s) at its nodes (N,), from rest to rest; :class:`TimingError` if there are none.
+
+    Parameters
+    ----------
+    path : see :func:`toppra_path`; constraints : of toppra
+    """
+    solver = toppra_library().algorithm.TOPPRA(constraints, path, gridpoints=way, solver_wrapper="seidel")
     _, speed, _ = solver.compute_parameterization(0, 0)
     if speed is None or not np.isfinite(speed).all():
         raise TimingError(NoTimeLawFound())
-    return np.asarray(speed)
+    between = (speed[:-1] + speed[1:]) / 2
+    if (between <= 0).any():
+        raise TimingError(MustStandStill())
+    return np.asarray(speed, float), np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])

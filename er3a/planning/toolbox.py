@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import Er3aError, ShapeError
-from er3a.geometry.transforms import check_poses, rpy_of, transform
+from er3a.geometry.transforms import check_poses, quaternion_of, rpy_of, transform
 from er3a.numerics.arrays import Reals, as_floats
 from er3a.planning.moves import JointMove, line
 from er3a.robots.usable import warn_of_degrees
@@ -111,9 +111,7 @@ def quaternion(T: Reals) -> Reals:
     PoseError, ShapeError
         if T is no rigid transform
     """
-    T = check_poses(T)
-    found = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
-    return np.asarray(found, float).reshape(*T.shape[:-2], 4)
+    return quaternion_of(check_poses(T))
 
 
 def jtraj(

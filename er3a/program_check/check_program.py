@@ -26,6 +26,7 @@ from er3a.planning.commands import (
     Start,
     ToolSequenceCommand,
 )
+from er3a.planning.names import ACCELERATION_TIME
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import RAMP_OF_A_DURATION, AssumedRates, CheckRules, MotionPath
@@ -68,7 +69,7 @@ class CheckOptions(ByValue):
     scene: Scene | None = None
     near: NearSingular = USUAL_NEAR
     assumed_speed: Reals | None = None
-    acceleration_time: float = 0.25
+    acceleration_time: float = ACCELERATION_TIME
     penetration_tolerance: float = PENETRATION_TOLERANCE
     assumed_margin: float = ASSUMED_MARGIN
     measures: bool = True

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from er3a.by_value import Displayed, ReadOnly, Sheet, first_rows
+from er3a.by_value import Displayed, ReadOnly, Sheet
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import NotOfArm, Quantity, Unit
 from er3a.references.subjects import ReferenceSubject
@@ -229,9 +229,8 @@ class ReferenceSet(Displayed):
             for group in groups
             for own in [[each for each in self.references if each.group == group]]
         )
-        shown, left_out = first_rows(rows, len(groups))
         heading = f"Reference set {self.name}: {len(self.references)} numbers, {len(self.checkable)} to check against"
-        return Sheet(heading, ("group", "numbers", "grades"), shown, left_out)
+        return Sheet.of_table(heading, ("group", "numbers", "grades"), rows, len(groups))
 
 
 def quantities_of(references: Iterable[Reference]) -> tuple[Quantity, ...]:

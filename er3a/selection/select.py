@@ -22,7 +22,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.collision.along import bodies_of, clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
@@ -217,11 +217,11 @@ class SolutionRanking(ByValue, Displayed):
                 *((None, row, self.reason[row]) for row in refused),
             )
         )
-        shown, left_out = first_rows(rows, len(self.reason))
         units = [f"{name} ({RULES[name].unit})" for name in self.measured]
         heading = f"Ranking of {len(self.reason)} solutions, {len(self.order)} admissible"
         taken = f"row {self.chosen} is taken" if len(self.order) else f"none is taken: {shortly(self.chosen_reason)}"
-        return Sheet(f"{heading}; {taken}", ("place", "row", "cost", *units, "refused"), shown, left_out)
+        columns = ("place", "row", "cost", *units, "refused")
+        return Sheet.of_table(f"{heading}; {taken}", columns, rows, len(self.reason))
 
 
 def select(
@@ -313,9 +313,9 @@ class SequenceChoice(ByValue, Displayed):
     def sheet(self) -> Sheet:
         """The row taken of each pose, with its joint angles."""
         rows = ((pose, row, *angles) for pose, row, angles in zip(range(len(self.q)), self.rows, np.degrees(self.q)))
-        shown, left_out = first_rows(rows, len(self.q))
         heading = f"Sequence of {len(self.q)} poses: cost {self.cost:.6g}; nearest each time: {self.greedy_cost:.6g}"
-        return Sheet(heading, ("pose", "row", *(f"q{k + 1}_deg" for k in range(self.q.shape[1]))), shown, left_out)
+        columns = ("pose", "row", *(f"q{k + 1}_deg" for k in range(self.q.shape[1])))
+        return Sheet.of_table(heading, columns, rows, len(self.q))
 
 
 def select_sequence(

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from er3a.by_value import ByValue
 from er3a.errors import Er3aError
+from er3a.geometry.transforms import exp_rotation, inverse_right_jacobian, log_rotation, posed
 from er3a.numerics.arrays import Reals
-from er3a.vision.calibration_set import exp_rotation, inverse_right_jacobian, log_rotation, posed
 
 
 @lru_cache(maxsize=1)

@@ -28,8 +28,8 @@ from typing import Literal, get_args
 import numpy as np
 import scipy
 
+from er3a.geometry.transforms import inverted, log_rotation, posed, quaternion_of, skew
 from er3a.numerics.arrays import Reals
-from er3a.vision.calibration_set import inverted, log_rotation, posed, skew
 
 MethodName = Literal["park", "horaud", "tsai", "andreff", "daniilidis", "shah", "li"]
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
@@ -87,21 +87,15 @@ def _nearest_rotation(M: Reals) -> Reals:
     return R
 
 
-def _quaternions(R: Reals) -> Reals:
-    """Unit quaternions (P, 4), real part first and not negative."""
-    q: Reals = scipy.spatial.transform.Rotation.from_matrix(R).as_quat(canonical=True, scalar_first=True)
-    return q
-
-
 def _below_half_turns(A: Reals, C: Reals) -> tuple[Reals, Reals]:
     """The motions whose quaternions have a sure sign, alike for hand and eye; all if those are few."""
-    sure = np.minimum(*(_quaternions(T[:, :3, :3])[:, 0] for T in (A, C))) > HALF_TURN
+    sure = np.minimum(*(quaternion_of(T)[:, 0] for T in (A, C))) > HALF_TURN
     return (A[sure], C[sure]) if sure.sum() >= 2 else (A, C)
 
 
 def _horaud(A: Reals, C: Reals) -> Reals:
     A, C = _below_half_turns(A, C)
-    a, c = _quaternions(A[:, :3, :3]), _quaternions(C[:, :3, :3])
+    a, c = quaternion_of(A), quaternion_of(C)
     K = _left_product(a) - _right_product(c)
     q = np.linalg.eigh(np.einsum("pki,pkj->ij", K, K))[1][:, 0]
     R = scipy.spatial.transform.Rotation.from_quat(q, scalar_first=True).as_matrix()
@@ -127,7 +121,7 @@ def _right_product(q: Reals) -> Reals:
 def _tsai(A: Reals, C: Reals) -> Reals:
     """From motions that turn far enough alone, as the authors advise and OpenCV does; from half of all at least."""
     A, C = _below_half_turns(A, C)
-    a, c = (2 * _quaternions(T[:, :3, :3])[:, 1:] for T in (A, C))
+    a, c = (2 * quaternion_of(T)[:, 1:] for T in (A, C))
     size = np.minimum(np.linalg.norm(a, axis=1), np.linalg.norm(c, axis=1))
     far = size >= min(TSAI_LEAST, float(np.median(size)))
     A, C, a, c = A[far], C[far], a[far], c[far]
@@ -155,7 +149,7 @@ def _scaled_pose(solution: Reals) -> Reals:
 
 def _daniilidis(A: Reals, C: Reals) -> Reals:
     A, C = _below_half_turns(A, C)
-    a, c = _quaternions(A[:, :3, :3]), _quaternions(C[:, :3, :3])
+    a, c = quaternion_of(A), quaternion_of(C)
     a_dual, c_dual = _dual_part(a, A[:, :3, 3]), _dual_part(c, C[:, :3, 3])
 
     def block(p: Reals, q: Reals) -> Reals:

@@ -21,7 +21,7 @@ from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.geometry.transforms import rot_z, translation
+from er3a.geometry.transforms import rot_z, skew, translation
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.singularity import characteristic_length, conditioning
@@ -31,7 +31,6 @@ from er3a.planning.timing import JointLimits
 from er3a.planning.way_around import NoWayAround, PlanningTask
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
-from er3a.vision.calibration_set import skew
 from er3a.vision.grasp_motion import GraspLeg, Part, least_clearance, tool_leg, transfer
 from er3a.vision.point_error import draws
 

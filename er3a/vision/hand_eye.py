@@ -27,8 +27,19 @@ from itertools import permutations, product
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
-from er3a.geometry.transforms import rotation_angle, rpy_of
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.geometry.transforms import (
+    inverted,
+    log_rotation,
+    moved,
+    posed,
+    quaternion_of,
+    rotation_angle,
+    rpy_of,
+    skew,
+    step_between,
+    transposed,
+)
 from er3a.numerics.arrays import Flags, Reals
 from er3a.vision import calibration_set, vision_findings
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
@@ -76,7 +87,7 @@ def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
     """Find samples whose turning angles contradict the others'."""
     hand, eye = samples.flange[:, :3, :3], samples.target[:, :3, :3]
     turned = angles_between(hand)
-    mismatch = np.abs(turned - angles_between(calibration_set.transposed(eye)))
+    mismatch = np.abs(turned - angles_between(transposed(eye)))
     upper = np.triu_indices(len(samples), 1)
     tolerance = _tolerance(samples, mismatch[upper])
     used = _agreeing(mismatch > tolerance)
@@ -125,9 +136,7 @@ def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: 
     mending: vision_findings.SuspectKind = "rotation"
     for kind in MEND_KINDS:
         for R in _mended(target[i], kind):
-            angle = rotation_angle(
-                calibration_set.transposed(R)[None], calibration_set.transposed(target[used, :3, :3])
-            )
+            angle = rotation_angle(transposed(R)[None], transposed(target[used, :3, :3]))
             off = float(np.median(np.abs(angle - turned[i, used])))
             if off < best:
                 best, mending = off, kind
@@ -176,13 +185,13 @@ def repeated_poses(samples: calibration_set.CalibrationSet) -> tuple[vision_find
     """Samples taken where the flange had been before."""
     found = []
     for i in range(1, len(samples)):
-        step = calibration_set.step_between(np.broadcast_to(samples.flange[i], (i, 4, 4)), samples.flange[:i])
+        step = step_between(np.broadcast_to(samples.flange[i], (i, 4, 4)), samples.flange[:i])
         near = (np.linalg.norm(step[:, :3], axis=1) < SAME_POSITION_M) & (
             np.linalg.norm(step[:, 3:], axis=1) < SAME_ROTATION_RAD
         )
         if near.any():
             first = int(near.argmax())
-            seen = calibration_set.step_between(samples.target[first], samples.target[i])
+            seen = step_between(samples.target[first], samples.target[i])
             apart_mm, apart_deg = 1000 * np.linalg.norm(seen[:3]), np.degrees(np.linalg.norm(seen[3:]))
             found.append(
                 vision_findings.RepeatedPose(samples.names[i], samples.names[first], float(apart_mm), float(apart_deg))
@@ -235,10 +244,7 @@ def other_reading(samples: calibration_set.CalibrationSet, residual: Reals) -> v
         return None
     best: tuple[float, vision_findings.RotationReading] | None = None
     for again, finding in _readings(samples, turned):
-        mismatch = np.abs(
-            angles_between(again.flange[:, :3, :3])
-            - angles_between(calibration_set.transposed(again.target)[:, :3, :3])
-        )
+        mismatch = np.abs(angles_between(again.flange[:, :3, :3]) - angles_between(transposed(again.target)[:, :3, :3]))
         if np.median(mismatch) > MOST_DEVIATION:
             continue
         try:
@@ -323,20 +329,18 @@ def _with(
     """The samples with other rotations of a stream."""
     T, B = samples.flange, samples.target
     if stream != "target":
-        T = calibration_set.posed(rotations(T), T[:, :3, 3])
+        T = posed(rotations(T), T[:, :3, 3])
     if stream != "flange":
-        B = calibration_set.posed(rotations(B), B[:, :3, 3])
+        B = posed(rotations(B), B[:, :3, 3])
     return replace(samples, flange=T, target=B)
 
 
 def _transposed(T: Reals) -> Reals:
-    return calibration_set.transposed(T[:, :3, :3])
+    return transposed(T[:, :3, :3])
 
 
 def _rolled(T: Reals, shift: int) -> Reals:
-    R: Reals = scipy.spatial.transform.Rotation.from_quat(
-        np.roll(calibration_set.quaternion_of(T), shift, axis=1)
-    ).as_matrix()
+    R: Reals = scipy.spatial.transform.Rotation.from_quat(np.roll(quaternion_of(T), shift, axis=1)).as_matrix()
     return R
 
 
@@ -440,12 +444,11 @@ class HandEye(ByValue, Displayed):
             for name, T, half in zip(poses, (self.X, self.Y), self.half_width.reshape(2, 6))
             for k, axis in enumerate("xyz")
         ]
-        shown, left_out = first_rows(rows, len(rows))
         columns = ("pose", "axis", "mm", "half_width_mm", "rpy_deg", "half_width_deg")
         found = [*self.suspects, *self.warnings]
         facts = tuple(shortly(each) for each in found[:MOST_FACTS])
         heading = f"Hand-eye calibration, {int(self.used.sum())} of {len(self.samples)} samples used"
-        return Sheet(heading, columns, shown, left_out, facts)
+        return Sheet.of_table(heading, columns, rows, len(rows), facts)
 
 
 def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
@@ -527,9 +530,7 @@ def start(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
 
 
 def _fitted(samples: calibration_set.CalibrationSet) -> Refined:
-    seen = PoseObservations(
-        samples.setup, samples.hand, samples.target, samples.camera_covariance, samples.flange_covariance
-    )
+    seen = PoseObservations.of(samples)
     try:
         found = refine(seen, *start(samples.hand, samples.target, np.array([1e-3, 5e-3])))
     except np.linalg.LinAlgError:
@@ -543,9 +544,7 @@ def _shared_covariance(samples: calibration_set.CalibrationSet, refined: Refined
     """What errors that all samples share add to the covariance of the two poses, (12, 12)."""
     if samples.shared is None:
         return np.zeros((UNKNOWNS, UNKNOWNS))
-    seen = PoseObservations(
-        samples.setup, samples.hand, samples.target, samples.camera_covariance, samples.flange_covariance
-    )
+    seen = PoseObservations.of(samples)
     sigma = np.broadcast_to(np.repeat(refined.deviations, 3), (len(samples), 6))
     W = whitening(seen, sigma, refined.X, refined.Y)
     J = W @ residuals(samples.hand, samples.target, refined.X, refined.Y)[1]
@@ -560,14 +559,14 @@ def _check_determined(samples: calibration_set.CalibrationSet) -> tuple[float, f
         raise vision_findings.HandEyeError(vision_findings.TooFewSamples(len(samples), LEAST_SAMPLES))
     for stream in ("flange", "target"):
         poses = getattr(samples, stream)
-        if np.abs(calibration_set.step_between(poses[:1], poses)).max() < EQUAL:
+        if np.abs(step_between(poses[:1], poses)).max() < EQUAL:
             raise vision_findings.HandEyeError(vision_findings.AllSamplesEqual(stream))  # type: ignore[arg-type]
     R = samples.hand[:, :3, :3]
     greatest = float(angles_between(R).max())
     if greatest < LEAST_TURN:
         raise vision_findings.HandEyeError(vision_findings.NoRotation(float(np.degrees(greatest))))
     i, j = np.triu_indices(len(samples), 1)
-    turns = calibration_set.log_rotation(calibration_set.transposed(R[j]) @ R[i])
+    turns = log_rotation(transposed(R[j]) @ R[i])
     _, size, axes = np.linalg.svd(turns, full_matrices=False)
     apart = float(np.arctan2(size[1], size[0]))
     if apart < LEAST_SPREAD:
@@ -621,7 +620,7 @@ def board_scale(samples: calibration_set.CalibrationSet, refined: Refined) -> tu
         r = (raw * weight).ravel()
         inverse = np.linalg.pinv(J.T @ J)
         step = -inverse @ (J.T @ r)
-        X, Y, s = calibration_set.moved(X, step[:6]), calibration_set.moved(Y, step[6:12]), float(s + step[12])
+        X, Y, s = moved(X, step[:6]), moved(Y, step[6:12]), float(s + step[12])
         if np.abs(step).max() < 1e-10:
             break
     free = len(r) - 13
@@ -638,7 +637,7 @@ def _answer(
         X, Y = np.full((4, 4), np.nan), np.full((4, 4), np.nan)
     if not (np.isfinite(X).all() and np.isfinite(Y).all()):
         return MethodAnswer(name, None, np.inf, np.inf, np.inf, np.inf, np.inf)
-    step = calibration_set.step_between(refined.X, X)
+    step = step_between(refined.X, X)
     raw = residuals(samples.hand, samples.target, X, Y)[0]
     return MethodAnswer(
         name=name,
@@ -663,8 +662,8 @@ def directions_tried(
     free = 6 * len(samples) - 12
     found: list[tuple[float, Reals | None]] = []
     for flange_inverted, target_inverted in DIRECTIONS:
-        F = calibration_set.inverted(samples.hand) if flange_inverted else samples.hand
-        B = calibration_set.inverted(samples.target) if target_inverted else samples.target
+        F = inverted(samples.hand) if flange_inverted else samples.hand
+        B = inverted(samples.target) if target_inverted else samples.target
         raw = _residuals_of(F, B, sigma)
         found.append((np.inf if raw is None else float(np.sum((raw / np.repeat(sigma, 3)) ** 2)), raw))
     costs = np.array([cost for cost, _ in found])
@@ -702,7 +701,7 @@ def _residuals_of(F: Reals, B: Reals, sigma: Reals) -> Reals | None:
 
 
 def _shift_with_all(samples: calibration_set.CalibrationSet, refined: Refined) -> Reals:
-    step = calibration_set.step_between(refined.X, _fitted(samples).X)
+    step = step_between(refined.X, _fitted(samples).X)
     return np.array([np.linalg.norm(step[:3]), np.linalg.norm(step[3:])])
 
 
@@ -712,7 +711,7 @@ def _touch(found: HandEye, touched: Reals) -> TouchCheck:
     T, part = (found.X, slice(0, 6)) if fixed else (found.Y, slice(6, 12))
     turned = touched[:, 0] @ T[:3, :3].T
     difference = touched[:, 1] - turned - T[:3, 3]
-    J = np.concatenate([np.broadcast_to(np.eye(3), (len(touched), 3, 3)), -calibration_set.skew(turned)], axis=2)
+    J = np.concatenate([np.broadcast_to(np.eye(3), (len(touched), 3, 3)), -skew(turned)], axis=2)
     own = found.deviations[0] ** 2 if fixed else 0.0
     shared = np.einsum("mik,kl,njl->minj", J, found.covariance[part, part], J).reshape(3 * len(J), -1)
     whole = shared + (own + found.samples.touch_deviation**2 + 1e-18) * np.eye(len(shared))
@@ -731,6 +730,6 @@ def board_poses(found: HandEye) -> Reals:
 def spread_of(found: HandEye) -> tuple[float, float]:
     """Root mean square distance (m) and angle (rad) of the samples' board poses from their mean, of those used."""
     poses = board_poses(found)[found.used]
-    step = calibration_set.step_between(mean_pose(poses), poses)
+    step = step_between(mean_pose(poses), poses)
     size = [np.linalg.norm(step[:, part], axis=1) for part in _PARTS]
     return float(np.sqrt((size[0] ** 2).mean())), float(np.sqrt((size[1] ** 2).mean()))

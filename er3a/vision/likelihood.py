@@ -22,8 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.transforms import inverse_right_jacobian, log_rotation, moved, skew, transposed
 from er3a.numerics.arrays import Reals
-from er3a.vision.calibration_set import Setup, inverse_right_jacobian, log_rotation, moved, skew, transposed
+from er3a.vision.calibration_set import CalibrationSet, Setup
 
 UNKNOWNS = 12
 MOST_STEPS = 60
@@ -43,6 +44,12 @@ class PoseObservations:
     B: Reals
     camera_covariance: Reals | None = None
     flange_covariance: Reals | None = None
+
+    @classmethod
+    def of(cls, samples: CalibrationSet) -> PoseObservations:
+        """Those of a set, with what it states of their scatter."""
+        covariances = samples.camera_covariance, samples.flange_covariance
+        return cls(samples.setup, samples.hand, samples.target, *covariances)
 
 
 @dataclass(frozen=True, eq=False)

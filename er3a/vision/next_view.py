@@ -8,10 +8,10 @@ import numpy as np
 
 from er3a.collision.along import clearance
 from er3a.collision.scene import Scene
+from er3a.geometry.transforms import inverted, skew
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
-from er3a.vision.calibration_set import inverted, skew
 from er3a.vision.hand_eye import HandEye
 from er3a.vision.likelihood import residuals
 from er3a.vision.point_error import error_sizes

@@ -12,11 +12,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from er3a.geometry.transforms import skew, step_between
 from er3a.kinematics.chain import JOINTS
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
-from er3a.vision.calibration_set import skew, step_between
 from er3a.vision.hand_eye import HandEye
 
 DRAWS = 4000

@@ -22,12 +22,13 @@ from er3a.calibration.fit import DEPENDENT, NO_EFFECT, SCALE
 from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
 from er3a.calibration.parameters import Parameter, parallel_pairs, parameters_of
 from er3a.calibration.parameters import moved as moved_tables
+from er3a.geometry.transforms import inverse_right_jacobian, inverted, moved, step_between
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.vision import likelihood
-from er3a.vision.calibration_set import CalibrationSet, inverse_right_jacobian, inverted, moved, step_between
+from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import SURE, HandEye
 
 STEP = 1e-6  # m and rad

@@ -786,16 +786,13 @@ _PORTION = 1 << 16
 _ACROSS = 2.5  # rings along each set behind joint 1, for each cell across
 
 
-def prove_general(
-    arm: GeneralArm, target: float, most_cells: int, seed: int, tries: int = TRIES
-) -> tuple[Proof, Reals]:
+def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) -> tuple[Proof, Reals]:
     """Decide the section of an arm about axis 1.
 
     Parameters
     ----------
     target : wanted width of the bracket
     most_cells : how many cells may be looked at; the first grid is always finished
-    tries : joint values tried for each cell
 
     Returns
     -------
@@ -822,7 +819,7 @@ def prove_general(
         nowhere = (empties == 1) & (empty[:, 0, 1] - empty[:, 0, 0] >= TURN)
         some = np.flatnonzero(~nowhere)
         parts = unfilled[some], counts[some], witness[some]
-        fill_cells(arm, cells[some], *parts, known, room, tries)
+        fill_cells(arm, cells[some], *parts, known, room, TRIES)
         unfilled[some], counts[some], witness[some] = parts
         for arcs, count in ((unfilled, counts), (empty, empties)):
             arcs[np.arange(MOST_ARCS) >= count[:, None]] = np.nan

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.distances import FREE, MEETS, free_between, judge_polyline
+from er3a.collision.distances import FREE, MEETS, free_between
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from testing.collision_peers import SHAPES, Outsider, Peer, coal_distance, fcl_distance, own_distance
@@ -79,21 +77,3 @@ def test_moves_that_are_proven_free_are_so_at_every_point_that_pinocchio_looks_a
         if met:
             assert states[-1] == MEETS
     assert {FREE, MEETS} <= set(states)
-
-
-@pytest.mark.long
-def test_a_path_proven_at_once_is_what_its_moves_are(random):
-    robot = load_robot("er3a_c60")
-    bodies = Bodies(robot, load_scene(SCENE))
-    ends = random.uniform(robot.lower, robot.upper, (7, 6)) * 0.7
-    s = np.linspace(0, 6, 400)
-    q = np.stack([np.interp(s, np.arange(7), ends[:, k]) for k in range(6)], axis=1)
-    states = np.empty(len(q) - 1, np.int64)
-    looked = judge_polyline(bodies.layout, q, 1e-4, states)
-    alone = [free_between(bodies.layout, a, b, 1e-4, 10_000)[0] for a, b in pairwise(q)]
-    np.testing.assert_array_equal(states == MEETS, np.array(alone) == MEETS)
-    assert (states[np.array(alone) == FREE] == FREE).all()
-    assert looked < len(q)
-    overlap = ~bodies.free(q)
-    assert (states[overlap[:-1] | overlap[1:]] != FREE).all()
-    assert {FREE, MEETS} <= set(states.tolist())

@@ -14,7 +14,7 @@ import pytest
 import er3a
 from er3a.dynamics.arm_model import arm_model
 from er3a.dynamics.margins import load_tolerance, parameters, torque_tolerance
-from er3a.dynamics.torques import accelerations, power_imbalance, torque_parts
+from er3a.dynamics.torques import power_imbalance, torque_parts
 from er3a.errors import Er3aError, PoseError, RobotError, ShapeError
 from er3a.kinematics.chain import link_parts
 from er3a.robots.masses import Drives, LinkMass, Load, MassBody, Masses, moved
@@ -276,16 +276,6 @@ def test_what_pinocchio_makes_of_rotors_and_friction():
     one, zero = np.ones(1), np.zeros(1)
     assert pinocchio.rnea(model, model.createData(), zero, one, one)[0] == pytest.approx(1.5)
     assert pinocchio.aba(model, model.createData(), zero, one, 1.5 * one)[0] == pytest.approx(1.0)
-
-
-def test_accelerations_undo_torques_and_name_a_joint_without_inertia(arm):
-    q, qd, qdd = motions(arm)
-    if arm.name == "er3a_c60":
-        with pytest.raises(RobotError, match="joint 6 moves nothing that has inertia"):
-            accelerations(arm, q, qd, qdd)
-        return
-    tau = er3a.torques(arm, q, qd, qdd)
-    np.testing.assert_allclose(accelerations(arm, q, qd, tau), qdd, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ARMS)

@@ -23,7 +23,6 @@ from er3a.identifiability.proposals import (
     Proposal,
     ReadLimit,
     TimeJoint,
-    measured,
     proposals_of,
 )
 from er3a.kinematics.table_batch import robot_of, tables_of
@@ -31,6 +30,7 @@ from er3a.references.quantities import CarriedCoordinate, PointCoordinate
 from er3a.references.reference import Document, Documents, Reference
 from er3a.references.subjects import PointAtPose
 from er3a.robots.robot import Robot
+from testing.proposed_measurements import measured
 
 TRACKER = ("tracker", "measured", "tracker")
 SETTLED = ("settled", "settled_up_to_signs")

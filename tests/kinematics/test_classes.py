@@ -17,7 +17,7 @@ from er3a.kinematics.classes.arm_angle import (
     is_out_of_reach,
     solve_at_arm_angle,
 )
-from er3a.kinematics.classes.chain_solvers import arm_class
+from er3a.kinematics.classes.chain_solvers import chain_solver
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
 from er3a.kinematics.classes.hidden_joint import TERMS, zeros_on_circle
 from er3a.kinematics.classes.parallel_axes import three_parallel
@@ -291,16 +291,8 @@ def test_scara_and_other_seven_joints():
     ],
 )
 def test_classes(name, code):
-    assert arm_class(links(name)).code == code
-
-
-def test_what_an_arm_has_nearly():
-    a, alpha, d = (np.array(column, float) for column in ROWS["ur5"])
-    alpha[2] = 1e-6
-    found = arm_class(links_of_rows(a, alpha, d))
-    assert found.code == "general_six"
-    assert [pair.first for pair in found.nearly_parallel] == [3]
-    assert arm_class(links("ur5")).nearly_parallel == ()
+    chain = links(name)
+    assert chain_solver(chain, np.zeros(len(chain) - 1, dtype=bool)).code == code
 
 
 @settings(max_examples=60)

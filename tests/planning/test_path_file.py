@@ -65,7 +65,7 @@ def test_bad_paths_are_refused_by_field(tmp_path, path, change, message):
 
 
 def test_duplicate_names_and_empty_lists_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"paths\[1\]\.name: 'move' names an earlier path too"):
+    with pytest.raises(InputError, match=r"paths\[1\]\.name: 'move' is also that of paths\[0\]"):
         load_paths(write(tmp_path, JOINT, LINE | {"name": "move"}))
     with pytest.raises(InputError, match="paths"):
         load_paths(write(tmp_path))

@@ -20,12 +20,11 @@ from er3a.files.hand_eye_file import load_hand_eye
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import UrdfImport, export_urdf, import_urdf
-from er3a.formats.urdf_tree import chain_ends
 from er3a.kinematics.forward import forward
 from er3a.robots.masses import Load
 from er3a.robots.robot import ConvexPiece, Envelope, Robot
 from testing.arms import placement
-from testing.fleet import UrdfFile, urdf_files
+from testing.fleet import UrdfFile, chain_ends, urdf_files
 
 LOAD = Load(5.0, (0.02, -0.03, 0.11), (0.02, 0.03, 0.025, 0.001, 0.002, -0.001))
 BOX = '<collision><origin xyz="0.1 0 0" rpy="0.2 0 0"/><geometry><box size="0.1 0.2 0.05"/></geometry></collision>'

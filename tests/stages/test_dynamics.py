@@ -16,7 +16,7 @@ import er3a
 import er3a.pipeline.messages.dynamics
 from er3a.dynamics.plausibility import MissingLink
 from er3a.errors import InputError
-from er3a.files.robot_file import WristLoadFields, check_masses
+from er3a.files.robot_file import WristLoadGroup, check_masses
 from er3a.pipeline.messages import dynamics
 from er3a.pipeline.messages.say import listed, say
 from er3a.pipeline.results import Stored, read_results
@@ -385,7 +385,9 @@ def test_forces_of_joints_that_slide_are_not_called_torques_in_newton_metres(ful
 
 
 def test_moments_about_a_joint_that_slides_are_refused():
-    wrist_group = WristLoadFields.model_validate({"rows": [{"joint": 3, "moment_n_m": 4.0}]})
+    wrist_group = WristLoadGroup.model_validate(
+        {"source": "a sheet", "grade": "claim", "rows": [{"joint": 3, "moment_n_m": 4.0}]}
+    )
     with pytest.raises(ValueError, match="joint 3 slides"):
         check_masses(None, None, wrist_group, [False, False, True, False])
 

@@ -16,7 +16,7 @@ from er3a.files.hand_eye_file import load_hand_eye
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
-from er3a.geometry.transforms import transform
+from er3a.geometry.transforms import moved, step_between, transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.stages.vision.compute import grasp_programs
 from er3a.planning.timing import joint_limits
@@ -24,7 +24,6 @@ from er3a.planning.way_around import EndOutsideLimits, PlannerMissing
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import within
-from er3a.vision.calibration_set import moved, step_between
 from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, GraspUnlikely, NoTransfer, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye

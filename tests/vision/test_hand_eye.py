@@ -9,8 +9,9 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
+from er3a.geometry.transforms import moved
 from er3a.pipeline.messages.vision import say
-from er3a.vision.calibration_set import CalibrationSet, moved
+from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
 from er3a.vision.hand_eye import calibrate_hand_eye, position_axes
 from er3a.vision.likelihood import flange_to_camera, residuals

@@ -75,7 +75,19 @@ ARM_CLASSES: dict[ArmClassCode, ArmClassTraits] = {
     "dependent": ArmClassTraits(),
     "unsolved": ArmClassTraits(),
 }
-"""All classes; where a chain can be taken as one of several, the first is preferred."""
+"""All classes; where a chain can be taken as one of several, the first is preferred.
+
+- ``spherical_wrist``: axes 2 and 3 parallel to 1e-9 rad, axes 4, 5, 6 meet to 1e-9 m;
+- ``three_parallel``: axes 2, 3, 4 parallel, 5 and 6 meet; ``general_six``: any other six revolute joints;
+- ``six_one_prismatic``: six joints, one of them prismatic; ``six_two_prismatic``: two of them; ``gantry``: three;
+- ``arm_angle``: seven revolute joints, the first three axes meet, and the last three; ``redundant``: others with
+  more than six joints;
+- ``scara``: four joints with one direction, one of them prismatic; ``free_roll``: five joints, the turn about the
+  tool's z axis is left over; ``planar_wrist``: up to five joints, solved for those poses that they can take exactly;
+  ``position``: three joints, solved for the tool point;
+- ``dependent``: joints that move the tool in fewer ways than their number (six at most), such as two parallel slides:
+  each pose that they reach, they reach in infinitely many ways; ``unsolved``: none of these.
+"""
 ALL_OF_POSE = ArmClassTraits().task
 
 BranchLabel = Literal[

@@ -9,7 +9,7 @@ import numpy as np
 import er3a.pipeline.messages.collision
 import er3a.pipeline.messages.diagnosis
 import er3a.pipeline.messages.planning  # noqa: F401
-from er3a.geometry.transforms import rpy_of
+from er3a.geometry.transforms import quaternion_of, rpy_of
 from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.language import N_, as_text
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
@@ -18,7 +18,7 @@ from er3a.pipeline.stages.vision.model import (
     GraspCounts,
 )
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
-from er3a.vision.calibration_set import TimeOffset, quaternion_of
+from er3a.vision.calibration_set import TimeOffset
 from er3a.vision.grasping import (
     GraspCollides,
     GraspUnlikely,

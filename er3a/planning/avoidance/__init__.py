@@ -1,1 +1,3 @@
-"""Singularity avoidance: one module per strategy, each one function of a path with singular segments."""
+"""Singularity avoidance: ``avoidance`` finds the segment of a path that is singular, ``strategies`` has each strategy,
+a function from such a segment to a motion or to why there is none, and compares them.
+"""

@@ -32,6 +32,7 @@ import numpy as np
 import scipy
 
 from er3a.errors import PoseError
+from er3a.geometry.transforms import moved
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward, frames, rows_of, step_row, turn_row
@@ -197,7 +198,7 @@ def _directions(
     moves = np.zeros((6, 6))
     moves[:3, part], moves[3:, part] = size * np.eye(3), -size * np.eye(3)
     ahead = np.array([min(top + 1e-4, 1.0), max(top - 1e-4, 0.0)])
-    T = np.concatenate([_moved(pose, moves), path.poses(ahead), pose[None]])
+    T = np.concatenate([moved(pose, moves), path.poses(ahead), pose[None]])
     beside = _beside(segment, T, slot, singular)
     slope = ((beside[:3] - beside[3:6]) / (2 * size)).T
     along = beside[6] - beside[7]
@@ -245,13 +246,6 @@ def _plane_across(axis: Reals) -> Reals:
     first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(axis, first)])
-
-
-def _moved(pose: Reals, moves: Reals) -> Reals:
-    T = np.repeat(pose[None], len(moves), axis=0)
-    T[:, :3, 3] += moves[:, :3]
-    T[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(moves[:, 3:]).as_matrix() @ T[:, :3, :3]
-    return T
 
 
 def _least(

@@ -111,14 +111,12 @@ class AvoidanceTask:
 
     def _no_more_than(self, found: judgement.Judgement) -> JointLimits:
         """The limits, or what of them the path needs if that is less."""
-        if found.fast or found.max_speed is None or found.max_acceleration is None:
+        if found.fast or found.greatest is None:
             return self.limits
-        speed = float((found.max_speed / self.limits.speed).max())
-        acceleration = float((found.max_acceleration / self.limits.acceleration).max())
-        speed, acceleration = (min(1.0, max(ratio, LEAST_RATIO)) for ratio in (speed, acceleration))
-        return replace(
-            self.limits, speed=self.limits.speed * speed, acceleration=self.limits.acceleration * acceleration
-        )
+        limits = self.limits.speed, self.limits.acceleration
+        ratios = (float((most / limit).max()) for most, limit in zip(found.greatest, limits))
+        speed, acceleration = (limit * min(1.0, max(ratio, LEAST_RATIO)) for limit, ratio in zip(limits, ratios))
+        return replace(self.limits, speed=speed, acceleration=acceleration)
 
     def _planned(self, motion: Motion) -> list[StrategyResult]:
         """The planner's motion between the ends of a path, where both can be reached."""
@@ -281,6 +279,7 @@ def path_summary(
     labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
     contacts = judgement.collisions(along)
+    speed, acceleration = found.greatest or (None, None)
     return model.PathSummary(
         name=entry.name,
         title=entry.title,
@@ -307,9 +306,9 @@ def path_summary(
             model.Jump(jump.t, jump.joint, float(np.degrees(jump.angle)))
             for jump in (followed.jumps if followed else ())
         ),
-        max_joint_speed_deg_s=None if found.max_speed is None else tuple(shown(robot, found.max_speed).tolist()),
-        max_joint_speed_ratio=_ratio(found.max_speed, limits.speed),
-        max_joint_acceleration_ratio=_ratio(found.max_acceleration, limits.acceleration),
+        max_joint_speed_deg_s=None if speed is None else tuple(shown(robot, speed).tolist()),
+        max_joint_speed_ratio=_ratio(speed, limits.speed),
+        max_joint_acceleration_ratio=_ratio(acceleration, limits.acceleration),
         joint_speed_bounded=found.speed_bounded,
         velocity_check_deg_s=float(np.degrees(found.velocity_check)),
         collisions=_stretches(motion, contacts),

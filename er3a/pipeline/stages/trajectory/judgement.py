@@ -32,44 +32,43 @@ SPEED_STEP = 1e-5  # share of the duration
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
-    """A motion's faults, collisions apart.
+class Faults:
+    """Faults of a motion by its joints, collisions apart.
 
     Attributes
     ----------
     fast : where a joint exceeds a limit of speed, acceleration or jerk
     undecided : where the bounds leave something open
-    times, q, velocity, acceleration : (N,) s and (N, n) in rad, rad/s, rad/s^2 at all points of the table
-    max_speed, max_acceleration : (n,), rad/s and rad/s^2; None where they have no bound
-    speed_bounded : False where the exact path needs a joint speed without bound
-    velocity_check : rad/s, largest difference between velocities through the Jacobian and by differences of angles
+    greatest : maximum speeds (n,), rad/s, and accelerations (n,), rad/s^2, if any are known
     """
-
-    verdict: PathVerdict
-    events: list[motion_faults.SingularEvent]
-    limits: list[motion_faults.Interval[motion_faults.LimitCause]]
-    beyond: list[motion_faults.Interval[motion_faults.PathOutOfReach]]
-    fast: list[motion_faults.Interval[motion_faults.RateCause]]
-    undecided: list[motion_faults.Interval[Undecided]]
-    times: Reals
-    q: Reals
-    velocity: Reals
-    acceleration: Reals
-    max_speed: Reals | None
-    max_acceleration: Reals | None
-    speed_bounded: bool
-    velocity_check: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """Faults of a motion, and its maximum speeds and accelerations (n,), if any are known."""
 
     events: list[motion_faults.SingularEvent]
     limits: list[motion_faults.Interval[motion_faults.LimitCause]]
     fast: list[motion_faults.Interval[motion_faults.RateCause]]
     undecided: list[motion_faults.Interval[Undecided]]
     greatest: tuple[Reals, Reals] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement(Faults):
+    """A motion's faults and the verdict that they make.
+
+    Attributes
+    ----------
+    beyond : where no branch reaches the pose
+    times, q, velocity, acceleration : (N,) s and (N, n) in rad, rad/s, rad/s^2 at all points of the table
+    speed_bounded : False where the exact path needs a joint speed without bound
+    velocity_check : rad/s, largest difference between velocities through the Jacobian and by differences of angles
+    """
+
+    verdict: PathVerdict
+    beyond: list[motion_faults.Interval[motion_faults.PathOutOfReach]]
+    times: Reals
+    q: Reals
+    velocity: Reals
+    acceleration: Reals
+    speed_bounded: bool
+    velocity_check: float
 
 
 def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Judgement:
@@ -90,26 +89,21 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
     edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
     bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
     return Judgement(
+        **vars(found) | ({} if bounded else {"greatest": None}),
         verdict="none found"
         if motion.no_way
         else _verdict(found, bool(beyond), bool(jumps), motion.followed is not None),
-        events=found.events,
-        limits=found.limits,
         beyond=beyond,
-        fast=found.fast,
-        undecided=found.undecided,
         times=times,
         q=q,
         velocity=velocity,
         acceleration=acceleration,
-        max_speed=found.greatest[0] if bounded and found.greatest else None,
-        max_acceleration=found.greatest[1] if bounded and found.greatest else None,
         speed_bounded=bool(bounded),
         velocity_check=_velocity_check(motion),
     )
 
 
-def _verdict(found: _Found, beyond: bool, jumps: bool, of_tool: bool) -> PathVerdict:
+def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVerdict:
     known = [part for part in found.fast if not isinstance(part.cause, ASSUMED)]
     faults: dict[PathVerdict, object] = {
         "unreachable": beyond,
@@ -123,7 +117,7 @@ def _verdict(found: _Found, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
     return next((verdict for verdict, there in faults.items() if there), "safe")
 
 
-def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSingular, limits: JointLimits) -> _Found:
+def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSingular, limits: JointLimits) -> Faults:
     """Faults found in one run through the motion, whose parts are made while they are wanted."""
     singular = motion_faults.SingularCheck(robot, near) if closed_form_missing(robot) is None else None
     within, greatest = motion_faults.LimitCheck(robot), motion_faults.MaxRates(robot.joints)
@@ -140,7 +134,7 @@ def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSi
     else:  # sampled: a move of the joints takes no harm from singular poses
         t = np.union1d(checks, motion.times)
         events = motion_faults.singular_events(robot, t, motion.joints(t), motion.joints, near)
-    return _Found(
+    return Faults(
         events=events,
         limits=within.intervals(),
         fast=[part for check in rates for part in check.intervals()],
@@ -149,7 +143,7 @@ def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSi
     )
 
 
-def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> _Found:
+def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Faults:
     """Faults at the poses solved for the proof, between which it leaves no room for others."""
     proof = motion.proof
     assert proof is not None
@@ -173,7 +167,7 @@ def _tool_faults(robot: Robot, motion: Motion, near: NearSingular, limits: Joint
     followed = motion.followed
     assert followed is not None
     ends = followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events)
-    return _Found(
+    return Faults(
         events=events,
         limits=motion_faults.out_of_limits(robot, t, q, motion.joints),
         fast=fast,

@@ -18,7 +18,7 @@ from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
 from er3a.files.vision_file import ObjectEntry, VisionFile, load_vision
 from er3a.files.yaml_file import load
-from er3a.geometry.transforms import rpy_of
+from er3a.geometry.transforms import inverted, quaternion_of, rpy_of
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
@@ -41,7 +41,7 @@ from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
 from er3a.robots.joint_limits import joint_columns, shown
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
-from er3a.vision.calibration_set import TimeOffset, inverted, quaternion_of
+from er3a.vision.calibration_set import TimeOffset
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spread_of

@@ -9,6 +9,7 @@ import rerun as rr
 import scipy
 
 from er3a.files.vision_file import VisionFile, load_vision
+from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.say import say
@@ -21,7 +22,6 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rg
 from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, write_recording
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
-from er3a.vision.calibration_set import posed
 
 MAGNIFIED = 50.0
 SIGHT = 0.35  # of the farthest distance, how far the drawn pyramid reaches

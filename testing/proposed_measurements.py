@@ -1,0 +1,59 @@
+"""What a measurement that er3a proposes would show on an arm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+from er3a.identifiability.proposals import LookAtMotion, MeasureLength, Proposal, ReadLimit, TimeJoint
+from er3a.references.predict import predict
+from er3a.references.quantities import Limit, Quantity, Speed
+from er3a.references.reference import Reference
+from er3a.references.seen import COARSE_DEG, Seen, SeenMotion, TableEntry
+from er3a.references.subjects import EntryOfTable, JointLimit, JointSpeed, MotionOfJoint, ReferenceSubject
+from er3a.robots.robot import Robot
+
+MEASURED = "measured"
+
+
+def measured(proposal: Proposal, arm: Robot, origin: str = MEASURED) -> Reference:
+    """What the proposed measurement shows on an arm, as a reference."""
+    subject, quantity, group = _about(proposal)
+    expected = float(predict(arm, [_plain(quantity, subject, group)])[0])
+    width = COARSE_DEG
+    if isinstance(proposal, LookAtMotion):
+        if expected > 90.0 and isinstance(quantity, SeenMotion):
+            quantity = replace(quantity, seen=opposite(proposal.seen))
+            subject = replace(cast(MotionOfJoint, subject), seen=quantity.seen)
+        expected = 0.0
+    elif isinstance(proposal, MeasureLength):
+        width = proposal.half_width_mm
+    elif isinstance(proposal, TimeJoint):
+        width = proposal.half_width_deg_s
+    else:
+        width = proposal.half_width_deg
+    return Reference(subject, group, quantity, expected, width, origin, "measured", origin)
+
+
+def opposite(seen: Seen) -> Seen:
+    """What is seen if the joint turns the other way."""
+    turned = {"up": "down", "left": "right", "forward": "back"}
+    turned |= {other: one for one, other in turned.items()}
+    stem, _, last = seen.rpartition("_")
+    return cast(Seen, f"{stem}_{turned[last]}" if stem else turned[last])
+
+
+def _about(proposal: Proposal) -> tuple[ReferenceSubject, Quantity, str]:
+    joint = proposal.joint
+    if isinstance(proposal, LookAtMotion):
+        motion = SeenMotion(proposal.pose_deg, joint, proposal.point, proposal.seen)
+        return MotionOfJoint(joint, proposal.point, proposal.seen), motion, "key_poses"
+    if isinstance(proposal, ReadLimit):
+        return JointLimit(joint, proposal.side), Limit(joint, proposal.side), "limits"
+    if isinstance(proposal, TimeJoint):
+        return JointSpeed(joint), Speed(joint), "speeds"
+    return EntryOfTable(proposal.column, joint), TableEntry(proposal.column, joint), "axes"
+
+
+def _plain(quantity: Quantity, subject: ReferenceSubject, group: str) -> Reference:
+    return Reference(subject, group, quantity, 0.0, 1.0, MEASURED, "measured")
