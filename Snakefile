@@ -35,6 +35,7 @@ onerror:
 onsuccess:
     print(
         *told("note: "),
+        *(f"The article, item by item: reports/{page}" for page in STUDY.article_pages().values()),
         f"\nOpen reports/index.html in a browser; `{view_command()}` opens the recordings.",
         sep="\n",
     )

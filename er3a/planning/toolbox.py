@@ -75,7 +75,7 @@ def rpy(T: Reals) -> Reals:
     PoseError, ShapeError
         if T is no rigid transform
     """
-    return rpy_of(check_poses(T))
+    return rpy_of(check_poses(T)) + 0.0  # no -0
 
 
 def zyz(T: Reals) -> Reals:

@@ -309,7 +309,9 @@ class Robot(ByValue, Displayed):
         return self.tool if self.flange_is_last_frame else self.flange @ self.tool
 
     def replace(self, **changes: Any) -> Robot:
-        """A copy with other values for some attributes."""
+        """A copy with other values for some attributes; a title that was the name follows it."""
+        if "name" in changes and self.title == self.name:
+            changes = {"title": changes["name"]} | changes
         return replace(self, **changes)
 
     def sheet(self) -> Sheet:

@@ -91,6 +91,8 @@ def test_from_dh_is_the_robot_of_a_table(arm, tmp_path):
     assert np.allclose(er3a.forward(er3a.load_robot("er3a_c60_article"), GOAL), er3a.forward(arm, GOAL), atol=1e-12)
     with pytest.warns(er3a.InputWarning):
         assert er3a.load_robot(table, convention="modified").convention == "modified"
+    assert arm.replace(name="other").title == "other"
+    assert arm.replace(title="Mine").replace(name="other").title == "Mine"
 
 
 def test_another_unit_in_a_table_is_warned_of():

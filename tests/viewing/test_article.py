@@ -123,6 +123,8 @@ def test_the_line_is_as_easy_as_its_joint_speeds_say(numbers):
     assert (numbers.peak_joint, numbers.peak_s) == (1 + speeds[at].argmax(), pytest.approx(t[at], abs=0.1))
     assert {"slow", "detour"} <= set(numbers.strategies_usable)
     assert {"stop", "via_shift"} <= set(numbers.strategies_unusable)
+    assert numbers.strategy in numbers.strategies_usable
+    assert numbers.line_turn_deg == pytest.approx(180)  # from the tool's axes (x, -y, -z) to (-x, y, -z)
 
 
 def test_joint_5_near_0_needs_speed_as_one_over_its_sine(numbers):
@@ -153,6 +155,7 @@ def test_6_kg_are_heavy_for_joint_2(numbers):
 def test_a_hole_is_blamed_as_in_the_article_only_on_limits_and_directions(numbers):
     meeting = {change.entry for change in numbers.changes_meeting}
     assert meeting == {"offset2"}
+    assert not {("d6", 62.8), ("a2", 1300.0)} & {(change.entry, change.tried) for change in numbers.changes_gone}
     assert agreements(numbers)["hole"] == "in_part"
     limit = replace(numbers.changes_meeting[0], column="upper")
     assert agreements(replace(numbers, changes_meeting=(limit,)))["hole"] == "agrees"

@@ -150,6 +150,8 @@ class ArticleNumbers:
     crossing_speed_deg_s: float
     peak_joint: int
     peak_s: float
+    line_turn_deg: float
+    strategy: StrategyName | None
     strategies_usable: tuple[StrategyName, ...]
     strategies_unusable: tuple[StrategyName, ...]
     repair_mm: float | None
@@ -225,7 +227,7 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     cloud = 1000 * _points(robot, random)
     void = np.array(printed.void_mm if printed.void_mm else (np.nan,) * 3)
     move, line = (_path(trajectory, name) for name in (MOVE, LINE))
-    repair = next((tried.motion for tried in line.avoidance if tried.name == line.strategy), None)
+    repair = line.chosen.motion if line.chosen else None
     rpy = (0.0, 90.0, 0.0), (30.0, 90.0, 30.0)
     same = [transform(np.zeros(3), np.radians(angles)) for angles in rpy]
     rounds = validation.round_trips
@@ -268,6 +270,7 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
         move_speed_deg_s=max(move.max_joint_speed_deg_s or (np.nan,)),
         move_acceleration_deg_s2=_greatest_acceleration(results, tables.printed),
         line_speed_deg_s=max(line.max_joint_speed_deg_s or (np.nan,)),
+        line_turn_deg=_line_turn_deg(robot),
         **_of_the_line(results, tables.printed, printed, line),
         repair_mm=repair.max_deviation_mm if repair else None,
         repair_deg=repair.max_deviation_deg if repair else None,
@@ -426,6 +429,12 @@ def _turn_deg(robot: Robot, step_deg: Sequence[float]) -> float:
     return float(np.degrees(rotation_angle(T[0, :3, :3], T[1, :3, :3])))
 
 
+def _line_turn_deg(robot: Robot) -> float:
+    """How far apart (deg) the orientations at both ends of the article's line are."""
+    end = transform(np.array(LINE_END_MM) / 1000, np.radians(LINE_END_RPY_DEG))
+    return float(np.degrees(rotation_angle(forward(robot, np.zeros(6))[:3, :3], end[:3, :3])))
+
+
 def _shift_mm(robot: Robot, angle: float) -> float:
     """By how much one degree of joint 4 moves the tool point, joint 5 at an angle (rad) and the others at 0."""
     q = np.zeros((2, 6))
@@ -476,6 +485,7 @@ def _of_the_line(results: Path, robot: str, table: TableNumbers, line: PathSumma
         "crossing_speed_deg_s": float(np.interp(max(crossings, default=np.nan), rows.t_s, speeds.max(axis=1))),
         "peak_joint": int(joint) + 1,
         "peak_s": float(rows.t_s[peak]),
+        "strategy": line.strategy,
         "strategies_usable": tuple(tried.name for tried in line.avoidance if tried.usable),
         "strategies_unusable": tuple(tried.name for tried in line.avoidance if not tried.usable),
     }

@@ -309,7 +309,7 @@ def _write(
         pages_in=mark,
         roles=[tr(word) for word in ROLES.values()],
         robots=[(name, study.robot(name), study.pages(name)) for name in tables.names],
-        table_columns=["i>", "a (mm)>", "α (°)>", "d (mm)>", tr("offset (°)>"), tr("limits (°)>")],
+        table_columns=["i>", "a (mm)>", "α (°)>", "d (mm)>", tr("direction>"), tr("offset (°)>"), tr("limits (°)>")],
         table_rows=[_dh_rows(study.robot(name)) for name in tables.names],
         drawn=drawn,
         of_section={"3.2": ["wrist"], "5.2": ["move", "line", "measures"]},
@@ -388,6 +388,8 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
     listed |= {"zyz": numbers.printed.example_zyz_deg, "quaternion": numbers.printed.example_quaternion}
     parts |= {f"{name}_{k}": value for name, values in listed.items() for k, value in enumerate(values)}
     parts["quintic_crossings"] = _times(numbers.quintic_crossings_s)
+    parts["way_chosen"] = strategy_word(numbers.strategy) if numbers.strategy else "–"
+    parts["round_trips"] = number(numbers.round_trips)
     parts["ways_usable"] = joined(map(strategy_word, numbers.strategies_usable)) or "–"
     parts["ways_unusable"] = joined(map(strategy_word, numbers.strategies_unusable)) or "–"
     parts |= {f"figure_{name}": place for name, place in places.items()}
@@ -518,6 +520,7 @@ def _dh_rows(robot: Robot) -> list[list[str]]:
             f"{round(1000 * float(robot.a[k]), 4) + 0.0:g}",
             deg(robot.alpha[k]),
             f"{round(1000 * float(robot.d[k]), 4) + 0.0:g}".replace("-", "−"),
+            f"{robot.direction[k]:+.0f}".replace("-", "−"),
             deg(robot.offset[k]),
             f"{deg(robot.lower[k])} … {deg(robot.upper[k])}",
         ]

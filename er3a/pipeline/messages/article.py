@@ -371,7 +371,9 @@ ITEMS = (
         N_("50 poses on a straight line are solved one after the other with ikcon, each from the last."),
         N_(
             "er3a follows the whole line of both tables, in ctraj's own time law: a trapezoid of speed, each ramp a "
-            "third of the time. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°."
+            "third of the time. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°. As printed the tool "
+            "turns by {line_turn_deg:.0f}° on the way: both directions are equally short, which the article does not "
+            "mention; er3a takes the counterclockwise one, seen from above."
         ),
     ),
     Item(
@@ -414,8 +416,10 @@ ITEMS = (
         N_("Stop, go round in joint space, warn the operator, or bend the line by a via point (6.2)."),
         N_(
             "All are tried and compared on the trajectory page. On the article's line as printed these work: "
-            "{ways_usable}; these do not, mostly because it begins at the singularity: {ways_unusable}. The one chosen "
-            "leaves it by {repair_mm:.0f} mm and {repair_deg:.1f}° and takes {repair_longer_s:.2f} s longer."
+            "{ways_usable}; these do not, mostly because it begins at the singularity: {ways_unusable}. Recommended: "
+            "{way_chosen}; it leaves the line by {repair_mm:.0f} mm and {repair_deg:.1f}° and takes "
+            "{repair_longer_s:.2f} s longer. To go through the singularity, if slowly, is the last resort: the tool's "
+            "least error makes it a near miss."
         ),
     ),
     Item(

@@ -167,7 +167,7 @@ def decision(
     if table == "fail":
         return tr("Never use this table: evidence contradicts it, so nothing computed from it holds for the robot.")
     if failed:
-        return tr("Do not use it as it is: see {stages}.", stages=", ".join(failed))
+        return tr("Do not use it as it is: see {stages}.", stages=joined(failed, ", "))
     if table == "pass":
         return tr(
             "Use it: every entry that moves the tool is settled by independent documents, and nothing here fails."
@@ -192,7 +192,7 @@ def what_it_can_do(stages: Mapping[str, Sequence[str]]) -> str:
     }
     known = dict(stages) | {"unknown": [*stages.get("no_reference", ()), *stages.get("not_computed", ())]}
     return joined(
-        [tr(text, stages=", ".join(known[status])) for status, text in said.items() if known.get(status)], " "
+        [tr(text, stages=joined(known[status], ", ")) for status, text in said.items() if known.get(status)], " "
     )
 
 

@@ -96,7 +96,7 @@ def _first_fault(path: PathSummary) -> tuple[str, float]:
     if at_any_pace or (found and path.verdict != "singular"):
         t, word, part = min(at_any_pace or found, key=lambda each: each[0])
         cause = say(part.cause.touches[0]) if isinstance(part.cause, BodiesOverlap) else cause_text(path, part)
-        return tr("at t = {time} s: {text}", time=fixed(t, 2), text=f"{word}: {cause}"), t
+        return tr("at t = {time} s: {text}", time=fixed(t, 2), text=tr("{fault}: {cause}", fault=word, cause=cause)), t
     return path_text(path), min((event.t_s for event in path.singularities), default=0.0)
 
 
@@ -130,7 +130,14 @@ def events(path: PathSummary) -> list[PlayedEvent]:
     passes = [PlayedEvent(e.t_s, e.until_s, _singular(e), "caution") for e in path.singularities]
     faults = [(word, stretch) for word, stretches in kinds(path) for stretch in stretches]
     return passes + [
-        PlayedEvent(s.t0_s, s.t1_s, f"{word}: {cause_text(path, s)}", "fail", _touching(s.cause)) for word, s in faults
+        PlayedEvent(
+            s.t0_s,
+            s.t1_s,
+            tr("{fault}: {cause}", fault=word, cause=cause_text(path, s)),
+            "fail",
+            _touching(s.cause),
+        )
+        for word, s in faults
     ]
 
 
