@@ -42,6 +42,7 @@ LEAST_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
 slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
+LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Parameter("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
 
@@ -73,23 +74,34 @@ def jacobian(robot: Robot, parameters: Sequence[Parameter], observations: Observ
 
 def subspace(robot: Robot, parameters: Sequence[Parameter], observations: Observations) -> Subspace:
     """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
-    one that lies in the span of those before it (to 0.1 % of its length) is held."""
+    one that lies in the span of those before it (to 0.1 % of its length) is held. So is one that does no more to points
+    which touch something than to turn or shrink what the table leaves of them: all of these could be brought to one."""
     J = SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None]
     norms = np.linalg.norm(J, axis=0)
+    turned = SCALE * _left_of_touched(robot, observations)
+    least = max(NO_EFFECT * norms.max(), turned / LEVER)
     kept: list[int] = []
     held: list[Held] = []
     basis: Reals = np.empty((len(J), 0))
     for k, norm in enumerate(norms):
         rest = J[:, k] - basis @ (basis.T @ J[:, k])
         rest -= basis @ (basis.T @ rest)
-        if norm > NO_EFFECT * norms.max() and np.linalg.norm(rest) > DEPENDENT * norm:
+        if norm > least and np.linalg.norm(rest) > max(DEPENDENT * norm, turned):
             kept.append(k)
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
-        still = norm <= NO_EFFECT * norms.max()
-        held.append(MovesNothing(parameters[k].name) if still else _confounded_with(robot, parameters, k, kept, J))
+        nothing = MovesNothing(parameters[k].name)
+        held.append(nothing if norm <= least else _confounded_with(robot, parameters, k, kept, J))
     singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
     return Subspace(tuple(kept), tuple(held), singular_values)
+
+
+def _left_of_touched(robot: Robot, observations: Observations) -> float:
+    """Length of the differences, in standard deviations, that a table leaves where points touch something; else 0."""
+    if not (isinstance(observations, PointObservations) and observations.dropped):
+        return 0.0
+    off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
+    return float(np.linalg.norm(off[observations.touched[observations.pose_of] >= 0]))
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
