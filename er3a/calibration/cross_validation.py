@@ -21,9 +21,9 @@ import scipy.sparse
 from scipy.cluster.vq import kmeans2
 
 from er3a.calibration.fit import Fit, jacobian
-from er3a.calibration.observations import DEPENDENT, PointObservations
+from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import TermVerdict
-from er3a.calibration.parameters import Parameter
+from er3a.calibration.parameters import DEPENDENT, Parameter
 from er3a.calibration.terms import (
     KINDS,
     RIPPLES,

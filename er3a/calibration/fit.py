@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.calibration.observations import DEPENDENT, Observations, PointObservations, directions, socket
+from er3a.calibration.observations import Observations, PointObservations, directions, socket
 from er3a.calibration.outcomes import (
     CalibrationError,
     Held,
@@ -26,7 +26,7 @@ from er3a.calibration.outcomes import (
     NotToldApart,
     SetsScale,
 )
-from er3a.calibration.parameters import MM, Parameter, corrected, parallel_pairs, parameters_of
+from er3a.calibration.parameters import DEPENDENT, MM, Parameter, corrected, parallel_pairs, parameters_of
 from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot

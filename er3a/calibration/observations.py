@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import MM, Parameter, moved, placed
+from er3a.calibration.parameters import DEPENDENT, MM, Parameter, moved, placed
 from er3a.errors import InputError
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.table_batch import frames_of, join, tables_of
@@ -38,8 +38,6 @@ TouchKind = Literal["place", "plane", "pair", "bar"]
 LEAST_LENGTH = 1e-9
 SOCKET_STEPS = 50
 SOCKET_STEP = 1e-13  # m
-DEPENDENT = 1e-3
-"""Share of a direction's length that has to lie outside the span of others to count as one more: 0.1 mm of 100 mm."""
 AT_ONCE = 8_000  # poses of tables whose frames are held at once
 
 
