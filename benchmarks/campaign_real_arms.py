@@ -159,7 +159,8 @@ def _worst_rows(name: str, run: Unseen) -> list[str]:
     for model, distances in models.items():
         size = float(np.sqrt((distances**2).mean() / 3))
         by_noise = size * scipy.stats.maxwell.ppf(0.5 ** (1 / len(distances)))
-        drawn = [[random.choice(distances, count, replace=False).max() for _ in range(DRAWS)] for count in (20, 40)]
+        sizes = [min(count, len(distances)) for count in (20, 40)]
+        drawn = [[random.choice(distances, count, replace=False).max() for _ in range(DRAWS)] for count in sizes]
         of_few = " | ".join(f"{np.median(w):.3f} | {np.mean(np.array(w) <= MOST_WORST_MM):.1%}" for w in drawn)
         shared = " | ".join(str(len(worst[model] & worst[other])) for other in ("robot file", "plain fit"))
         rows.append(

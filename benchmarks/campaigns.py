@@ -23,6 +23,7 @@ from testing.evidence import CAMPAIGNS, PAGES, SHARE, evidence, is_of_this_code,
 END = "<!-- end of {name} -->"
 ALONE = ("speed", "pages", "teach", "slurm")  # they measure times on the wall, or take all cores
 FIRST = ("fleet", "classes", "motion", "diagnosis", "kills", "hand_eye", "faults")  # the longest
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")  # BLAS, of small matrices, else waits
 _WRITING = threading.Lock()  # several write parts of one page
 
 
@@ -47,9 +48,8 @@ def _carried_out(name: str, share: float) -> float | None:
     """
     line = "" if share < 1 else made_from(name, 0)
     command = [sys.executable, "-m", "benchmarks.campaigns", "--table", name]
-    done = subprocess.run(
-        command, env=os.environ | {SHARE: f"{share:g}"}, capture_output=True, text=True, encoding="utf-8", check=False
-    )
+    env = ({} if name in ALONE else ONE_THREAD) | os.environ | {SHARE: f"{share:g}"}
+    done = subprocess.run(command, env=env, capture_output=True, text=True, encoding="utf-8", check=False)
     with _WRITING:
         if done.returncode:
             print(f"{name}: failed\n{done.stderr[-3000:]}", file=sys.stderr, flush=True)

@@ -31,27 +31,29 @@ def measured(arm: Robot, q: Reals, deviation_mm: float, random: np.random.Genera
 
 def covered(
     robot: Robot, runs: int, poses: int, deviation_mm: float, random: np.random.Generator
-) -> tuple[tuple[str, ...], NDArray[np.bool_]]:
+) -> tuple[tuple[str, ...], NDArray[np.bool_], int]:
     """Calibrate arms with random errors in the identifiable entries, each measured at random poses.
 
     Returns
     -------
     names : of the k identifiable entries
     inside : (runs, k) bool, whether the 95 % interval holds the true correction
+    terms : how many runs took errors of joints beyond the table, which there are not
     """
     kept = _identifiable(robot, poses, random)
     size = np.array([LENGTH_ERROR_M if parameter.unit == "mm" else ANGLE_ERROR_RAD for parameter in kept])
-    inside = np.zeros((runs, len(kept)), dtype=bool)
+    inside, terms = np.zeros((runs, len(kept)), dtype=bool), 0
     for run in range(runs):
         truth = random.normal(0.0, size)
         arm = corrected(robot, kept, truth)
         q = random.uniform(robot.lower, robot.upper, (poses, 6))
         found = calibrate(robot, measured(arm, q, deviation_mm, random))
+        terms += found.beyond is not None
         by_parameter = {estimate.parameter: estimate for estimate in found.estimates}
         for k, parameter in enumerate(kept):
             estimate = by_parameter[parameter]
             inside[run, k] = abs(estimate.correction - truth[k] * parameter.in_unit) <= estimate.half_width
-    return tuple(parameter.name for parameter in kept), inside
+    return tuple(parameter.name for parameter in kept), inside, terms
 
 
 def _identifiable(robot: Robot, poses: int, random: np.random.Generator) -> list[Parameter]:

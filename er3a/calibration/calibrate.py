@@ -42,7 +42,6 @@ from er3a.calibration.fit import (
 )
 from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
 from er3a.calibration.outcomes import (
-    INTERVAL_95,
     CalibrationError,
     FixedName,
     LevelName,
@@ -66,7 +65,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Pose
-from er3a.references.reference import ReferenceSet
+from er3a.references.reference import INTERVAL_95, ReferenceSet
 from er3a.robots.robot import Robot
 
 SHOWN_POSES = 3
@@ -470,9 +469,13 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     error, count = np.sqrt(np.diag(covariance)), len(found.kept)
     correlation = (covariance / np.outer(error, error))[:count, :count]
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
-    kept, deviation = found.kept, observations.deviation_mm
+    kept, deviation, here = found.kept, observations.deviation_mm, corrected(robot, found.kept, found.amounts)
+    bars: tuple[BarLength, ...] = ()
+    if isinstance(observations, PointObservations):
+        errors = JointErrors(robot, found.terms, found.coefficients)
+        bars = bar_lengths(here, errors, kept, observations, covariance, float(quantiles.max()))
     return Calibration(
-        robot=_with_ratios(corrected(robot, kept, found.amounts), found),
+        robot=_with_ratios(here, found),
         level=level.name,
         estimates=_estimates(robot, found, error, quantiles),
         correlation=correlation,
@@ -486,6 +489,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
         rms_after_mm=float(np.sqrt(np.mean((found.after * deviation) ** 2))),
         scatter=found.scatter,
         more=level.more,
+        bars=bars,
     )
 
 
@@ -530,7 +534,8 @@ class _Model:
 
 
 def _with_ratios(robot: Robot, found: Fit) -> Robot:
-    return with_ratios(robot, {term.joint: float(c) for term, c in zip(found.terms, found.coefficients)})
+    own = zip(found.terms, places_of(found.terms))
+    return with_ratios(robot, {t.joint: float(found.coefficients[at[0]]) for t, at in own if t.kind == "ratio"})
 
 
 def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> _Model:
@@ -558,15 +563,10 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
         used, model = again, _model(robot, every.take(again), free_ratios)
     distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model, used) ** 2))
     observations, table = model.observations, _result(robot, model.level, model.observations, model.table)
-    ratios = JointErrors(robot, model.table.terms, model.table.coefficients)
-    moved = observations.shifted(ratios.amounts(observations.row_values, observations.points(robot)))
-    kept = model.table.kept
-    covariance = _covariance(observations, model.table)[0][: len(kept), : len(kept)]
     return replace(
         table,
         deviation_mm=None if observations.deviation_known else float(observations.deviation_mm[0]),
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
-        bars=bar_lengths(corrected(robot, kept, model.table.amounts), kept, moved, covariance),
         left_out=_left_out(observations, model.table),
         residuals=_structure(robot, observations, model.table),
         tried=model.choice.tried,

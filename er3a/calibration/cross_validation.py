@@ -20,10 +20,10 @@ import scipy
 import scipy.sparse
 from scipy.cluster.vq import kmeans2
 
-from er3a.calibration.fit import DEPENDENT, Fit, jacobian
+from er3a.calibration.fit import Fit, jacobian
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import TermVerdict
-from er3a.calibration.parameters import Parameter
+from er3a.calibration.parameters import DEPENDENT, Parameter
 from er3a.calibration.terms import (
     KINDS,
     RIPPLES,

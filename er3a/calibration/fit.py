@@ -19,7 +19,6 @@ import numpy as np
 
 from er3a.calibration.observations import Observations, PointObservations, directions, socket
 from er3a.calibration.outcomes import (
-    INTERVAL_95,
     CalibrationError,
     Held,
     MovesNothing,
@@ -27,7 +26,7 @@ from er3a.calibration.outcomes import (
     NotToldApart,
     SetsScale,
 )
-from er3a.calibration.parameters import Parameter, corrected, parallel_pairs, parameters_of
+from er3a.calibration.parameters import DEPENDENT, MM, Parameter, corrected, parallel_pairs, parameters_of
 from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
@@ -35,16 +34,15 @@ from er3a.robots.robot import Robot
 STEP = 1e-5
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
-DEPENDENT = 1e-3
 STEPS = 30
 SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE = 1e-6  # of the weighted differences, of measured points
 HALVINGS = 12
 LEAST_OWN = 1e-9
-OFF_CONE = 0.02
-"""By how much (root mean square) the directions of a bar have to be off a common cone to settle its length."""
-SLID = 10.0
-"""Times what the table leaves of touched points that joints have to slide, to set the scale."""
+CLEAR = 10.0
+"""Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
+slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
+LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Parameter("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
 
@@ -76,23 +74,34 @@ def jacobian(robot: Robot, parameters: Sequence[Parameter], observations: Observ
 
 def subspace(robot: Robot, parameters: Sequence[Parameter], observations: Observations) -> Subspace:
     """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
-    one that lies in the span of those before it (to 0.1 % of its length) is held."""
+    one that lies in the span of those before it (to 0.1 % of its length) is held. So is one that does no more to points
+    which touch something than to turn or shrink what the table leaves of them: all of these could be brought to one."""
     J = SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None]
     norms = np.linalg.norm(J, axis=0)
+    turned = SCALE * _left_of_touched(robot, observations)
+    least = max(NO_EFFECT * norms.max(), turned / LEVER)
     kept: list[int] = []
     held: list[Held] = []
     basis: Reals = np.empty((len(J), 0))
     for k, norm in enumerate(norms):
         rest = J[:, k] - basis @ (basis.T @ J[:, k])
         rest -= basis @ (basis.T @ rest)
-        if norm > NO_EFFECT * norms.max() and np.linalg.norm(rest) > DEPENDENT * norm:
+        if norm > least and np.linalg.norm(rest) > max(DEPENDENT * norm, turned):
             kept.append(k)
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
-        still = norm <= NO_EFFECT * norms.max()
-        held.append(MovesNothing(parameters[k].name) if still else _confounded_with(robot, parameters, k, kept, J))
+        nothing = MovesNothing(parameters[k].name)
+        held.append(nothing if norm <= least else _confounded_with(robot, parameters, k, kept, J))
     singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
     return Subspace(tuple(kept), tuple(held), singular_values)
+
+
+def _left_of_touched(robot: Robot, observations: Observations) -> float:
+    """Length of the differences, in standard deviations, that a table leaves where points touch something; else 0."""
+    if not (isinstance(observations, PointObservations) and observations.dropped):
+        return 0.0
+    off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
+    return float(np.linalg.norm(off[observations.touched[observations.pose_of] >= 0]))
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
@@ -107,7 +116,7 @@ def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     if longest is None:
         return None
     slid, off = observations.slid(robot), observations.predict(robot, (), np.zeros((1, 0)))[0]
-    least = max(SLID * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
+    least = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
     return longest if np.linalg.norm(slid) < least else None
 
 
@@ -217,28 +226,38 @@ class BarLength:
 
 
 def bar_lengths(
-    robot: Robot, kept: Sequence[Parameter], observations: PointObservations, covariance: Reals
+    here: Robot,
+    errors: JointErrors,
+    kept: Sequence[Parameter],
+    observations: PointObservations,
+    covariance: Reals,
+    quantile: float,
 ) -> tuple[BarLength, ...]:
     """The lengths of bars of unknown length, which are fitted beside the sockets.
 
     Parameters
     ----------
-    robot : as it was fitted; kept, covariance : of what was estimated, (k,) and (k, k), m and rad
+    here : the corrected robot; errors : of its joints, with c coefficients
+    covariance : (k + c, k + c), of what was kept and of the coefficients, m and rad
+    quantile : half-width of a 95 % interval in standard errors
     """
     found = []
     for name, points in observations.unknown_bars():
-        xyz = points.positions(robot)
+        own = points.as_coordinates()
+        moved = own.shifted(errors.amounts(own.row_values, own.points(errors.robot)))
+        xyz = moved.positions(here)
         along, size = directions(xyz - socket(xyz, np.zeros(len(xyz))))
         basis = np.column_stack([along, np.ones(len(xyz))])
-        if np.linalg.matrix_rank(basis, tol=OFF_CONE * len(xyz) ** 0.5) < basis.shape[1]:
+        least = max(DEPENDENT, CLEAR * float(size.std() / size.mean()))
+        if np.linalg.matrix_rank(basis, tol=least * len(xyz) ** 0.5) < basis.shape[1]:
             found.append(BarLength(name, None, None))
             continue
         weights = np.linalg.pinv(basis)[-1]  # what the length takes of each distance, beside the socket
-        slopes = jacobian(robot, kept, points.as_coordinates()).reshape(len(xyz), 3, len(kept))
-        by_numbers = np.einsum("p,pi,pik->k", weights, along, slopes)
+        slopes = np.hstack([jacobian(here, kept, moved), term_jacobian(here, errors.robot, errors.terms, own, moved)])
+        by_numbers = (weights[:, None] * along).ravel() @ slopes
         variance = (weights * points.deviation_mm) @ (weights * points.deviation_mm)
         variance += by_numbers @ covariance @ by_numbers
-        found.append(BarLength(name, 1000 * float(size.mean()), INTERVAL_95 * float(np.sqrt(variance))))
+        found.append(BarLength(name, MM * float(size.mean()), quantile * float(np.sqrt(variance))))
     return tuple(found)
 
 

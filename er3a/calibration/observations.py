@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import MM, Parameter, moved, placed
+from er3a.calibration.parameters import DEPENDENT, MM, Parameter, moved, placed
 from er3a.errors import InputError
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.table_batch import frames_of, join, tables_of
@@ -38,8 +38,6 @@ TouchKind = Literal["place", "plane", "pair", "bar"]
 LEAST_LENGTH = 1e-9
 SOCKET_STEPS = 50
 SOCKET_STEP = 1e-13  # m
-FLAT = 1e-3
-"""Share of the largest singular value below which points, as on a circle, don't say on which side their socket is."""
 AT_ONCE = 8_000  # poses of tables whose frames are held at once
 
 
@@ -366,13 +364,13 @@ def socket(xyz: Reals, lengths: Reals) -> Reals:
     here = xyz - middle
     unknown = not lengths.any()
     squares = (here**2).sum(axis=1) - lengths**2
-    centre: Reals = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, FLAT)[0][:3]
+    centre: Reals = np.linalg.lstsq(np.column_stack([2 * here, np.ones(len(here))]), squares, DEPENDENT)[0][:3]
     for _ in range(SOCKET_STEPS):
         along, size = directions(here - centre)
         off = size - lengths
         if unknown:
             along, off = along - along.mean(axis=0), off - off.mean()
-        step = np.linalg.lstsq(along, off, FLAT)[0]
+        step = np.linalg.lstsq(along, off, DEPENDENT)[0]
         centre = centre + step
         if np.abs(step).max() < SOCKET_STEP:
             break

@@ -22,9 +22,6 @@ TermVerdict = Literal["taken", "not_lower", "noise", "wrong_way"]
 may have made it, or because a load would have to lift the arm."""
 
 
-INTERVAL_95 = 1.959963984540054
-
-
 @dataclass(frozen=True)
 class MovesNothing:
     """An entry moves none of the measured points."""

@@ -25,6 +25,8 @@ PLACED = BASE_COLUMNS + TOOL_COLUMNS
 IN_MM = ("a", "d", *BASE_COLUMNS[:3], *TOOL_COLUMNS)
 PARALLEL_RAD = np.radians(1.0)
 MM = 1000.0
+DEPENDENT = 1e-3
+"""Share of a direction's length that has to lie outside the span of others to count as one more: 0.1 mm of 100 mm."""
 
 
 @dataclass(frozen=True)

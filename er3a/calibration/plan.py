@@ -27,15 +27,16 @@ from er3a.calibration.observations import (
     observed,
     socket,
 )
-from er3a.calibration.outcomes import INTERVAL_95, FixedName, Held
+from er3a.calibration.outcomes import FixedName, Held
 from er3a.calibration.parameters import Parameter, parameters_of, placements_of
-from er3a.calibration.terms import effects
+from er3a.calibration.terms import JointErrors, effects
 from er3a.collision.along import clearance
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import Pose
+from er3a.references.reference import INTERVAL_95
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
@@ -125,7 +126,8 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
     chosen = [options[k] for k in _chosen(robot, kept, every, len(measurements), options, count)]
     proposals = tuple(each for option in chosen for each in option)
     then = _with(robot, measurements, proposals, seen)
-    now, new, ever = (_half_widths(robot, parameters, each) for each in (seen, then, every))
+    now, new = (_half_widths(robot, parameters, each) for each in (seen, then))
+    ever = (*(each.name for each in kept), *_bars(robot, (), every, np.zeros((0, 0))))
     units = {each.name: each.unit for each in parameters}
     return Plan(
         settled=tuple(now),
@@ -294,7 +296,10 @@ def _half_widths(robot: Robot, parameters: Sequence[Parameter], seen: PointObser
     covariance = np.asarray(SCALE**2 * np.linalg.pinv(J.T @ J), np.float64)
     errors = np.sqrt(np.diag(covariance))
     found = {each.name: INTERVAL_95 * float(error) * each.in_unit for each, error in zip(kept, errors)}
-    for bar in bar_lengths(robot, kept, seen, covariance):
-        if bar.half_width_mm is not None:
-            found[f"bar_{bar.name}"] = bar.half_width_mm
-    return found
+    return found | _bars(robot, kept, seen, covariance)
+
+
+def _bars(robot: Robot, kept: Sequence[Parameter], seen: PointObservations, covariance: Reals) -> dict[str, float]:
+    """Of bars whose length is settled half of its 95 % interval, mm; ``covariance`` (k, k) of what is kept."""
+    bars = bar_lengths(robot, JointErrors(robot, (), np.zeros(0)), kept, seen, covariance, INTERVAL_95)
+    return {f"bar_{each.name}": each.half_width_mm for each in bars if each.half_width_mm is not None}

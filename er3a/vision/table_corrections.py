@@ -18,9 +18,9 @@ import scipy
 
 from er3a.by_value import ByValue
 from er3a.calibration.calibrate import CLOSE, Close, Estimate
-from er3a.calibration.fit import DEPENDENT, NO_EFFECT, SCALE
+from er3a.calibration.fit import NO_EFFECT, SCALE
 from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
-from er3a.calibration.parameters import Parameter, parallel_pairs, parameters_of
+from er3a.calibration.parameters import DEPENDENT, Parameter, parallel_pairs, parameters_of
 from er3a.calibration.parameters import moved as moved_tables
 from er3a.geometry.transforms import inverse_right_jacobian, inverted, moved, step_between
 from er3a.kinematics.chain import row_values

@@ -129,7 +129,7 @@ def test_a_measured_tool_sees_more_than_the_flange(random):
 
 @pytest.mark.long
 def test_intervals_cover_the_truth_in_95_of_100_runs(random):
-    names, inside = covered(load_robot("er3_600"), 120, 25, 0.05, random)
+    names, inside, _ = covered(load_robot("er3_600"), 120, 25, 0.05, random)
     assert len(names) == 24
     assert 0.93 < inside.mean() < 0.97
 

@@ -8,8 +8,7 @@ from typing import ClassVar, Literal, Self, get_args
 
 from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
-from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, NextMeasurement, TooSmallToTell
-from er3a.diagnosis.faults import Faults
+from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, RankedHypothesis, TooSmallToTell
 from er3a.files.robot_library import robot_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
 from er3a.identifiability.evidence import PartName, PartStatus
@@ -22,7 +21,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
-from er3a.references.quantities import NotOfArm, Unit
+from er3a.references.quantities import NotOfArm
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach, ReferenceSubject, Subject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
@@ -422,21 +421,6 @@ class Conflict:
 
 
 Floats = tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class RankedHypothesis:
-    """A hypothesis of a diagnosis; see :class:`er3a.diagnosis.diagnose.Hypothesis`."""
-
-    faults: Faults
-    residual_before: float
-    residual_after: float
-    unit: Unit
-    explains: bool
-    half_widths: float
-    indistinguishable_from: tuple[Faults, ...]
-    to_decide: NextMeasurement | None
-    score: float
 
 
 @dataclass(frozen=True)
