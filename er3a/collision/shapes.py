@@ -96,7 +96,8 @@ def _uncovered(robot: Robot, link: int) -> bool:
 
 
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:
-    """What is to be said of collisions where the arm's shapes are assumed; None where a document gives them.
+    """What is to be said of collisions where the arm's shapes are assumed; None where a document that
+    verdicts rest on gives them.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class Verdict(Generic[FindingT]):
     """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
 
     ``unexamined``: pairs of bodies whose collisions were not looked at because their shapes can't be right. ``shapes``:
-    on what shapes of the arm it rests, if no document gives them. ``missed``: what was not examined and may turn it.
+    on what assumed shapes of the arm it rests. ``missed``: what was not examined and may turn it.
     """
 
     status: Status

@@ -606,6 +606,8 @@ ZEROS = "A 0,B 0,C 0"
         (["P={X 300,Y 0,Z 400,A 0,B 90,C 0}", "LIN P"], None),
         (["P={X 300,Y 0,Z 400,A 0,B 90,C 0}", "P={X 310}", "LIN P"], "undefined"),
         (["P.X=300", "P.Y=0", "P.Z=400", "LIN P"], None),  # the rest is where the arm stands
+        (["P=?!", "P.X=300", "P.Y=0", "P.Z=400", "LIN P"], "undefined"),
+        ([f"XP[1]={axes(NEAR)}", "XP[1]=?!", "PTP XP[1]"], "undefined"),
         ([f"LIN {{X 300,Y 0,Z 0,{ZEROS}}}:{{X 10,Y 0,Z 400}}"], "undefined"),
         ([f"LIN {{X 300,Y 0,Z 0,{ZEROS}}}:{{X 10,Y 0,Z 400,{ZEROS}}}"], None),
     ],
@@ -636,6 +638,8 @@ def test_a_position_that_leaves_out_a_turn_the_variable_had_does_not_say_which_s
         ([f"BASE_DATA[SEEN]={{X 0,Y 0,Z 9,{ZEROS}}}", "$BASE=BASE_DATA[1]"], None),
         (["BASE_DATA[1].Z=SEEN", "$BASE=BASE_DATA[1]"], None),
         (["$BASE=SEEN"], None),
+        (["BASE_DATA[1]=?!", "$BASE=BASE_DATA[1]"], None),
+        (["DECL FRAME BASE_DATA[16]", "$BASE=BASE_DATA[1]"], 0.05),
     ],
 )
 def test_a_frame_of_the_cell_is_what_the_program_makes_of_it_or_not_given(tmp_path, lines, height):

@@ -15,6 +15,7 @@ from er3a.pipeline.results import Verdict, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.trajectory.model import RESULTS
+from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.languages import read_program
@@ -44,7 +45,7 @@ def test_what_comes_near_to_assumed_shapes_is_a_caution(least, near):
     assert shapes.near == near
     verdict = Verdict("pass", FreeSpace(0.5, 10, 5, 5, 0)).resting_on(shapes)
     assert verdict.status == ("caution" if near else "pass")
-    assert say(verdict.findings[-1]).startswith("No document gives the shapes of the arm's links")
+    assert say(verdict.findings[-1]).startswith("No document that verdicts rest on gives the shapes")
     assert ("not settled: a." in say(shapes)) == bool(near)
 
 
@@ -61,6 +62,10 @@ def test_the_stages_say_so(small_results):
     paths = stored.results.summary.paths
     near = [each.name for each in paths if each.expect is None and 0 <= each.clearance.least_mm < 20]
     assert list(shapes.near) == near
+    summary = stored.results.summary
+    count, (tile,) = summary.verdict.finding.safe, (each for each in summary.figures if each.name == "safe")
+    assert count == tile.value == len(paths) - len(faults(stored.results))  # which the index counts
+    assert count < sum(path.verdict == "safe" for path in paths)
 
 
 @pytest.mark.long

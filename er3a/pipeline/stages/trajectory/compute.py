@@ -11,7 +11,7 @@ import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import PairOverlaps, PairTooNear
+from er3a.collision.pairs import PairOverlaps, PairTooNear, ShapesAssumed
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -412,8 +412,8 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     }
     assumed_shapes = shapes_assumed(robot, assumed_margin, least)
     summary = model.TrajectorySummary(
-        verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined).resting_on(assumed_shapes),
-        figures=_figures(paths, length, used),
+        verdict=_verdict(paths, skipped, assumed_shapes).without(surroundings.bodies.unexamined).resting_on(assumed_shapes),
+        figures=_figures(paths, length, used, assumed_shapes),
         characteristic_length_m=length,
         near=thresholds,
         joint_limits=used,
@@ -485,7 +485,7 @@ def _checks(
 
 
 def _verdict(
-    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed]
+    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: ShapesAssumed | None
 ) -> Verdict[model.AllSafe | model.SomeUnsafe | model.NoneSafe | ExpectationsUnmet]:
     if unmet := unmet_expectations([*paths, *skipped]):
         return Verdict("fail", unmet)
@@ -495,10 +495,11 @@ def _verdict(
     def named(verdict: PathVerdict) -> tuple[str, ...]:
         return tuple(path.name for path in asked if path.verdict == verdict)
 
-    safe, count = len(named("safe")), len(asked) + len(unfollowed)
-    finding = model.AllSafe if safe == count else model.SomeUnsafe if safe else model.NoneSafe
+    safe, count = sum(model.is_safe(path, shapes) for path in asked), len(asked) + len(unfollowed)
+    some = bool(named("safe"))
+    finding = model.AllSafe if safe == count else model.SomeUnsafe if some else model.NoneSafe
     failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
-    status: Status = "pass" if safe == count else "fail" if failed or not safe else "caution"
+    status: Status = "pass" if safe == count else "fail" if failed or not some else "caution"
     counts = finding(
         paths=count,
         safe=safe,
@@ -522,7 +523,9 @@ def _fails(path: model.PathSummary) -> bool:
     return path.verdict in FAULTS or (path.verdict == "singular" and (bool(path.jumps) or not path.joint_speed_bounded))
 
 
-def _figures(paths: list[model.PathSummary], length: float, limits: model.LimitsUsed) -> tuple[Figure, ...]:
+def _figures(
+    paths: list[model.PathSummary], length: float, limits: model.LimitsUsed, shapes: ShapesAssumed | None
+) -> tuple[Figure, ...]:
     asked = [path for path in paths if path.expect in (None, "safe")]  # demonstrations are counted apart
     events = [event for path in asked for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]
@@ -535,7 +538,7 @@ def _figures(paths: list[model.PathSummary], length: float, limits: model.Limits
     speed, limit, unit = max(speeds, key=lambda each: each[0] / each[1], default=(None, None, "deg/s"))
     colliding = sum(bool(path.collisions) for path in asked)
     return (
-        Figure("safe", sum(path.verdict == "safe" for path in asked), "", of=len(asked)),
+        Figure("safe", sum(model.is_safe(path, shapes) for path in asked), "", of=len(asked)),
         Figure("singular_poses", sum(event.crossing for event in events), ""),
         Figure("near_passes", sum(not event.crossing for event in events), ""),
         Figure("colliding", colliding, ""),
