@@ -412,7 +412,9 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     }
     assumed_shapes = shapes_assumed(robot, assumed_margin, least)
     summary = model.TrajectorySummary(
-        verdict=_verdict(paths, skipped, assumed_shapes).without(surroundings.bodies.unexamined).resting_on(assumed_shapes),
+        verdict=_verdict(paths, skipped, assumed_shapes)
+        .without(surroundings.bodies.unexamined)
+        .resting_on(assumed_shapes),
         figures=_figures(paths, length, used, assumed_shapes),
         characteristic_length_m=length,
         near=thresholds,

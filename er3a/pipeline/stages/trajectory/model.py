@@ -38,7 +38,8 @@ CauseT = TypeVar("CauseT", bound=Finding)
 class PathCounts:
     """How many paths there are, how many are safe, and the names of the others by their verdict.
 
-    Paths as near to assumed shapes as these may be wrong are not counted as safe. ``demonstrations``, paths that fail as they are meant to, count for none of these.
+    Paths as near to assumed shapes as these may be wrong count as none of these, and neither do ``demonstrations``,
+    paths that fail as they are meant to.
     """
 
     paths: int
