@@ -82,16 +82,16 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile
         check = check_program(read_program(file), robot, options)
     except InputError as error:
         return CheckedFile(file, None, error)
-    missed = missed_collisions(robot, options.scene)
+    missed = missed_collisions(robot, options.scene, check.arms)
     if missed:
         verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
         check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)
     return CheckedFile(file, check, missed=missed)
 
 
-def missed_collisions(robot: Robot, scene: Scene | None) -> tuple[LeftOut, ...]:
-    """What a check for collisions leaves out without which nothing passes."""
-    left_out = left_out_of_collisions(bodies_of(robot, scene), scene)
+def missed_collisions(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
+    """What a check for collisions leaves out without which nothing passes; ``arms`` with the tools of programs."""
+    left_out = left_out_of_collisions(bodies_of(robot, scene), scene, arms=arms)
     return tuple(each for each in left_out if each.subject in NEVER_A_PASS)
 
 

@@ -597,6 +597,15 @@ def test_motions_with_more_targets_than_they_have_are_not_understood(tmp_path):
     assert motion.target.reason == "not_understood"
 
 
+@pytest.mark.parametrize("note", ["grip", '"grip', '"grip"', 'the 2" pipe'])
+def test_no_row_of_a_table_is_taken_for_the_rest_of_a_note(tmp_path, note):
+    head = "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,note\n"
+    out = np.where(np.arange(6) == 1, np.radians(-170), NEAR)
+    rows = [f"{2 * k}," + ",".join(map(str, np.degrees(q))) for k, q in enumerate((HOME, NEAR, out, FAR))]
+    found = check(tmp_path, head + f",{note}\n".join(rows) + ",\n", "a.csv")
+    assert codes(found)["below_limit"] == [4]
+
+
 ZEROS = "A 0,B 0,C 0"
 
 

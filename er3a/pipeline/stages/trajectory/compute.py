@@ -25,7 +25,14 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates, left_out_without_tool
 from er3a.pipeline.stages.trajectory import judgement, model
-from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, proof_requirements
+from er3a.pipeline.stages.trajectory.motion import (
+    Motion,
+    left_out_of_programs,
+    limits_of,
+    listed_motions,
+    planning_of,
+    proof_requirements,
+)
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
@@ -377,8 +384,10 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     paths: list[model.PathSummary] = []
     programs: list[model.ProgramFiles] = []
     skipped: list[model.PathNotFollowed] = []
+    rest: dict[str, tuple[int, ...]] = {}
     for each in listed_motions(file, planning, required, settings.checks_per_sample):
         motion = each.motion
+        rest |= {each.listed: each.rest} if each.expect in (None, "safe") else {}
         if motion is None:
             stops = each.ends.t if each.ends else None
             lacking, outcome = closed_form_missing(robot), each.outcome_unfollowed
@@ -398,15 +407,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
-    assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
-    used = model.LimitsUsed(
-        speed_deg_s=_shown(robot, limits.speed),
-        speed_assumed=assumed,
-        acceleration_deg_s2=_shown(robot, limits.acceleration),
-        acceleration_assumed=limits.acceleration_assumed,
-        acceleration_time_s=settings.acceleration_time_s,
-        jerk_deg_s3=None if limits.jerk is None else _shown(robot, limits.jerk),
-    )
+    used = _limits_used(robot, limits, settings)
     least = {
         path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
     }
@@ -427,6 +428,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
             *left_out_of_collisions(surroundings.bodies, scene, settings.penetration_tolerance_mm),
             *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
             *_left_out(paths, skipped, only),
+            *left_out_of_programs(rest),
             *left_out_without_tool(robot),
             LeftOut("torques"),
         ),
@@ -441,6 +443,17 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     )
 
 
+def _limits_used(robot: Robot, limits: JointLimits, settings: TrajectorySettings) -> model.LimitsUsed:
+    return model.LimitsUsed(
+        speed_deg_s=_shown(robot, limits.speed),
+        speed_assumed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
+        acceleration_deg_s2=_shown(robot, limits.acceleration),
+        acceleration_assumed=limits.acceleration_assumed,
+        acceleration_time_s=settings.acceleration_time_s,
+        jerk_deg_s3=None if limits.jerk is None else _shown(robot, limits.jerk),
+    )
+
+
 def _left_out(
     paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], only: StrategyName | None
 ) -> Iterator[LeftOut]:
@@ -451,6 +464,8 @@ def _left_out(
         yield LeftOut("path_stretches", open_)
     if unplanned := tuple(path.name for path in paths if path.verdict == "none found"):
         yield LeftOut("plans", unplanned)
+    if len(paths) + len(skipped) > 1:
+        yield LeftOut("ways_between")
     if only:
         yield LeftOut("strategies", tuple(name for name in get_args(StrategyName) if name != only))
 
