@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
 from er3a.dynamics.plausibility import MassFinding, MissingLink, mass_findings
@@ -430,7 +431,7 @@ NO_FIGURE = Figure("holding_torque", None, "")
 def compute(study: Study, name: str) -> model.DynamicsResults:
     """Compute the dynamics stage of a robot."""
     settings = study.section(DynamicsSettings)
-    given = study.robot(name)
+    given, margin = study.robot(name), study.section(TrajectorySettings).assumed_margin_mm / 1000
     robot = with_estimates(given, settings.capsule_density_kg_m3)
     loads = study.loads(name)
     load, load_grade = load_of(loads), _worst_grade([each.grade for each in loads])
@@ -451,7 +452,9 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = model.DynamicsSummary(
-        verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped),
+        verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped).resting_on(
+            shapes_assumed(robot, margin, {}) if paths else None
+        ),
         figures=_figures(summaries, holding, uses, imbalances, masses),
         gravity_m_s2=settings.gravity_m_s2,
         masses=masses,
