@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -45,6 +46,7 @@ from er3a.pipeline.stages.validation.compute import compute as validation
 from er3a.pipeline.stages.vision.compute import compute as vision
 from er3a.pipeline.stages.workspace.compute import compute as workspace
 from er3a.pipeline.stages.workspace.entry import BoxTask
+from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
 from er3a.references.rows import GROUPS
 from er3a.robots.robot import PairRule
@@ -276,6 +278,15 @@ def test_validation_of_seven_joints_names_what_diagnosis_leaves_out(study):
     found = subjects(validation(made, "lbr_iiwa_14"))
     assert "diagnosis" not in found
     assert "more_faults" in found
+
+
+@pytest.mark.parametrize("arm", [None, "a section's"])
+@pytest.mark.parametrize("width", [0.1, 0.2])
+def test_a_proof_that_leaves_much_undecided_names_hidden_voids_of_any_arm(study, arm, width):
+    proven = SimpleNamespace(proof=SimpleNamespace(bounds=(0.5, 1.0), width=width), arm=arm)
+    tool = SimpleNamespace(capability=CapabilityMissing("a reason"), placement=None)
+    left_out = STAGES["workspace"].module("compute")._left_out(study.workspace, proven, None, (), tool)
+    assert ("hidden_voids" in {each.subject for each in left_out}) == (width == 0.2)
 
 
 @pytest.mark.long
