@@ -14,7 +14,7 @@ from er3a.pipeline.messages.collision import say
 from er3a.pipeline.results import Verdict, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
-from er3a.pipeline.stages.trajectory.model import RESULTS
+from er3a.pipeline.stages.trajectory.model import RESULTS, is_safe
 from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -65,7 +65,11 @@ def test_the_stages_say_so(small_results):
     summary = stored.results.summary
     count, (tile,) = summary.verdict.finding.safe, (each for each in summary.figures if each.name == "safe")
     assert count == tile.value == len(paths) - len(faults(stored.results))  # which the index counts
-    assert count < sum(path.verdict == "safe" for path in paths)
+    sound = next(path for path in paths if path.verdict == "safe" and path.name not in near)
+    nearer = replace(shapes, near=(*near, sound.name))
+    assert (is_safe(sound, shapes), is_safe(sound, nearer)) == (True, False)
+    closer = replace(summary, verdict=replace(summary.verdict, shapes=nearer))
+    assert len(faults(replace(stored.results, summary=closer))) == len(faults(stored.results)) + 1
 
 
 @pytest.mark.long
