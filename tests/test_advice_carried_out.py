@@ -75,10 +75,9 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("collision.base_in_solid", "centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
     *("all_samples_equal#target", "ambiguous_tilt", "void_advice#cause", "void_advice#predicate"),
     *("read_limit#lower", "read_limit#upper", "time_joint", "at_singularity#wrist", "other_direction#both"),
-    # ways that help in some cases only; what is sure to help, joint moves, is named before them
+    # ways that may help, and say no more; what is sure to help, joint moves, is named before them
     *("slide_exceeded", "combination_exceeded", "configuration_ends", "zone_not_settled"),
     *("singular.elbow", "singular.shoulder", "singular.dependent_axes"),
-    *("remedy.collision#links", "remedy.joint_jumps#moves"),
 }
 NO_ADVICE = {f"not_of_this_arm#{why}" for why in ("no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns")}
 

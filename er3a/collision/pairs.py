@@ -120,11 +120,12 @@ class PairsUnexamined:
 
 @dataclass(frozen=True)
 class ShapesAssumed:
-    """No document gives the shapes of an arm's links, so that what is said of collisions rests on assumed ones.
+    """No document that verdicts rest on gives the shapes of an arm's links: what is said of collisions rests on
+    assumed ones.
 
     Attributes
     ----------
-    given : whether the robot's file gives shapes, inferred ones; else they were guessed from its table
+    given : whether the robot's file gives shapes, inferred or claimed; else they were guessed from its table
     margin_mm : within which of assumed shapes nothing is settled
     near : what comes so near to them without touching, by name
     """

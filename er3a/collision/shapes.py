@@ -72,7 +72,22 @@ def arm_shapes(robot: Robot) -> ArmShapes:
 
 
 def _uncovered(robot: Robot, link: int) -> bool:
-    """Whether points of a link, along its lengths in the table, lie outside the shapes of its two neighbours.
+    """Whether points of a link, along its lengths in the table, lie outside the shapes of its two neighbours."""
+    lines = [np.linspace(c.start, c.end, LINE_POINTS) for c in default_envelopes(robot) if c.link == link]
+    return _outside(robot, np.concatenate([np.empty((0, 3)), *lines]), link, {link - 1, link + 1})
+
+
+def has_bare_tool(robot: Robot) -> bool:
+    """Whether a tool's point lies outside the shapes that the arm's file gives, so that the tool itself has none."""
+    if not arm_shapes(robot).given or not robot.tool[:3, 3].any():
+        return False
+    T, last = frames(robot, np.zeros(robot.joints)), robot.rows
+    point = (np.linalg.inv(T[last - 1]) @ T[last])[None, :3, 3]
+    return _outside(robot, point, last, {last - 1, last})
+
+
+def _outside(robot: Robot, points: Reals, link: int, beside: set[int]) -> bool:
+    """Whether points (n, 3) of a link, m, lie outside the shapes of some links.
 
     They are looked at in one pose: a joint between two links turns about the line on which they meet.
     """
@@ -82,10 +97,8 @@ def _uncovered(robot: Robot, link: int) -> bool:
         found: Reals = points @ T[k, :3, :3].T + T[k, :3, 3]
         return found
 
-    lines = [np.linspace(c.start, c.end, LINE_POINTS) for c in default_envelopes(robot) if c.link == link]
-    points = placed(np.concatenate([np.empty((0, 3)), *lines]), link)
+    points = placed(points, link)
     outside = np.full(len(points), np.inf)
-    beside = {link - 1, link + 1}
     shapes = [(c.link, np.array([c.start, c.end]), c.radius) for c in robot.envelopes if c.link in beside]
     shapes += [(h.link, np.array(h.points), h.margin) for h in robot.hulls if h.link in beside]
     for k, corners, radius in shapes:
@@ -96,7 +109,8 @@ def _uncovered(robot: Robot, link: int) -> bool:
 
 
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:
-    """What is to be said of collisions where the arm's shapes are assumed; None where a document gives them.
+    """What is to be said of collisions where the arm's shapes are assumed; None where a document that
+    verdicts rest on gives them.
 
     Parameters
     ----------

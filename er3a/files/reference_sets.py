@@ -470,7 +470,7 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
     if not folder.is_dir():
         known = ", ".join(names("data/manual_refs", "*/"))
         raise InputError(folder, None, "there is no such reference set", f"Known: {known}; or give a folder's path")
-    files = [file for file in sorted(folder.glob("*.csv")) if file.name != FILE]
+    files = [each for each in sorted(folder.iterdir()) if each.suffix.lower() == ".csv" and each.name != FILE]
     if not files:
         raise InputError(folder, None, "the folder holds no CSV file", f"Add one of: {_file_names()}")
     tables = {file.stem: check_reference_file(file) for file in files}

@@ -20,8 +20,9 @@ import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import PENETRATION_TOLERANCE
+from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
+from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
 from er3a.kinematics.singularity import USUAL_NEAR
@@ -30,7 +31,7 @@ from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
 from er3a.pipeline.stages.left_out import left_out_of_collisions
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured
-from er3a.pipeline.stages.trajectory.motion import listed_motions
+from er3a.pipeline.stages.trajectory.motion import left_out_of_programs, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, written
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import ProofRequirements
@@ -82,16 +83,16 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile
         check = check_program(read_program(file), robot, options)
     except InputError as error:
         return CheckedFile(file, None, error)
-    missed = missed_collisions(robot, options.scene)
+    missed = missed_collisions(robot, options.scene, check.arms)
     if missed:
         verdicts = tuple(replace(each, level=worst_of((each.level, "caution"))) for each in check.verdicts)
         check = replace(check, level=worst_of((check.level, "caution")), verdicts=verdicts)
     return CheckedFile(file, check, missed=missed)
 
 
-def missed_collisions(robot: Robot, scene: Scene | None) -> tuple[LeftOut, ...]:
-    """What a check for collisions leaves out without which nothing passes."""
-    left_out = left_out_of_collisions(bodies_of(robot, scene), scene)
+def missed_collisions(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
+    """What a check for collisions leaves out without which nothing passes; ``arms`` with the tools of programs."""
+    left_out = left_out_of_collisions(bodies_of(robot, scene), scene, arms=arms)
     return tuple(each for each in left_out if each.subject in NEVER_A_PASS)
 
 
@@ -172,9 +173,9 @@ def cycle_line(checked: CheckedFile) -> str:
     return f"{shown(checked.file)}: {what} takes about {time}{more}{less}"
 
 
-def shapes_line(checked: Sequence[CheckedFile]) -> str:
+def shapes_line(robot: Robot) -> str:
     """On what shapes of the arm collisions rest; empty where a document gives them."""
-    found = next((each.check.shapes for each in checked if each.check and each.check.shapes), None)
+    found = shapes_assumed(robot, ASSUMED_MARGIN, {})
     return "" if found is None else say(found)
 
 
@@ -398,6 +399,7 @@ class PathProgram:
     verdict: PathVerdict
     files: Mapping[str, str] | None
     findings: tuple[WriteFinding, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def programs_of(
@@ -424,6 +426,7 @@ def programs_of(
         if each.motion is None:
             yield PathProgram(each.name, each.outcome_unfollowed, None)
             continue
+        rest = left_out_of_programs({each.listed: each.rest})
         verdict = judge(robot, each.motion, USUAL_NEAR, task.limits).verdict
         if collisions(measured(surroundings, each.motion)):
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
@@ -432,4 +435,4 @@ def programs_of(
             continue
         files, findings = written(robot, each.motion, verdict, language)
         name = program_name(each.name, LONGEST_NAME)
-        yield PathProgram(each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings)
+        yield PathProgram(each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, rest)

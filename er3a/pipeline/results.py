@@ -52,7 +52,7 @@ class Verdict(Generic[FindingT]):
     """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
 
     ``unexamined``: pairs of bodies whose collisions were not looked at because their shapes can't be right. ``shapes``:
-    on what shapes of the arm it rests, if no document gives them. ``missed``: what was not examined and may turn it.
+    on what assumed shapes of the arm it rests. ``missed``: what was not examined and may turn it.
     """
 
     status: Status
@@ -118,6 +118,7 @@ LeftOutSubject = Literal[
     "strategies",
     "program_lines",
     "program_starts",
+    "program_rest",
     "outer_axes",
     "controller_ramps",
     "joint_vectors",
@@ -175,13 +176,17 @@ LeftOutSubject = Literal[
     "placed_box",
     "uncovered_links",
     "allowed_contacts",
+    "bare_tool",
     "arm_errors",
     "objects_out_of_view",
     "hidden_voids",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
-    ("obstacles", "uncovered_links", "allowed_contacts", "arm_errors", "objects_out_of_view", "hidden_voids")
+    (
+        *("obstacles", "uncovered_links", "bare_tool", "allowed_contacts", "program_rest"),
+        *("arm_errors", "objects_out_of_view", "hidden_voids"),
+    )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""
 

@@ -22,9 +22,9 @@ class TrajectorySettings(StrictModel):
     to reach full speed in ``acceleration_time_s``, unless their maximum accelerations are given
     (``acceleration_deg_s2``, one for each joint). ``jerk_deg_s3`` bounds the jerk; left out, nothing does.
     ``scene`` holds the obstacles; no overlap with them deeper than ``penetration_tolerance_mm`` goes unnoticed between
-    points. Where no document gives the shapes of the arm's links, a verdict within ``assumed_margin_mm`` of them is a
-    caution. Safe paths are written as programs in the languages ``programs``; others only with ``write_unsafe``, with
-    the reason in the file.
+    points. Where the shapes of the arm's links are inferred, claimed or guessed, a verdict within
+    ``assumed_margin_mm`` of them is a caution. Safe paths are written as programs in the languages ``programs``; others
+    only with ``write_unsafe``, with the reason in the file.
     """
 
     checks_per_sample: Annotated[int, Field(ge=1, le=1000)]

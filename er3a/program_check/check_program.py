@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
@@ -178,6 +178,12 @@ class ProgramCheck(ByValue):
     cycle: CycleTime
     not_examined: tuple[NotExamined, ...] = ()
     shapes: ShapesAssumed | None = None
+
+    @property
+    def arms(self) -> tuple[tuple[str, Robot], ...]:
+        """The robot with each tool that motions have, and the name that the program gives the tool."""
+        placed = (motion.placed for motion in self.motions.values())
+        return tuple({id(each.arm): (each.motion.tool.name, each.arm) for each in placed}.values())
 
 
 def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
@@ -469,8 +475,13 @@ class ProgramPart:
         return replace(self.made, source=source)
 
 
-def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> list[ProgramPart]:
+def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[list[ProgramPart], tuple[int, ...]]:
     """The way with the most motions, up to the first motion that can't be carried out; that one is the last.
+
+    Returns
+    -------
+    parts : its stretches
+    rest : the program's lines that may move the arm otherwise: on other ways, behind the last, or not understood
 
     Raises
     ------
@@ -478,6 +489,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> list[P
         for a program that does not move the arm, or whose tool is not the robot's
     """
     groups: list[list[tuple[int, CheckedMotion]]] = []
+    rest = _moving(check)
     for number in check.main:
         motion = check.motions.get(number)
         if motion is None or motion.stays or motion.start is None:
@@ -495,11 +507,33 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> list[P
             groups[-1].append((line, motion))
         else:
             groups.append([(line, motion)])
+        rest.pop(_same_for(check, number), None)
         if motion.end is None:
             break
     if not groups:
         raise InputError(source.file, f"{source.field}.program", "no motion has a known way", "Give start_deg")
-    return [_part(group) for group in groups]
+    return [_part(group) for group in groups], tuple(sorted({*rest.values()} - {0}))
+
+
+def _moving(check: ProgramCheck) -> dict[Hashable, int]:
+    """Lines of all that moves the arm, or may, or was not followed; motions that are alike are one."""
+    execution = check.execution
+    found: dict[Hashable, int] = {
+        _same_for(check, number): execution.own_line(execution.steps[number])
+        for number, motion in check.motions.items()
+        if not motion.stays
+    }
+    for step in execution.steps:
+        if isinstance(step.instruction, Unknown) and step.instruction.may_move:
+            found[step.place] = execution.own_line(step)
+    return found | {each: each.place.line for each in check.not_examined if each.what != "way"}
+
+
+def _same_for(check: ProgramCheck, number: int) -> Hashable:
+    """Equal for motions of one instruction from and to the same joints."""
+    motion = check.motions[number]
+    ends = (None if q is None else q.tobytes() for q in (motion.start, motion.end))
+    return check.execution.steps[number].place, *ends
 
 
 def _part(group: list[tuple[int, CheckedMotion]]) -> ProgramPart:

@@ -451,7 +451,12 @@ PARTS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of corners and
 
 
 def zone_clearance(
-    bodies: Bodies, corners: Reals, tolerance: float, bend: Reals | None = None, patch: ZonePatch | None = None
+    bodies: Bodies,
+    corners: Reals,
+    tolerance: float,
+    bend: Reals | None = None,
+    patch: ZonePatch | None = None,
+    margin: float = 0.0,
 ) -> found_in.ZoneCollides | found_in.ZoneNotSettled | None:
     """Look for a way round a corner that collides; None if all are free.
 
@@ -461,6 +466,7 @@ def zone_clearance(
     tolerance : m; no overlap deeper than this goes unnoticed
     bend : (n,), rad, by which joints may be off the triangle of joint values; None for not at all
     patch : the triangle of poses instead, round a corner of two lines
+    margin : m; what comes nearer than this counts as colliding, with the depth -1000 times its distance
     """
     every = np.arange(len(bodies.pairs))
     if not every.size:
@@ -485,10 +491,10 @@ def zone_clearance(
         measured += 1
         worst = int(np.argmin(distances))
         least = min(least, float(distances[worst]))
-        if distances[worst] < -tolerance - (0.0 if patch is None else off[worst]):
+        if distances[worst] < margin - tolerance - (0.0 if patch is None else off[worst]):
             return found_in.ZoneCollides(bodies.pairs[worst], -1000 * float(distances[worst]))
         nearer = (levers @ np.abs(row_values(bodies.robot, triangle - middle)).T).max(axis=1)
-        open_ = distances <= nearer + off - tolerance
+        open_ = distances <= nearer + off + margin - tolerance
         if not open_.any():
             continue
         if measured >= most or (proven and (open_ & (nearer < np.maximum(per_joint @ lasting, tolerance))).any()):
@@ -852,16 +858,16 @@ class StepChecker:
         self.motions[second] = replace(self.motions[second], blended_ends=min(self.motions[second].blended_ends + 1, 2))
 
     def _round_corner(
-        self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float]
-    ) -> found_in.CheckFinding | None:
+        self, way: MotionPath, after: MotionPath, corners: Reals, shares: tuple[float, float], margin: float = 0.0
+    ) -> found_in.ZoneCollides | found_in.ZoneNotSettled | None:
         """What stands in a way from joints (3, n) before a corner to behind it, over shares of the two motions."""
         assert self.obstacles is not None
         bodies, tolerance = self.obstacles.of(way.arm), self.obstacles.tolerance
         if way.tool_path is None or after.tool_path is None or way.arm is not after.arm:
             bend = _bend(way, 1 - shares[0], 1.0) + _bend(after, 0.0, shares[1])
-            return zone_clearance(bodies, corners, tolerance, bend)
+            return zone_clearance(bodies, corners, tolerance, bend, margin=margin)
         slack = max(way.sagitta(shares[0]), after.sagitta(shares[1]))
-        return zone_clearance(bodies, corners, tolerance, patch=patch_of(way.arm, corners, slack))
+        return zone_clearance(bodies, corners, tolerance, patch=patch_of(way.arm, corners, slack), margin=margin)
 
     def _rounded(self, way: MotionPath, after: MotionPath, motion: CheckedMotion) -> tuple[found_in.CheckFinding, ...]:
         key = (id(way), id(after))
@@ -885,8 +891,13 @@ class StepChecker:
         )
         if np.isfinite(corners).all():
             hit = self._round_corner(way, after, corners, (before, behind))
+            margin = self.obstacles.assumed_margin
             if hit is not None:
                 found.append(hit)
+            elif 0 < margin <= motion.clearance:
+                near = self._round_corner(way, after, corners, (before, behind), margin)
+                if isinstance(near, found_in.ZoneCollides):
+                    found.append(found_in.ClearOfAssumed(near.pair, -near.depth_mm, 1000 * margin))
         return tuple(found)
 
 

@@ -69,7 +69,7 @@ def read_csv_program(source: ProgramText) -> Program:
         for a column that is missing, a value that is no finite number, times that do not rise
     """
     kept = [(i, line) for i, line in enumerate(source.lines, 1) if line.strip() and not line.startswith("#")]
-    rows = list(csv.reader((line for _, line in kept), strict=False))
+    rows = [next(csv.reader((line,))) for _, line in kept]  # each by itself: no quote goes on over lines
     if not rows:
         raise InputError(source.path, None, "holds no rows", "Give the columns q1_deg, q2_deg ...")
     head = [name.strip() for name in rows[0]]

@@ -310,9 +310,10 @@ class ProgramMemory:
         if isinstance(of, syntax.Record):
             self.assign(target.of, of.having(target.name, value))
             return True
-        if name is None or not isinstance(of, syntax.Unclear) or self.read(name) is None:
+        kept = None if name is None else self.read(name)
+        if kept is None or not isinstance(of, syntax.Unclear):
             return False
-        if of.text == name:  # declared, without a value yet
+        if isinstance(kept, syntax.Unset):
             self.assign(target.of, syntax.Record("", ((target.name, value),)))
         return True
 
@@ -338,8 +339,7 @@ class ProgramMemory:
             case syntax.Constant(value=value):
                 return value
             case syntax.Variable(name=name):
-                found = self.read(name)
-                return syntax.Unclear(name) if found is None else found
+                return known(self.read(name), name)
             case syntax.Member() | syntax.Element():
                 return self._part(expression)
             case syntax.Unary(operator=sign, of=of):
@@ -461,6 +461,11 @@ class ProgramMemory:
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")
         return int(found) if whole and abs(found) < 2**53 else found
+
+
+def known(found: syntax.Value | None, name: str) -> syntax.Value:
+    """What a name has; unclear where that is nothing."""
+    return syntax.Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
 
 
 def root(name: str) -> str:

@@ -29,7 +29,7 @@ from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, root
+from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, known, root
 from er3a.programs.execution import Ending, EndKind, Execution, KeepOn, RunLimits, Step
 from er3a.programs.languages import LANGUAGES, not_written
 from er3a.robots.robot import Robot
@@ -600,9 +600,11 @@ class Machine:
             memory.types[each.target.name] = each.type_name
         if each.value is None:
             if isinstance(each.target, syntax.Variable) and each.target.name not in memory.local:
-                memory.write(each.target.name, syntax.Unclear(each.target.name), each.local)
+                memory.write(each.target.name, syntax.Unset(each.target.name), each.local)
             return None
         value = memory.value(each.value)
+        if isinstance(each.value, syntax.Constant) and isinstance(value, syntax.Unclear):  # which part is not known
+            memory.forget(root(memory.key(each.target) or ""))
         name = memory.key(each.target) or each.text
         if self.dialect.is_signal(name):
             memory.write(name, value)
@@ -754,7 +756,7 @@ class Machine:
         frame = way.frames.pop()
         memory.local = way.frames[-1].local
         for name, target in frame.outs:
-            memory.assign(target, frame.local.get(name, syntax.Unclear(name)))
+            memory.assign(target, known(frame.local.get(name), name))
         if frame.result:
             memory.write(frame.result, value, local=True)
 
@@ -804,7 +806,7 @@ def _locals(
         elif parameter.default is not None:
             local[parameter.name] = memory.value(parameter.default)
         else:
-            local[parameter.name] = syntax.Unclear(parameter.name)
+            local[parameter.name] = syntax.Unset(parameter.name)
     fits = len(arguments) <= len(routine.parameters) and by_name.keys() <= {each.name for each in routine.parameters}
     return local, fits
 

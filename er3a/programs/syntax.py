@@ -24,6 +24,11 @@ class Unclear:
 
 
 @dataclass(frozen=True, slots=True)
+class Unset(Unclear):
+    """What a variable holds that was declared, and that nothing has been assigned to; ``text`` is its name."""
+
+
+@dataclass(frozen=True, slots=True)
 class Record:
     """Named values, in the language's own units: a position, a frame, a pose of URScript.
 

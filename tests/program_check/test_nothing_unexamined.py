@@ -597,6 +597,15 @@ def test_motions_with_more_targets_than_they_have_are_not_understood(tmp_path):
     assert motion.target.reason == "not_understood"
 
 
+@pytest.mark.parametrize("note", ["grip", '"grip', '"grip"', 'the 2" pipe'])
+def test_no_row_of_a_table_is_taken_for_the_rest_of_a_note(tmp_path, note):
+    head = "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,note\n"
+    out = np.where(np.arange(6) == 1, np.radians(-170), NEAR)
+    rows = [f"{2 * k}," + ",".join(map(str, np.degrees(q))) for k, q in enumerate((HOME, NEAR, out, FAR))]
+    found = check(tmp_path, head + f",{note}\n".join(rows) + ",\n", "a.csv")
+    assert codes(found)["below_limit"] == [4]
+
+
 ZEROS = "A 0,B 0,C 0"
 
 
@@ -606,6 +615,8 @@ ZEROS = "A 0,B 0,C 0"
         (["P={X 300,Y 0,Z 400,A 0,B 90,C 0}", "LIN P"], None),
         (["P={X 300,Y 0,Z 400,A 0,B 90,C 0}", "P={X 310}", "LIN P"], "undefined"),
         (["P.X=300", "P.Y=0", "P.Z=400", "LIN P"], None),  # the rest is where the arm stands
+        (["P=?!", "P.X=300", "P.Y=0", "P.Z=400", "LIN P"], "undefined"),
+        ([f"XP[1]={axes(NEAR)}", "XP[1]=?!", "PTP XP[1]"], "undefined"),
         ([f"LIN {{X 300,Y 0,Z 0,{ZEROS}}}:{{X 10,Y 0,Z 400}}"], "undefined"),
         ([f"LIN {{X 300,Y 0,Z 0,{ZEROS}}}:{{X 10,Y 0,Z 400,{ZEROS}}}"], None),
     ],
@@ -636,6 +647,8 @@ def test_a_position_that_leaves_out_a_turn_the_variable_had_does_not_say_which_s
         ([f"BASE_DATA[SEEN]={{X 0,Y 0,Z 9,{ZEROS}}}", "$BASE=BASE_DATA[1]"], None),
         (["BASE_DATA[1].Z=SEEN", "$BASE=BASE_DATA[1]"], None),
         (["$BASE=SEEN"], None),
+        (["BASE_DATA[1]=?!", "$BASE=BASE_DATA[1]"], None),
+        (["DECL FRAME BASE_DATA[16]", "$BASE=BASE_DATA[1]"], 0.05),
     ],
 )
 def test_a_frame_of_the_cell_is_what_the_program_makes_of_it_or_not_given(tmp_path, lines, height):

@@ -15,6 +15,7 @@ from er3a.pipeline import (
 )
 from er3a.pipeline.commands.options import app
 from er3a.pipeline.program_reports import PathProgram
+from er3a.pipeline.results import LeftOut
 from er3a.programs.languages import read_program
 from er3a.programs.program_findings import TargetsLeftOut
 
@@ -191,14 +192,19 @@ def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
     assert "movel(" not in kinds[0] + kinds[2]
 
 
-def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch):
-    made = PathProgram("line", "safe", {"line.src": "DEF line( )\nEND\n"}, (TargetsLeftOut(1),))
+@pytest.mark.parametrize(
+    ("findings", "missed", "told"),
+    [((TargetsLeftOut(1),), (), "left out"), ((), (LeftOut("program_rest", ("line: 3",)),), "holds (line: 3)")],
+)
+def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findings, missed, told):
+    made = PathProgram("line", "safe", {"line.src": "DEF line( )\nEND\n"}, findings, missed)
     monkeypatch.setattr(program_reports, "programs_of", lambda *_: iter([made]))
     words = ("program", "write", "data/paths/er3a_c60.yaml", "--robot", "er3a_c60", "--language", "krl")
     done = run(*words, "--output", str(tmp_path))
     assert (tmp_path / "line.src").is_file()
     assert done.exit_code == 1
-    assert "left out" in done.stderr
+    assert told in done.stderr
+    assert "assumed shapes" in done.stderr
 
 
 def test_assumed_shapes_and_ways_from_nowhere_are_named():
@@ -209,4 +215,4 @@ def test_assumed_shapes_and_ways_from_nowhere_are_named():
     assert {each["what"] for each in record["not_examined"]} == {"way"}
     done = check("data/programs/weld_seam.src", "--verdicts")
     assert "mm of assumed shapes [motion]" in done.stdout
-    assert "No document gives the shapes of the arm's links" in done.stderr
+    assert "No document that verdicts rest on gives the shapes of the arm's links" in done.stderr

@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from er3a.collision.scene import Plane, Scene
+from er3a.collision.scene import Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.messages.collision import say
 from er3a.pipeline.results import Verdict, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
-from er3a.pipeline.stages.trajectory.model import RESULTS
+from er3a.pipeline.stages.trajectory.model import RESULTS, is_safe
+from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.languages import read_program
@@ -44,7 +45,7 @@ def test_what_comes_near_to_assumed_shapes_is_a_caution(least, near):
     assert shapes.near == near
     verdict = Verdict("pass", FreeSpace(0.5, 10, 5, 5, 0)).resting_on(shapes)
     assert verdict.status == ("caution" if near else "pass")
-    assert say(verdict.findings[-1]).startswith("No document gives the shapes of the arm's links")
+    assert say(verdict.findings[-1]).startswith("No document that verdicts rest on gives the shapes")
     assert ("not settled: a." in say(shapes)) == bool(near)
 
 
@@ -61,6 +62,14 @@ def test_the_stages_say_so(small_results):
     paths = stored.results.summary.paths
     near = [each.name for each in paths if each.expect is None and 0 <= each.clearance.least_mm < 20]
     assert list(shapes.near) == near
+    summary = stored.results.summary
+    count, (tile,) = summary.verdict.finding.safe, (each for each in summary.figures if each.name == "safe")
+    assert count == tile.value == len(paths) - len(faults(stored.results))  # which the index counts
+    sound = next(path for path in paths if path.verdict == "safe" and path.name not in near)
+    nearer = replace(shapes, near=(*near, sound.name))
+    assert (is_safe(sound, shapes), is_safe(sound, nearer)) == (True, False)
+    closer = replace(summary, verdict=replace(summary.verdict, shapes=nearer))
+    assert len(faults(replace(stored.results, summary=closer))) == len(faults(stored.results)) + 1
 
 
 @pytest.mark.long
@@ -91,6 +100,19 @@ def test_a_motion_that_passes_near_assumed_shapes_is_a_caution(tmp_path, nearer,
     drawn = check_program(program, documented(), options)
     assert drawn.level == ("fail" if level == "fail" else "pass")
     assert drawn.shapes is None
+
+
+def test_a_corner_cut_near_assumed_shapes_is_a_caution(tmp_path):
+    """Both moves stay more than 27 mm away from a ball; the way round their corner comes within 18."""
+    moves = (([-20, -10, -10, 0, -70, 0], 0), ([0, -10, -10, 0, -70, 0], 0.15), ([0, -40, 10, 0, -70, 0], 0))
+    lines = [f"movej({np.radians(q).tolist()}, a=1, v=1, r={r})" for q, r in moves]
+    (tmp_path / "a.script").write_text("\n".join(lines) + "\n")
+    ball = np.eye(4)
+    ball[:3, 3] = [0.46921, -0.09252, 0.41923]
+    options = CheckOptions(start=np.radians(moves[0][0]), scene=Scene("ball", (Sphere("ball", ball, 0.03),)))
+    for robot, near in ((load_robot("er3a_c60"), [2]), (documented(), [])):
+        found = check_program(read_program(tmp_path / "a.script"), robot, options)
+        assert [each.place.line for each in found.findings if each.finding.code == "clear_of_assumed"] == near
 
 
 def plane(height: float) -> Plane:

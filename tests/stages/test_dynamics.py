@@ -411,6 +411,9 @@ def test_the_load_that_a_program_names_counts_for_its_stretches(tmp_path):
         np.testing.assert_allclose(rows.gravity, er3a.gravity(arm, np.radians(rows.q), load=load), atol=1e-9)
     payloads = {use.path: use.asked for use in summary.uses if use.quantity == "payload"}
     assert payloads == {None: 1.5, "moves_2": 2.0}
+    for held in summary.holding:  # with the heavier of the two
+        torque = er3a.gravity(arm, np.radians([held.q]), load=Load(2.0, (0.02, 0.0, 0.09)))[0, held.joint - 1]
+        assert held.torque == pytest.approx(torque, abs=1e-6)
     left = {each.subject: each.names for each in summary.not_examined}
     assert left["program_loads"] == ("moves_3: set_payload(get_flag(1))",)
     report(study, found, tmp_path / "page.html")

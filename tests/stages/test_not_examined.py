@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
 
+from er3a.collision.along import bodies_of
+from er3a.collision.scene import Scene, Sphere
 from er3a.collision.shapes import arm_shapes
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
@@ -27,17 +30,26 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.inverse.compute import compute as inverse
+from er3a.pipeline.stages.left_out import left_out_of_collisions
 from er3a.pipeline.stages.programs.compute import compute as programs
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as trajectory
 from er3a.pipeline.stages.trajectory.model import RESULTS
+from er3a.pipeline.stages.trajectory.motion import (
+    left_out_of_programs,
+    listed_motions,
+    planning_of,
+    proof_requirements,
+)
 from er3a.pipeline.stages.trajectory.report import report
 from er3a.pipeline.stages.validation.compute import compute as validation
 from er3a.pipeline.stages.vision.compute import compute as vision
 from er3a.pipeline.stages.workspace.compute import compute as workspace
 from er3a.pipeline.stages.workspace.entry import BoxTask
+from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
 from er3a.references.rows import GROUPS
+from er3a.robots.robot import PairRule
 
 ROBOT = "er3a_c60"
 
@@ -170,6 +182,59 @@ def test_loops_cut_off_by_their_limits_do_not_pass(study, tmp_path):
             assert results.summary.verdict.status == "caution", few
 
 
+@pytest.mark.parametrize(
+    ("body", "lines"),
+    [
+        ("PTP {near}\nPTP {far}", ""),
+        ("PTP {near}\nPTP XSEEN\nPTP {far}", "3, 4"),
+        ("IF $IN[1] THEN\nPTP {near}\nELSE\nPTP {far}\nPTP {near}\nENDIF", "3"),
+        ("PTP {near}\nDRIVE_ANYWHERE( )", "3"),
+        ("INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO AWAY( )\nINTERRUPT ON 3\nPTP {near}\nEND\nDEF AWAY( )\nPTP {far}", "7"),
+    ],
+)
+def test_paths_of_a_program_name_its_lines_that_they_leave_out(study, tmp_path, body, lines):
+    near, far = "{A1 10,A2 -15,A3 -5,A4 5,A5 -60,A6 10}", "{A1 20,A2 -5,A3 -15,A4 -5,A5 -65,A6 20}"
+    (tmp_path / "a.src").write_text(f"DEF a( )\n{body.format(near=near, far=far)}\nEND\n")
+    job = {"name": "job", "title": "Job", "kind": "program", "program": str(tmp_path / "a.src"), "samples": 11}
+    listed = {"kind": "paths", "paths": [job | {"start_deg": [0, -10, -10, 0, -70, 0]}]}
+    (tmp_path / "paths.yaml").write_text(yaml.safe_dump(listed))
+    required = proof_requirements(study.robot(ROBOT), study.trajectory)
+    task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
+    motions = [*listed_motions(tmp_path / "paths.yaml", task, required, 5)]
+    left_out = left_out_of_programs({each.listed: each.rest for each in motions})
+    assert [each.names for each in left_out] == ([(f"job: {lines}",)] if lines else [])
+
+
+def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):
+    """A pair of links that only the scene allows; a scene without obstacles; a tool longer than the arm's shapes."""
+    robot, tool = study.robot(ROBOT), np.eye(4)
+    tool[2, 3] = 0.25
+    part = (Sphere("part", tool, 0.01),)
+    links = PairRule("link_2", "link_6", "allow", "a test")
+    for arm, scene, subject, names in (
+        (robot, Scene("a", part, (), (links,)), "allowed_contacts", ("link_2/link_6",)),
+        (robot, Scene("a", (), part), "obstacles", ()),
+        (robot.replace(tool=tool), Scene("a", part), "bare_tool", ("tool",)),
+    ):
+        found = {each.subject: each.names for each in left_out_of_collisions(bodies_of(arm, scene), scene)}
+        assert found[subject] == names
+    held = Scene("a", (), part)
+    assert "bare_tool" not in {each.subject for each in left_out_of_collisions(bodies_of(robot, held), held)}
+
+
+def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):
+    """The arm stands 9.4 mm above the table; nothing settles whether it does."""
+    (tmp_path / "targets.yaml").write_text("kind: targets\ntargets:\n- {name: a, q_deg: [0, -10, -10, 0, -70, 0]}\n")
+    scene = yaml.safe_load(Path("data/scenes/table_and_post.yaml").read_text(encoding="utf-8"))
+    scene |= {"boxes": [{"name": "table", "size_mm": [500, 800, 40], "xyz_mm": [500, 0, 410]}]}
+    (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene))
+    entry, few = {"targets": str(tmp_path / "targets.yaml")}, {"round_trips": 3, "map_cells": 8}
+    for scene_file, near in ((str(tmp_path / "scene.yaml"), ("a",)), ("data/scenes/table_and_post.yaml", ())):
+        verdict = inverse(changed(study, entry, inverse=few | {"scene": scene_file}), ROBOT).summary.verdict
+        assert verdict.shapes.near == near
+        assert verdict.status == ("caution" if near else "pass")
+
+
 def test_targets_name_what_rests_on_samples_rules_and_obstacles(study, tmp_path):
     """The one target lies inside a table that no scene holds."""
     targets = {"kind": "targets", "targets": [{"name": "a", "q_deg": [0, -10, -10, 0, -70, 0]}]}
@@ -213,6 +278,15 @@ def test_validation_of_seven_joints_names_what_diagnosis_leaves_out(study):
     found = subjects(validation(made, "lbr_iiwa_14"))
     assert "diagnosis" not in found
     assert "more_faults" in found
+
+
+@pytest.mark.parametrize("arm", [None, "a section's"])
+@pytest.mark.parametrize("width", [0.1, 0.2])
+def test_a_proof_that_leaves_much_undecided_names_hidden_voids_of_any_arm(study, arm, width):
+    proven = SimpleNamespace(proof=SimpleNamespace(bounds=(0.5, 1.0), width=width), arm=arm)
+    tool = SimpleNamespace(capability=CapabilityMissing("a reason"), placement=None)
+    left_out = STAGES["workspace"].module("compute")._left_out(study.workspace, proven, None, (), tool)
+    assert ("hidden_voids" in {each.subject for each in left_out}) == (width == 0.2)
 
 
 @pytest.mark.long

@@ -22,7 +22,7 @@ from er3a.diagnosis.faults import BaseElsewhere, WrongOffset
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
-from er3a.identifiability.reactions import bases_of
+from er3a.identifiability.reactions import CheckCounts, CheckTally, bases_of
 from er3a.kinematics.forward import frames
 from er3a.kinematics.round_trips import slot_round_trips
 from er3a.kinematics.wrist_partitioned import NoWristCentre
@@ -49,6 +49,7 @@ from er3a.pipeline.stages.validation.model import (
     NothingToCompare,
     NumbersMissing,
     SelfCheck,
+    SetSummary,
     ValidationResults,
     ValidationSummary,
     WholeGroup,
@@ -322,6 +323,17 @@ def test_conflicts_excuse_only_what_another_trustworthy_row_outweighs(stated, st
     bases = bases_of(robot, references.checkable, references.documents)
     checks, _ = checks_of_set(references, predict(robot, references.checkable), bases)
     assert [check.status for check in checks[: len(stated)]] == statuses
+
+
+@pytest.mark.parametrize(
+    ("documented", "claims", "told"),
+    [(24, CheckTally(5, 1), (6, 1)), (24, CheckTally(6), None), (0, CheckTally(6), (6, 0))],
+)
+def test_claims_among_documents_are_told_where_they_do_not_hold(documented, claims, told):
+    counts = CheckCounts(CheckTally(documented), CheckTally(), claims)
+    sets = (SetSummary("mine", ("cad", "claim"), counts, False, None, None, None),)
+    found = verdict_of([], [], sets, {}, None).finding.claims
+    assert [(each.claims, each.failed) for each in found] == ([told] if told else [])
 
 
 def test_table_checks_see_faults_that_a_file_could_not_hold():

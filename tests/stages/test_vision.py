@@ -93,19 +93,25 @@ def test_page_and_recording_are_written(study, folders, tmp_path, name):
 
 @pytest.mark.long
 def test_images_come_with_their_reprojected_corners(study, tmp_path):
-    """Rendered boards, one of them taken with the arm 5 mm beside where it says it was: its lines all point one way."""
+    """Rendered boards, one of them taken with the arm 5 mm beside where it says it was: its lines all point one way.
+
+    Before each of them an image was taken that shows no board: these are counted, and listed together.
+    """
     random = np.random.default_rng(3)
     Y, X = pose([3, -4, 20], [0.02, 0.03, 0.05]), pose([150, 5, 30], [0.7, 0.1, 1.2])
     places = board_places(random, 14)
     flange = np.array([X @ T @ np.linalg.inv(Y) for T in places])
     for number, T in enumerate(places):
-        Image.fromarray(rendered(CHARUCO, T, random)).save(tmp_path / f"{number}.png")
+        Image.fromarray(shown := rendered(CHARUCO, T, random)).save(tmp_path / f"{2 * number + 1}.png")
+        Image.fromarray(np.full_like(shown, 90)).save(tmp_path / f"{2 * number}.png")
     flange[3, :3, 3] += [0.005, 0, 0]
     head = HEAD.format(setup="eye_to_hand") + (
         "images:\n  board: {pattern: charuco, squares: [7, 5], square_mm: 30, marker_mm: 22}\n"
         "  intrinsics: {fx: 1100.0, fy: 1105.0, cx: 640.0, cy: 470.0}\n  pixel_standard_deviation: 0.3\n"
     )
-    table = columns(flange, "flange", "quaternion") | {"image": np.array([f"{n}.png" for n in range(14)])}
+    table = columns(np.repeat(flange, 2, axis=0), "flange", "quaternion") | {
+        "image": np.array([f"{n}.png" for n in range(28)])
+    }
     made = write(tmp_path, table, head)
     text = (ROOT / "data/vision/er3a_c60.yaml").read_text(encoding="utf-8")
     (tmp_path / "vision.yaml").write_text(text.replace("fixed_camera.yaml", made.name), encoding="utf-8")
@@ -114,10 +120,16 @@ def test_images_come_with_their_reprojected_corners(study, tmp_path):
     folder = tmp_path / "results"
     folder.mkdir()
     run.compute("vision", own, "er3a_c60", folder)
-    corners = read_results(folder, VisionResults).results.corners
-    assert set(corners.image) == {f"{n}.png" for n in range(14)}
+    results = read_results(folder, VisionResults).results
+    corners, blank = results.corners, [f"{n}.png" for n in range(0, 28, 2)]
+    calibration = results.summary.calibration
+    assert (calibration.samples, calibration.used) == (28, 13)
+    assert [each.image for each in calibration.boardless] == blank
+    (left_out,) = (each for each in results.summary.not_examined if each.subject == "boardless_images")
+    assert len(left_out.names) == 14
+    assert set(corners.image) == {f"{n}.png" for n in range(1, 28, 2)}
     sound = corners.used
-    assert set(corners.image[~sound]) == {"3.png"}
+    assert set(corners.image[~sound]) == {"7.png"}
     assert np.sqrt(((corners.by_board_px - corners.seen_px)[sound] ** 2).sum(axis=1).mean()) < 0.5
     off = corners.by_arm_px - corners.seen_px
     assert np.sqrt((off[sound] ** 2).sum(axis=1).mean()) < 1.5

@@ -100,7 +100,7 @@ def check_program(
                 print(line)
         of_files = [line(each) for each in checked for line in (cycle_line, not_examined_line)]
         missed = next((each.missed for each in checked if each.missed), ())
-        for line in filter(None, (*of_files, shapes_line(checked), missed_line(missed), summary_line(checked))):
+        for line in filter(None, (*of_files, shapes_line(arm), missed_line(missed), summary_line(checked))):
             print_note(line)
     if any(each.check is None for each in checked):
         raise typer.Exit(2)
@@ -130,7 +130,7 @@ def write(
     from er3a.files.scene_file import load_scene
     from er3a.pipeline.messages.expectations import outcome_word
     from er3a.pipeline.messages.programs import say
-    from er3a.pipeline.program_reports import missed_collisions, missed_line, programs_of
+    from er3a.pipeline.program_reports import missed_collisions, missed_line, programs_of, shapes_line
     from er3a.pipeline.progress import shown_work
     from er3a.programs.program_findings import TargetsLeftOut
 
@@ -149,8 +149,9 @@ def write(
             print(f"{file}: written")
         for finding in made.findings:
             print_note(f"{made.name}: {say(finding)}")
-        refused += any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
-    if line := missed_line(missed_collisions(arm, around)):
+        refused += bool(made.left_out) or any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
+    missed = dict.fromkeys(each for made in programs for each in made.left_out)
+    for line in filter(None, (shapes_line(arm), missed_line((*missed_collisions(arm, around), *missed)))):
         print_note(line)
     if refused:
         raise typer.Exit(1)

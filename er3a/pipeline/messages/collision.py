@@ -54,8 +54,8 @@ TEXTS = texts(
         "carried_and_link": "{link} and {carried}",
         "pairs_unexamined": "Collisions not examined, because the shapes overlap where no arm's can: {pairs}.",
         "shapes_assumed#given": (
-            "No document gives the shapes of the arm's links: collisions are judged by assumed shapes, and clear means "
-            "clear of these."
+            "No document that verdicts rest on gives the shapes of the arm's links: collisions are judged by assumed "
+            "shapes, and clear means clear of these."
         ),
         "shapes_assumed#guessed": (
             "The robot's file gives no shapes: collisions are judged by capsules guessed from its table, and clear "
@@ -201,7 +201,7 @@ def why(
 
     Parameters
     ----------
-    assumed : whether no document gives the shapes
+    assumed : whether no document that verdicts rest on gives the shapes
     witness : joint values with their units; empty where there are none
     """
     match state:

@@ -10,15 +10,16 @@ from er3a.pipeline.results import LeftOut, LeftOutSubject, NoPass
 
 TEXTS = texts(
     {
-        "left_out.obstacles": "obstacles: no scene is given, and the arm was checked against itself only",
+        "left_out.obstacles": "obstacles: none are given, and the arm was checked against itself only",
         "no_pass": "Not examined, and therefore no pass: {missed}.",
         "left_out.bare_links": "what links hit to which no shape is given, and which lie within those of others",
         "left_out.uncovered_links": "what links hit to which no shape is given, and which reach out of all others'",
-        "left_out.allowed_contacts": "collisions with obstacles that the scene's file allows",
+        "left_out.bare_tool": "what the tool hits: its point lies outside all shapes, and the scene gives it none",
+        "left_out.allowed_contacts": "collisions that the scene's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
-        "left_out.allowed_pairs": "collisions of pairs that the robot's or scene's file allows",
+        "left_out.allowed_pairs": "collisions of pairs that the robot's file allows",
         "left_out.joined_pairs": (
             "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
         ),
@@ -31,6 +32,7 @@ TEXTS = texts(
         "left_out.path_stretches": "stretches that the bounds between the poses solved leave open",
         "left_out.strategies": "avoidance strategies that the study does not ask for",
         "left_out.program_lines": "lines of programs that were not examined, or not each time",
+        "left_out.program_rest": "lines of programs that may move the arm and that none of their paths holds",
         "left_out.program_starts": "motions from where the arm is not known to stand",
         "left_out.outer_axes": "axes beside the arm's, which are taken to be at rest",
         "left_out.controller_ramps": "the controller's own ramps and blends, which decide times and corners",
@@ -78,7 +80,7 @@ TEXTS = texts(
         "left_out.uncertain_solutions": "whether the solutions found are all",
         "left_out.advice": "what would help at targets without a solution",
         "left_out.rules": "rules of the mix for which the robot's file has no data",
-        "left_out.ways_between": "motions from one target to the next",
+        "left_out.ways_between": "motions from one target, or path, to the next",
         "left_out.colliding_reach": (
             "collisions, in reach, voids and tool directions: arms count there that touch themselves or obstacles"
         ),

@@ -2,47 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_shapes
+from er3a.collision.shapes import arm_shapes, has_bare_tool
 from er3a.numerics.arrays import Flags
 from er3a.pipeline.results import LeftOut, LeftOutSubject
 from er3a.robots.robot import Robot
 
 
 def left_out_of_collisions(
-    bodies: Bodies, scene: Scene | None, tolerance_mm: float | None = None
+    bodies: Bodies, scene: Scene | None, tolerance_mm: float | None = None, arms: Iterable[tuple[str, Robot]] = ()
 ) -> tuple[LeftOut, ...]:
     """What a check for collisions does not see.
 
     Parameters
     ----------
     tolerance_mm : of overlaps that may go unnoticed between points of a motion; None where only points are checked
+    arms : the robot with each tool that programs set, by the tool's name
     """
 
     def pairs(state: PairState) -> tuple[str, ...]:
         return tuple(f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state)
 
-    shapes, rules = arm_shapes(bodies.robot), scene.pair_rules if scene else ()
+    robot, carries = bodies.robot, bool(scene and scene.carried)
+    shapes, rules = arm_shapes(robot), scene.pair_rules if scene else ()
     solids = {solid.name for solid in scene.solids} if scene else set()
+    by_scene = {frozenset((each.first, each.second)): f"{each.first}/{each.second}" for each in rules}
+    bare = dict.fromkeys(name or "tool" for name, arm in (("", robot), *arms) if not carries and has_bare_tool(arm))
     found: list[tuple[LeftOutSubject, tuple[str, ...]]] = [
         ("uncovered_links", tuple(link_label(link) for link in shapes.uncovered)),
-        (
-            "allowed_contacts",
-            tuple(f"{each.first}/{each.second}" for each in rules if solids & {each.first, each.second}),
-        ),
+        ("allowed_contacts", tuple(by_scene.values())),
+        ("bare_tool", tuple(bare)),
         ("bare_links", tuple(link_label(link) for link in shapes.bare if link not in shapes.uncovered)),
         ("unexamined_pairs", tuple(pair.label for pair in bodies.unexamined)),
-        ("allowed_pairs", pairs("allowed")),
+        ("allowed_pairs", tuple(name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene)),
         ("joined_pairs", pairs("joined")),
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]
-    obstacles = [LeftOut("obstacles" if scene is None else "scene_shapes")]
-    carried = [] if scene is not None and scene.carried else [LeftOut("carried")]
+    obstacles = [LeftOut("scene_shapes" if solids else "obstacles")]
+    carried = [] if carries else [LeftOut("carried")]
     shallow = [] if tolerance_mm is None else [LeftOut("shallow_overlaps", amount=tolerance_mm)]
     return (*obstacles, *carried, *listed, *shallow)
 

@@ -184,7 +184,7 @@ def _frame(memory: ProgramMemory, variable: str) -> instructions.NamedFrame:
     own, pose = memory.local.get(name, memory.shared.get(name)), record_pose(value)
     if isinstance(value, syntax.Unclear):
         name = name or value.text
-        if isinstance(own, syntax.Unclear) and own.text != name:  # the program has changed what the name stands for
+        if isinstance(own, syntax.Unclear) and not isinstance(own, syntax.Unset):  # the program has changed it
             name = f"{name}={own.text}"
     elif pose is None and is_frame(value):
         name = syntax.shown(value)

@@ -16,7 +16,7 @@ from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_j
 class NeverFree:
     """Pairs that overlap in every joint vector within the limits, proven: the arm can't be used like this.
 
-    ``assumed``: whether no document gives the shapes, so that it is proven of assumed ones only.
+    ``assumed``: whether the shapes are, so that nothing is proven of the arm itself.
     """
 
     pairs: tuple[Pair, ...]
@@ -59,7 +59,7 @@ class FreeSpace:
     ----------
     places, clear, joined : cells reached, with an arm free of overlap, and joined to home by a proven motion
     undecided : pairs of links of which it is not known whether they can meet
-    assumed : whether no document gives the shapes of the arm's links, so that nothing is proven of the arm itself
+    assumed : whether the shapes of the arm's links are, so that nothing is proven of the arm itself
     """
 
     free_ratio: float

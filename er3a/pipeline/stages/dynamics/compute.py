@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
 from er3a.dynamics.plausibility import MassFinding, MissingLink, mass_findings
@@ -23,7 +24,14 @@ from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
 from er3a.pipeline.stages.trajectory.judgement import verdict_of as verdict_of_motion
-from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, limits_of, near_singular, study_motions
+from er3a.pipeline.stages.trajectory.motion import (
+    Motion,
+    PartOfProgram,
+    left_out_of_programs,
+    limits_of,
+    near_singular,
+    study_motions,
+)
 from er3a.pipeline.study import Study
 from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict
 from er3a.planning.timing import JointLimits, NoTimeLaw, TimingError, fastest, nodes_along
@@ -423,15 +431,15 @@ NO_FIGURE = Figure("holding_torque", None, "")
 def compute(study: Study, name: str) -> model.DynamicsResults:
     """Compute the dynamics stage of a robot."""
     settings = study.section(DynamicsSettings)
-    given = study.robot(name)
+    given, margin = study.robot(name), study.section(TrajectorySettings).assumed_margin_mm / 1000
     robot = with_estimates(given, settings.capsule_density_kg_m3)
     loads = study.loads(name)
     load, load_grade = load_of(loads), _worst_grade([each.grade for each in loads])
     grade = "inferred" if robot is not given else _links_grade(given)
     moving = any(each.link > 0 for each in robot.masses.links)
     arm = _loaded_arm(study, robot, load, (grade, load_grade), settings)
-    paths, skipped = _paths(study, name, arm, settings) if moving else ([], ())
-    holding = _holding(arm) if moving else ()
+    paths, skipped, rest = _paths(study, name, arm, settings) if moving else ([], (), ())
+    holding = _hardest([arm, *_with_named_loads(arm, paths)]) if moving else ()
     motors = _motors(robot, paths, holding) if any(path.summary.counts for path in paths) else ()
     summaries = tuple(path.summary for path in paths)
     uses = (
@@ -444,7 +452,9 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = model.DynamicsSummary(
-        verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped),
+        verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped).resting_on(
+            shapes_assumed(robot, margin, {}) if paths else None
+        ),
         figures=_figures(summaries, holding, uses, imbalances, masses),
         gravity_m_s2=settings.gravity_m_s2,
         masses=masses,
@@ -457,7 +467,9 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         motors=motors,
         uses=uses,
         power_imbalance=max(imbalances, default=None),
-        not_examined=_left_out(robot, summaries, skipped, unknown, settings.samples) if holding or uses else (),
+        not_examined=(*rest, *_left_out(robot, summaries, skipped, unknown, settings.samples))
+        if holding or uses
+        else (),
     )
     followed = [path.rows for path in paths if path.demand]
     rows = model.TorqueRows.stacked(followed)
@@ -541,22 +553,23 @@ def _left_out(
 
 def _paths(
     study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings
-) -> tuple[list[PathTorques], tuple[str, ...]]:
-    """The paths, and the names of those that an arm of its class can't be made to follow."""
+) -> tuple[list[PathTorques], tuple[str, ...], tuple[LeftOut, ...]]:
+    """The paths, the names of those that an arm of its class can't follow, and what programs have besides."""
     joints, trajectory = arm.robot.joints, study.section(TrajectorySettings)
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
     bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
     surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
     judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
-    found, skipped = [], []
+    found, skipped, rest = [], [], dict[str, tuple[int, ...]]()
     for each in study_motions(study, name, trajectory.checks_per_sample):
+        rest |= {each.listed: each.rest} if each.expect in (None, "safe") else {}
         if each.motion is None:
             skipped.append(each.name)
         else:
             loaded = with_load(arm, program_load(each.motion))
             found.append(path_torques(loaded, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
-    return found, tuple(skipped)
+    return found, tuple(skipped), left_out_of_programs(rest)
 
 
 def program_load(motion: Motion) -> MassBody | str | None:
@@ -576,6 +589,18 @@ def with_load(arm: LoadedArm, load: MassBody | str | None) -> LoadedArm:
     outer = arm.load or Load(0.0)
     known = Load(load.mass, load.centre, load.inertia, force=outer.force, moment=outer.moment)
     return replace(arm, load=known, load_grade="claim")
+
+
+def _with_named_loads(arm: LoadedArm, paths: list[PathTorques]) -> Iterator[LoadedArm]:
+    """The arm with each load that a program names on a path that may be run."""
+    for load in {path.load: None for path in paths if path.load and path.summary.counts}:
+        yield replace(arm, load=load, load_grade="claim")
+
+
+def _hardest(arms: Sequence[LoadedArm]) -> tuple[model.HoldingTorque, ...]:
+    """Of each joint what it holds with the load that asks most of it."""
+    held = zip(*map(_holding, arms))
+    return tuple(max(each, key=lambda one: one.bound + one.tolerance) for each in held)
 
 
 def _holding(arm: LoadedArm) -> tuple[model.HoldingTorque, ...]:

@@ -41,7 +41,7 @@ from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
-from er3a.robots.joint_limits import limit_margin, shown
+from er3a.robots.joint_limits import limit_margin, meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import AllCollide, Choice, Refusal, nearest
 from er3a.selection.rule_names import RuleName
@@ -393,6 +393,10 @@ def compute(study: Study, name: str) -> model.InverseResults:
     ranked = [rankings(robot, target, one, scene, settings.mix) for target, one in zip(targets, solved)]
     solutions = model.SolutionRows.stacked(one.rows for one in solved).of_joints(robot.slides)
     results = tuple(one.result for one in solved)
+    asked = [each for each in results if each.chosen_deg is not None and each.expect in (None, "reached")]
+    chosen = meant(robot, np.reshape([each.chosen_deg for each in asked], (-1, robot.joints)))
+    least = bodies_of(robot, scene).min_distance(chosen)[0].tolist()
+    rests_on = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {each.name: d for each, d in zip(asked, least)})
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
     wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MOST_BY_CLASS)
@@ -401,7 +405,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     summary = model.InverseSummary(
         verdict=_verdict(results, worst, trips, scene is not None)
         .without(bodies_of(robot, scene).unexamined)
-        .resting_on(assumed),
+        .resting_on(rests_on),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,

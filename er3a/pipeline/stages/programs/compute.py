@@ -54,6 +54,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     lines: list[model.Lines] = []
     instructions: list[model.Instructions] = []
     unknown_starts: list[str] = []
+    arms: list[tuple[str, Robot]] = []
     motions: list[model.ProgramMotion] = []
     for entry in listed.programs:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
@@ -61,6 +62,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
         summaries.append(_summary(entry, check, starts))
         if any(each.what == "way" for each in check.not_examined):
             unknown_starts.append(entry.name)
+        arms += check.arms if entry.expect in (None, "pass") else ()
         lines.append(_lines(entry.name, check))
         instructions.append(_instructions(entry.name, check, len(robot.lower)))
         motions.append(motion)
@@ -78,7 +80,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
             assumed_speed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
             programs=tuple(summaries),
             not_examined=(
-                *left_out_of_collisions(bodies_of(robot, scene), scene, 1000 * options.penetration_tolerance),
+                *left_out_of_collisions(bodies_of(robot, scene), scene, 1000 * options.penetration_tolerance, arms),
                 *left_out_of_rates(np.isfinite(robot.speed), jerk=False),
                 *_left_out(summaries, unknown_starts),
             ),

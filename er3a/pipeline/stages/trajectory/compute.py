@@ -11,7 +11,7 @@ import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import PairOverlaps, PairTooNear
+from er3a.collision.pairs import PairOverlaps, PairTooNear, ShapesAssumed
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -25,7 +25,14 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates, left_out_without_tool
 from er3a.pipeline.stages.trajectory import judgement, model
-from er3a.pipeline.stages.trajectory.motion import Motion, limits_of, listed_motions, planning_of, proof_requirements
+from er3a.pipeline.stages.trajectory.motion import (
+    Motion,
+    left_out_of_programs,
+    limits_of,
+    listed_motions,
+    planning_of,
+    proof_requirements,
+)
 from er3a.pipeline.stages.trajectory.written_programs import program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
@@ -376,8 +383,10 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     paths: list[model.PathSummary] = []
     programs: list[model.ProgramFiles] = []
     skipped: list[model.PathNotFollowed] = []
+    rest: dict[str, tuple[int, ...]] = {}
     for each in listed_motions(file, planning, required, settings.checks_per_sample):
         motion = each.motion
+        rest |= {each.listed: each.rest} if each.expect in (None, "safe") else {}
         if motion is None:
             stops = each.ends.t if each.ends else None
             lacking, outcome = closed_form_missing(robot), each.outcome_unfollowed
@@ -397,22 +406,16 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)
-    assumed = tuple(bool(value) for value in ~np.isfinite(robot.speed))
-    used = model.LimitsUsed(
-        speed_deg_s=_shown(robot, limits.speed),
-        speed_assumed=assumed,
-        acceleration_deg_s2=_shown(robot, limits.acceleration),
-        acceleration_assumed=limits.acceleration_assumed,
-        acceleration_time_s=settings.acceleration_time_s,
-        jerk_deg_s3=None if limits.jerk is None else _shown(robot, limits.jerk),
-    )
+    used = _limits_used(robot, limits, settings)
     least = {
         path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
     }
     assumed_shapes = shapes_assumed(robot, assumed_margin, least)
     summary = model.TrajectorySummary(
-        verdict=_verdict(paths, skipped).without(surroundings.bodies.unexamined).resting_on(assumed_shapes),
-        figures=_figures(paths, length, used),
+        verdict=_verdict(paths, skipped, assumed_shapes)
+        .without(surroundings.bodies.unexamined)
+        .resting_on(assumed_shapes),
+        figures=_figures(paths, length, used, assumed_shapes),
         characteristic_length_m=length,
         near=thresholds,
         joint_limits=used,
@@ -424,6 +427,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
             *left_out_of_collisions(surroundings.bodies, scene, settings.penetration_tolerance_mm),
             *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
             *_left_out(paths, skipped, only),
+            *left_out_of_programs(rest),
             *left_out_without_tool(robot),
             LeftOut("torques"),
         ),
@@ -438,6 +442,17 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     )
 
 
+def _limits_used(robot: Robot, limits: JointLimits, settings: TrajectorySettings) -> model.LimitsUsed:
+    return model.LimitsUsed(
+        speed_deg_s=_shown(robot, limits.speed),
+        speed_assumed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
+        acceleration_deg_s2=_shown(robot, limits.acceleration),
+        acceleration_assumed=limits.acceleration_assumed,
+        acceleration_time_s=settings.acceleration_time_s,
+        jerk_deg_s3=None if limits.jerk is None else _shown(robot, limits.jerk),
+    )
+
+
 def _left_out(
     paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], only: StrategyName | None
 ) -> Iterator[LeftOut]:
@@ -448,6 +463,8 @@ def _left_out(
         yield LeftOut("path_stretches", open_)
     if unplanned := tuple(path.name for path in paths if path.verdict == "none found"):
         yield LeftOut("plans", unplanned)
+    if len(paths) + len(skipped) > 1:
+        yield LeftOut("ways_between")
     if only:
         yield LeftOut("strategies", tuple(name for name in get_args(StrategyName) if name != only))
 
@@ -484,7 +501,7 @@ def _checks(
 
 
 def _verdict(
-    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed]
+    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: ShapesAssumed | None
 ) -> Verdict[model.AllSafe | model.SomeUnsafe | model.NoneSafe | ExpectationsUnmet]:
     if unmet := unmet_expectations([*paths, *skipped]):
         return Verdict("fail", unmet)
@@ -494,10 +511,11 @@ def _verdict(
     def named(verdict: PathVerdict) -> tuple[str, ...]:
         return tuple(path.name for path in asked if path.verdict == verdict)
 
-    safe, count = len(named("safe")), len(asked) + len(unfollowed)
-    finding = model.AllSafe if safe == count else model.SomeUnsafe if safe else model.NoneSafe
+    safe, count = sum(model.is_safe(path, shapes) for path in asked), len(asked) + len(unfollowed)
+    some = bool(named("safe"))
+    finding = model.AllSafe if safe == count else model.SomeUnsafe if some else model.NoneSafe
     failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
-    status: Status = "pass" if safe == count else "fail" if failed or not safe else "caution"
+    status: Status = "pass" if safe == count else "fail" if failed or not some else "caution"
     counts = finding(
         paths=count,
         safe=safe,
@@ -521,7 +539,9 @@ def _fails(path: model.PathSummary) -> bool:
     return path.verdict in FAULTS or (path.verdict == "singular" and (bool(path.jumps) or not path.joint_speed_bounded))
 
 
-def _figures(paths: list[model.PathSummary], length: float, limits: model.LimitsUsed) -> tuple[Figure, ...]:
+def _figures(
+    paths: list[model.PathSummary], length: float, limits: model.LimitsUsed, shapes: ShapesAssumed | None
+) -> tuple[Figure, ...]:
     asked = [path for path in paths if path.expect in (None, "safe")]  # demonstrations are counted apart
     events = [event for path in asked for event in path.singularities]
     bounded = [path for path in paths if path.max_joint_speed_deg_s]
@@ -534,7 +554,7 @@ def _figures(paths: list[model.PathSummary], length: float, limits: model.Limits
     speed, limit, unit = max(speeds, key=lambda each: each[0] / each[1], default=(None, None, "deg/s"))
     colliding = sum(bool(path.collisions) for path in asked)
     return (
-        Figure("safe", sum(path.verdict == "safe" for path in asked), "", of=len(asked)),
+        Figure("safe", sum(model.is_safe(path, shapes) for path in asked), "", of=len(asked)),
         Figure("singular_poses", sum(event.crossing for event in events), ""),
         Figure("near_passes", sum(not event.crossing for event in events), ""),
         Figure("colliding", colliding, ""),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
 from er3a.by_value import Finding
-from er3a.collision.pairs import Pair, PairOverlaps, PairTooNear
+from er3a.collision.pairs import Pair, PairOverlaps, PairTooNear, ShapesAssumed
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
@@ -38,7 +38,8 @@ CauseT = TypeVar("CauseT", bound=Finding)
 class PathCounts:
     """How many paths there are, how many are safe, and the names of the others by their verdict.
 
-    ``demonstrations``, paths that fail as they are meant to, count for none of these.
+    Paths as near to assumed shapes as these may be wrong count as none of these, and neither do ``demonstrations``,
+    paths that fail as they are meant to.
     """
 
     paths: int
@@ -346,6 +347,11 @@ class PathNotFollowed:
     outcome: PathVerdict
     expect: PathVerdict | None
     stops_at_s: float | None = None
+
+
+def is_safe(path: PathSummary, shapes: ShapesAssumed | None) -> bool:
+    """Whether nothing is wrong with a path, and it is not as near to assumed ``shapes`` as these may be wrong."""
+    return path.verdict == "safe" and not (shapes and path.name in shapes.near)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
+from er3a.pipeline.results import LeftOut
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.planning.class_follow import PathEndsError, follow_by_class
@@ -38,13 +39,14 @@ from er3a.robots.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class PartOfProgram:
-    """A stretch of a program as an entry of a path file."""
+    """A stretch of a program as an entry of a path file; ``rest``: lines that no stretch of the program holds."""
 
     name: str
     title: str
     samples: int
     expect: PathVerdict | None
     part: ProgramPart
+    rest: tuple[int, ...]
 
     @property
     def kind(self) -> Literal["joint_sequence", "sequence"]:
@@ -72,12 +74,12 @@ def planned_entries(robot: Robot, entry: PathEntry | ProgramPath, source: Comman
         return
     start = None if entry.start_deg is None else np.radians(entry.start_deg)
     check = check_program(read_program(entry.program), robot, CheckOptions(start=start, measures=False))
-    parts = parts_of(check, robot, source)
+    parts, rest = parts_of(check, robot, source)
     for number, part in enumerate(parts, 1):
         name = f"{entry.name}_{number}" if len(parts) > 1 else entry.name
         first, last = part.lines
         title = f"{entry.title}, lines {first} to {last}" if last > first else f"{entry.title}, line {first}"
-        yield PartOfProgram(name, title, entry.samples, entry.expect, part)
+        yield PartOfProgram(name, title, entry.samples, entry.expect, part, rest)
 
 
 FOLLOWED_AT = 1030  # times at which a path of the tool is solved at least: its branches depend on no samples
@@ -305,7 +307,7 @@ class ListedMotion:
     """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
 
     ``motion`` is None for a path of the tool that an arm of its class can't be made to follow, or not to its end;
-    ``ends`` then says when and why it is not.
+    ``ends`` then says when and why it is not. ``rest``: lines of its program that no motion is of.
     """
 
     listed: str
@@ -314,6 +316,7 @@ class ListedMotion:
     expect: PathVerdict | None
     motion: Motion | None
     ends: PathEndsError | None = None
+    rest: tuple[int, ...] = ()
 
     @property
     def outcome_unfollowed(self) -> PathVerdict:
@@ -321,6 +324,12 @@ class ListedMotion:
         if self.ends is None:
             return "undecided"
         return "unreachable" if self.ends.kind == "out_of_reach" else "singular"
+
+
+def left_out_of_programs(rest: Mapping[str, tuple[int, ...]]) -> tuple[LeftOut, ...]:
+    """Lines of programs, by their names, that are of no path made of them."""
+    lines = tuple(f"{name}: {', '.join(map(str, own))}" for name, own in rest.items() if own)
+    return (LeftOut("program_rest", lines),) if lines else ()
 
 
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
@@ -360,4 +369,5 @@ def listed_motions(
                 motion, ended = None, error
             end = np.full(task.robot.joints, np.nan) if motion is None else motion.q[-1]
             ends[entry.name] = ends[listed.name] = end
-            yield ListedMotion(listed.name, entry.name, entry.title, entry.expect, motion, ended)
+            rest = entry.rest if isinstance(entry, PartOfProgram) else ()
+            yield ListedMotion(listed.name, entry.name, entry.title, entry.expect, motion, ended, rest)

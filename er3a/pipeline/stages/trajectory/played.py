@@ -19,6 +19,7 @@ from er3a.pipeline.stages.trajectory.model import (
     Stretch,
     TrajectoryResults,
     TrajectorySummary,
+    is_safe,
 )
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.planning.names import PathVerdict
@@ -66,7 +67,7 @@ def faults(results: TrajectoryResults) -> list[Fault]:
     found = []
     for path in worst_first(results.summary.paths):
         near = near_assumed(path, results.summary)
-        if path.verdict == "safe" and not near:
+        if is_safe(path, results.summary.verdict.shapes):
             continue
         where, t = near, path.clearance.t_s if path.clearance else 0.0
         if path.verdict != "safe":

@@ -470,8 +470,13 @@ def _zero_pose_error(poses: model.KeyPoses, set_name: str) -> float | None:
 
 
 def _claims(sets: tuple[model.SetSummary, ...]) -> tuple[model.Claims, ...]:
-    found = [(each.name, each.counts.claims) for each in sets if not each.is_authoritative]
-    return tuple(model.Claims(name, claims.total, claims.failed) for name, claims in found if claims.total)
+    """Of sets of claims alone, and of claims among documents that do not hold."""
+    found = [(each, each.counts.claims) for each in sets]
+    return tuple(
+        model.Claims(each.name, claims.total, claims.failed)
+        for each, claims in found
+        if (claims.failed if each.is_authoritative else claims.total)
+    )
 
 
 def _contradiction(conflicts: list[model.Conflict]) -> model.Contradiction:

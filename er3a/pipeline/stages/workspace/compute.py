@@ -279,7 +279,7 @@ def _left_out(
     lower, upper = proven.proof.bounds
     if surface is None and upper > lower:
         yield LeftOut("undecided_volume", amount=1000 * (upper - lower))
-    if surface is None and proven.arm is not None and proven.proof.width > COARSE:
+    if surface is None and proven.proof.width > COARSE:
         yield LeftOut("hidden_voids", amount=100 * proven.proof.width)
     if surface and (surface.lower is None or surface.upper is None):
         yield LeftOut("area")
