@@ -213,11 +213,10 @@ def next_step(
     same_arm: bool = False,
     measurement: str = "",
     entry: str = "",
-    others: int = 0,
 ) -> NextStep | None:
     """The step that helps most; None where nothing is open. ``failed``: titles of stages that failed, by name;
-    ``measurement``: the one that validation proposes, ``entry``, what it settles, and how many ``others`` rest on their
-    own source alone; the rest as of :func:`decision`."""
+    ``measurement``: the one that validation proposes, and ``entry``, what it settles; the others as of
+    :func:`decision`."""
     validation = f"{robot}/validation.html"
     if table == "fail" and same_arm:
         return NextStep(tr("Take the corrected table from the validation page."), validation)
@@ -231,12 +230,7 @@ def next_step(
     if table == "no_reference":
         text = tr("Gather the manufacturer's data, or compare the table with a URDF by er3a compare.")
         return NextStep(text, validation)
-    if not measurement:
-        return None
-    if others:
-        step = N_("{step} It settles {entry}; {others} more entries rest on one source.")
-        measurement = tr(step, step=measurement, entry=entry, others=others)
-    return NextStep(measurement, f"{validation}#entry-{entry.replace(' ', '')}")
+    return NextStep(measurement, f"{validation}#entry-{entry}") if measurement else None
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.pages import caveat, decision, next_step, what_it_can_do
 from er3a.pipeline.messages.say import bracketed, joined, say
-from er3a.pipeline.messages.validation import how_far_off, missed_text
+from er3a.pipeline.messages.validation import how_far_off, missed_text, shortened
 from er3a.pipeline.messages.workspace import box_text, void_text
 from er3a.pipeline.results import (
     AbsentResults,
@@ -582,7 +582,6 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding)
-    proposed, alone = (finding.next_measurement, finding.unbounded) if isinstance(finding, LeftOpen) else (None, ())
     return {
         "robot": robot,
         "table": table,
@@ -606,14 +605,24 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             failed,
             instead=instead,
             same_arm=same_arm,
-            measurement=page.whole_sentence(say(proposed)) if proposed else "",
-            entry=proposed.entry if proposed else "",
-            others=len({*alone} - {proposed.entry}) if proposed else 0,
+            **_proposed(finding),
         ),
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
         "expected": expected,
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
     }
+
+
+def _proposed(finding: object) -> dict[str, str]:
+    """The measurement that validation proposes, as :func:`next_step` takes it; empty where it proposes none."""
+    if not isinstance(finding, LeftOpen) or finding.next_measurement is None:
+        return {}
+    step, entry = page.whole_sentence(say(finding.next_measurement)), finding.next_measurement.entry
+    others = len({*finding.unbounded} - {entry})
+    if others:
+        more = N_("{step} It settles {entry}; {others} more entries rest on one source.")
+        step = tr(more, step=step, entry=shortened([entry]), others=others)
+    return {"measurement": step, "entry": entry}
 
 
 def _settled(finding: object) -> tuple[bool, str]:
