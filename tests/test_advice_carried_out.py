@@ -53,6 +53,8 @@ CARRIED_OUT = {
     "advice.slower": "test_the_slower_pace_that_is_advised_keeps_the_limits",
     "advice.clear_until": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.clear_until#links": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
+    "advice.end": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
+    "advice.end#clear": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.within_reach": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
     "turn_tool": "test_a_target_moved_or_turned_as_advised_is_reached_with_margin",
     "shift_tool": "test_a_target_moved_or_turned_as_advised_is_reached_with_margin",

@@ -118,13 +118,35 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
         each.name for each in stored["er3a_c60"].results.summary.verdict.finding.demonstrations
     }
     for each in listed:  # what the index links to
-        name, t, place = re.fullmatch(r"programs\.html\?play=(\w+)&t=([\d.]+)#([\w-]+)", each.address).groups()
+        name, t, place = re.fullmatch(r"programs\.html\?play=(\w+)&t=([\d.]+)#([\w.-]+)", each.address).groups()
         assert name == each.name
         assert f'id="{place}"' in html
         assert float(t) <= max(motion.take(motion.program == name).t_s, default=0.0) + 1e-9  # as it is rounded
         assert each.to_do
     assert "Go there by a joint move to (" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
+
+
+@pytest.mark.long
+def test_a_long_listing_keeps_the_line_that_is_wrong_and_no_line_has_another_programs_address(study, tmp_path):
+    """A program that goes wrong in its last line, behind more motions than the page shows lines for."""
+    near = "PTP {A1 0,A2 -10,A3 -10,A4 0,A5 -70,A6 0}"
+    far = "PTP {A1 500}"
+    for name, between in (("far", [*[near] * 60, *[""] * 400]), ("far-2", [near])):
+        (tmp_path / f"{name}.src").write_text("\n".join(["DEF far()", *between, far, "END"]))
+    entries = [{"name": name, "title": name, "file": str(tmp_path / f"{name}.src")} for name in ("far", "far-2")]
+    listed = tmp_path / "programs.yaml"
+    listed.write_text(json.dumps({"kind": "programs", "programs": entries}))
+    own = with_entry(study, programs=str(listed))
+    run.compute("programs", own, "er3a_c60", tmp_path / "found")
+    found = read_results(tmp_path / "found", RESULTS)
+    report(own, found, tmp_path / "programs.html")
+    html = (tmp_path / "programs.html").read_text(encoding="utf-8")
+    ids = re.findall(r' id="([^"]+)"', html)
+    assert len(ids) == len(set(ids))
+    places = {each.address.partition("#")[2] for each in faults(found.results)}
+    assert places == {"far.462", "far-2.3"}
+    assert places < set(ids)
 
 
 def test_a_file_without_programs_is_no_reference_and_has_a_page(study, tmp_path):

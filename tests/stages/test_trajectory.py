@@ -170,8 +170,8 @@ def test_a_path_that_leaves_the_reach_is_given_a_point_that_is_reached(study, re
     """As it is printed: before the first fault, on the path, and the arm has joint angles for it."""
     robot, path = study.robot("er3a_c60"), by_name(results["er3a_c60"])["line_out"]
     (fault,) = (each for each in faults(results["er3a_c60"]) if each.name == "line_out")
-    printed = r"wrong is at t = (.*?) s, the tool at x, y, z = (.*?), (.*?), (.*?) mm"
-    t, *xyz = map(float, re.search(printed, fault.to_do).groups())
+    t = float(re.search("&t=(.*?)#", fault.instead[1])[1])
+    xyz = [float(value) for value in re.search(r"x, y, z = (.*?) mm", fault.to_do)[1].split(", ")]
     assert 0 < t <= min(part.t0_s for part in (*path.too_fast, *path.unreachable))
     assert xyz[1:] == [0.0, 400.0]
     assert 350 < xyz[0] < 350 + 1000 * path.unreachable[0].s0_m
@@ -376,6 +376,8 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
     meant = stored["er3_600"].results.summary.verdict.finding.demonstrations
     assert meant
     listed = index.split('id="faults-er3_600-trajectory"')[1].split("</table>")[0]
+    assert 'play=line_wrist%2C+repaired&amp;t=0.0#line_wrist">line_<wbr>wrist, repaired</a>' in listed
+    assert "trajectory.html?play=line_clean&amp;t=0#line_clean" in index  # a sound one is named too
     for each in meant:
         t, place = re.search(rf'trajectory.html\?play={each.name}&amp;t=([\d.]+)#(\w+)"', listed).groups()
         path = next(path for path in stored["er3_600"].results.summary.paths if path.name == each.name)
@@ -573,8 +575,9 @@ def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means
     path = by_name(results["er3a_c60"])["line_shoulder"]
     assert path.fastest_s < path.duration_s
     assert (
-        "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path can take "
-        f"as little as {path.fastest_s:.2f} s in place of the {path.duration_s:.2f} s programmed" in (path_text(path))
+        "only the speed profile is at fault, not the path: slower there and faster elsewhere, "
+        f"the {path.duration_s:.2f} s programmed are enough (at its fastest it takes {path.fastest_s:.2f} s)"
+        in path_text(path)
     )
     assert "it takes at least 9.00 s" in path_text(replace(path, fastest_s=9.0))
 

@@ -16,6 +16,7 @@ from er3a.pipeline.messages.trajectory import advice
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
+from er3a.pipeline.stages.trajectory.played import faults
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
@@ -109,13 +110,17 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("before_mm", [2, 20])
+@pytest.mark.parametrize("before_mm", [2, None])
 def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_path, before_mm):
-    (path,) = paths_of(tmp_path, "line_out")
+    """Just before the edge, and at the last sound point that index and page name."""
+    results = compute(study_of(tmp_path, "line_out"), ROBOT)
+    (path,), (fault,) = results.summary.paths, faults(results)
     far = float(re.search(r"within reach up to t = \S+ s \(([\d.]+) mm of the path\): end it before", advice(path))[1])
     (entry,) = (each for each in load_paths(f"data/paths/{ROBOT}.yaml").paths if each.name == "line_out")
     start, end = np.array(entry.start.xyz_mm), np.array(entry.end.xyz_mm)
-    part = float((far - before_mm) / np.linalg.norm(end - start))
+    named = [float(x) for x in re.search(r"x, y, z = (.*?) mm", fault.to_do)[1].split(", ")]
+    length = far - before_mm if before_mm else np.linalg.norm(named - start)
+    part = float(length / np.linalg.norm(end - start))
     there = {"xyz_mm": (start + part * (end - start)).tolist(), "rpy_deg": list(entry.end.rpy_deg)}
     (shorter,) = paths_of(tmp_path, "line_out", end=there, duration_s=4 * part)
     assert path.verdict == "unreachable"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +17,12 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import NoWristCentre
-from er3a.pipeline.messages.workspace import say
+from er3a.pipeline.messages.workspace import say, void_text
 from er3a.pipeline.results import read_stage, write_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.compute import compute
-from er3a.pipeline.stages.workspace.model import VoidUnexpected, WorkspaceResults
+from er3a.pipeline.stages.workspace.model import Bounds, VoidUnexpected, WorkspaceResults
 from er3a.pipeline.stages.workspace.report import report
 from er3a.pipeline.stages.workspace.sample import sample
 from er3a.pipeline.study import load_study
@@ -126,6 +127,10 @@ def test_void_centres_have_no_inverse_solution(small_results, random):
     assert isinstance(summary.verdict.finding, VoidUnexpected)
     assert summary.verdict.status == "caution"
     (void,) = (void for void in summary.enclosed_voids if not void.holds_shoulder)
+    larger = replace(void, holds_shoulder=True, volume_m3=Bounds(0.5, 0.6))
+    told = void_text(replace(summary, voids=(larger, *summary.voids)))
+    assert "away from the shoulder" in told  # as the verdict has it
+    assert "1 other enclosed one" in told
 
     def solvable(position):
         T = np.eye(4)

@@ -327,8 +327,8 @@ TEXTS = texts(
             "the target."
         ),
         "remedy.collision#solid": (
-            "Move the target away from {name} (raise it, or to the side) if the arm overlaps it there; if only the way "
-            "there does, lead the tool round it by a via point, or move {name}."
+            "Move the target away from {name} if the arm overlaps it there; if only the way there does, lead the tool "
+            "round it by a via point."
         ),
         "remedy.collision#links": (
             "The arm hits itself: another tool orientation or configuration may help, or another place of the target."

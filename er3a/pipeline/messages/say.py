@@ -26,7 +26,7 @@ Views and the command line import the modules whose findings they show.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatch
 from typing import Any, Literal, TypeVar
 
@@ -155,6 +155,14 @@ def say_all(findings: Iterable[Finding]) -> str:
 def bracketed(text: str, more: str) -> str:
     """A text and what stands behind it in brackets, such as a unit; the text alone where that is empty."""
     return sentence("bracketed", text=text, more=more) if more else text
+
+
+def say_first(finding: Any) -> str:
+    """A finding with the first of the bodies that touch, or of the reasons, that it names."""
+    for name in ("touches", "reasons"):
+        if several := getattr(finding, name, ()):
+            finding = replace(finding, **{name: several[:1]})
+    return say(finding)
 
 
 def joined(parts: Iterable[str], separator: Separator | str = "; ") -> str:

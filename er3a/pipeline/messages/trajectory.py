@@ -75,14 +75,13 @@ TEXTS = texts(
         "path.harmless": "passes singular poses ({places}); joint moves are unaffected by singularities",
         "path.no_fault": "no fault",
         "path.pace#profile": (
-            "only the speed profile is at fault, not the path: slower there and faster elsewhere, the path can take "
-            "as little as {fastest:.2f} s in place of the {programmed:.2f} s programmed"
+            "only the speed profile is at fault, not the path: slower there and faster elsewhere, the "
+            "{programmed:.2f} s programmed are enough (at its fastest it takes {fastest:.2f} s)"
         ),
         "path.pace#least": "it takes at least {fastest:.2f} s",
         "path.speeds#unbounded": "no finite joint speed follows the path there",
         "path.speeds#bounded": (
-            "joint speeds stay finite on this configuration, but two configurations meet there: a controller may stop "
-            "or change to the other"
+            "joint speeds stay finite there, but a controller may stop or change to another configuration"
         ),
         "singularity.passed": "{type} singularity within {distance} at t = {when} s",
         "dependent.passed": "close to {type} at t = {when} s ({distance})",
@@ -98,7 +97,10 @@ TEXTS = texts(
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
         "advice.no_way": "No avoidance strategy works: {reason}",
-        "advice.slower": ("Or run all of it at {percent:.3g} % of its speed: duration_s {needed:.4g} in the path file"),
+        "advice.slower": (
+            "If its speed can't vary along the path, run all of it at {percent:.3g} % of that: duration_s "
+            "{needed:.4g} in the path file"
+        ),
         "advice.clear_until": (
             "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm): end the path there, with the "
             "tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg (joints {q}), or move its end or the body "
@@ -116,13 +118,15 @@ TEXTS = texts(
         "advice.sound": (
             "The last point computed before anything is wrong is at t = {t:.4g} s, the tool at x, y, z = {xyz} mm"
         ),
+        "advice.end": "End it there, with the tool at x, y, z = {xyz} mm.",
+        "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
         "advice.chosen": "{way}: {tool}, and {time}",
         "advice.chosen#clear": "{way}: {tool}, {time}, and the arm keeps {clearance:.1f} mm of clearance",
         "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
         "advice.tool#none": "the tool stays on the path",
         "advice.tool#far": "the tool leaves the path by {far} mm",
         "advice.tool#turned": "the tool leaves the path by {turned} deg",
-        "advice.swing": "{tool}, J{joint} swings through {swing:.0f} deg",
+        "advice.swing": "{tool}, J{joint} turns most, by {swing:.0f} deg",
         "advice.time#less": "it takes {shorter:.2f} s less than programmed",
         "advice.time#same": "it takes no more time than programmed",
         "advice.time#more": "it takes {longer:.2f} s more than programmed",
@@ -297,11 +301,11 @@ def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-ar
 
 def advice(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None = None) -> str | None:
     """What to do about a path; None where nothing is to be done. ``sound``: time (s) and place (mm) of the last point
-    before anything is wrong, of a path that leaves the reach."""
+    before anything is wrong."""
     if not path.avoidance:
         return None
     if path.chosen:
-        return joined([_chosen(path.chosen, path.duration_s, path.sliding), _slower_throughout(path)], ". ")
+        return joined([repair_text(path), _slower_throughout(path)], ". ")
     if path.unreachable:
         when = joined(map(_when, path.unreachable), ", ")
         why = sentence("advice.out_of_reach", when=when)
@@ -315,8 +319,17 @@ def advice(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None = No
             return joined([no_way, _clear(path)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
+    if path.clear_until and not path.unreachable:
+        sound = None
     last = sentence("advice.sound", t=sound[0], xyz=_numbers(sound[1], 1)) if sound else ""
     return joined([sentence("advice.none", why=why), _within_reach(path), last, _clear(path)], ". ")
+
+
+def end_text(path: PathSummary, xyz_mm: tuple[float, ...]) -> str:
+    """That a path may be run to a point of it (mm), and by how much it is clear up to there, if that was measured."""
+    if path.clear_until and not path.unreachable:
+        return sentence("advice.end#clear", xyz=_numbers(xyz_mm, 1), margin=path.clear_until.margin_mm)
+    return sentence("advice.end", xyz=_numbers(xyz_mm, 1))
 
 
 def _slower_throughout(path: PathSummary) -> str:
@@ -362,17 +375,21 @@ def reasons(tried: TriedStrategy) -> str:
     return joined(listed(tried.reasons))
 
 
-def _chosen(tried: TriedStrategy, programmed_s: float, sliding: tuple[int, ...]) -> str:
+def repair_text(path: PathSummary, *, in_short: bool = False) -> str:
+    """What the strategy that was chosen does, and what it costs."""
+    tried = path.chosen
+    if tried is None or tried.motion is None:
+        raise ValueError(f"{path.name} has no motion that repairs it")
     motion = tried.motion
-    if motion is None:
-        raise ValueError(f"{tried.name} was chosen and has no motion")
     tool = _leaves(motion.max_deviation_mm, motion.max_deviation_deg)
-    swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in sliding}
-    if tried.name in BY_JOINTS and swings:
+    swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in path.sliding}
+    if tried.name in BY_JOINTS and swings and not in_short:
         joint = max(swings, key=swings.__getitem__)
         tool = sentence("advice.swing", tool=tool, joint=joint, swing=swings[joint])
-    cost = {"tool": tool, "time": _takes(motion.duration_s - programmed_s)}
+    cost = {"tool": tool, "time": _takes(motion.duration_s - path.duration_s)}
     way = word("advice", ADVICE, tried.name)
+    if in_short:
+        return sentence("finding", finding=sentence("advice.chosen", way=way, **cost))
     if motion.clearance_mm is None:
         return sentence("advice.chosen", way=way, **cost)
     return sentence("advice.chosen#clear", way=way, clearance=math.floor(10 * motion.clearance_mm) / 10, **cost)

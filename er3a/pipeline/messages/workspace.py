@@ -17,6 +17,7 @@ from er3a.pipeline.stages.workspace.model import (
     StandSummary,
     ToolPointsElsewhere,
     VoidAtShoulder,
+    VoidSummary,
     VoidUncertain,
     VoidUnexpected,
     WorkspaceSummary,
@@ -163,7 +164,11 @@ TEXTS = texts(
         ),
         "void.cause#it": "Its cause: it {cause}.",
         "void.cause#noun": "Its cause: {cause}.",
-        "void.more": Plural("count", "{count} smaller one besides.", "{count} smaller ones besides."),
+        "void.pocket": (
+            "Larger, but open to the outside, so no enclosed void: a pocket of {lower:.3g} to {upper:.3g} L, centre at "
+            "({centre}) mm."
+        ),
+        "void.more": Plural("count", "{count} other enclosed one besides.", "{count} other enclosed ones besides."),
         "box.size#turned": "{box} mm, turned by 90 deg so that x, y, z are {xyz} mm",
         "box.size#as_given": "{box} mm (x, y, z)",
         "box.unknown": "Box of {box} mm: {why}",
@@ -365,23 +370,27 @@ def box_text(summary: Summary) -> str:
 
 
 def void_text(summary: Summary) -> str:
-    """The largest void that the arm encloses, with its bounds, place and cause; empty where voids were not judged."""
+    """The void that the verdict tells of, with its bounds, place and cause, and a larger open pocket; empty where voids
+    were not judged."""
     finding = summary.verdict.finding
     if isinstance(finding, NoVoid | VoidUncertain):
         return say(finding)
     if not isinstance(summary, WorkspaceSummary) or not isinstance(finding, VoidAtShoulder | VoidUnexpected):
         return ""
     voids = summary.enclosed_voids
-    largest = max(voids, key=lambda void: void.volume_m3.upper)
-    parts = {
-        "lower": 1000 * largest.volume_m3.lower,
-        "upper": 1000 * largest.volume_m3.upper,
-        "centre": millimetres(largest.centroid_m),
-    }
-    where = sentence("void.shoulder" if largest.holds_shoulder else "void.away", **parts)
-    cause = sentence("void.cause#it" if is_predicate(largest.cause) else "void.cause#noun", cause=say(largest.cause))
+    unexpected = (void for void in voids if void.status == "proven_empty" and not void.holds_shoulder)
+    told = next(unexpected, voids[0])
+    where = sentence("void.shoulder" if told.holds_shoulder else "void.away", **_void_parts(told))
+    cause = sentence("void.cause#it" if is_predicate(told.cause) else "void.cause#noun", cause=say(told.cause))
     more = sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else ""
-    return joined([where, cause, more], " ")
+    pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
+    open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""
+    return joined([where, cause, more, open_one], " ")
+
+
+def _void_parts(void: VoidSummary) -> dict[str, float | str]:
+    bounds = void.volume_m3
+    return {"lower": 1000 * bounds.lower, "upper": 1000 * bounds.upper, "centre": millimetres(void.centroid_m)}
 
 
 def millimetres(values: Sequence[float]) -> str:

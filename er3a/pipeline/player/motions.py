@@ -39,10 +39,10 @@ class Mark:
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a path or a program may not be run as it is: what fails first and where, and what to do instead.
+    """Why a path or a program may not be run as it is: what fails first, when or in which line, and what to do instead.
 
     ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that; ``address``: of the place on the
-    robot's pages, which the player shows there.
+    robot's pages, which the player shows there. ``instead``: a motion that may be run, and where the player shows it.
     """
 
     name: str
@@ -50,9 +50,11 @@ class Fault:
     status: Weight
     verdict: str
     meant: bool
-    where: str
+    when: str
+    what: str
     to_do: str
     address: str
+    instead: tuple[str, str] | None = None
 
 
 def address_of(page: str, motion: str, t: float, place: str) -> str:

@@ -32,7 +32,7 @@ from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.pages import caveat, decision, next_step, what_it_can_do
 from er3a.pipeline.messages.say import bracketed, joined, say
-from er3a.pipeline.messages.validation import how_far_off, missed_text
+from er3a.pipeline.messages.validation import how_far_off, missed_text, shortened
 from er3a.pipeline.messages.workspace import box_text, void_text
 from er3a.pipeline.results import (
     AbsentResults,
@@ -45,10 +45,10 @@ from er3a.pipeline.results import (
     read_status,
     result_records,
 )
-from er3a.pipeline.stages.programs.model import ProgramsResults
+from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
-from er3a.pipeline.stages.trajectory.model import TrajectoryResults
+from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
 from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
@@ -582,7 +582,6 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding)
-    proposed = finding.next_measurement if isinstance(finding, LeftOpen) else None
     return {
         "robot": robot,
         "table": table,
@@ -606,13 +605,24 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             failed,
             instead=instead,
             same_arm=same_arm,
-            measurement=page.whole_sentence(say(proposed)) if proposed else "",
-            entry=proposed.entry.replace(" ", "") if proposed else "",
+            **_proposed(finding),
         ),
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
         "expected": expected,
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
     }
+
+
+def _proposed(finding: object) -> dict[str, str]:
+    """The measurement that validation proposes, as :func:`next_step` takes it; empty where it proposes none."""
+    if not isinstance(finding, LeftOpen) or finding.next_measurement is None:
+        return {}
+    step, entry = page.whole_sentence(say(finding.next_measurement)), finding.next_measurement.entry
+    others = len({*finding.unbounded} - {entry})
+    if others:
+        more = N_("{step} It settles {entry}; {others} more entries rest on one source.")
+        step = tr(more, step=step, entry=shortened([entry]), others=others)
+    return {"measurement": step, "entry": entry}
 
 
 def _settled(finding: object) -> tuple[bool, str]:
@@ -643,13 +653,15 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
 
 
 def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
-    """How many paths or programs there are, how many may be run as they are, and why the others may not."""
+    """How many paths or programs there are, which may be run as they are, and why the others may not."""
+    followed: Sequence[ProgramSummary | PathSummary]
     if isinstance(results, ProgramsResults):
-        followed, lost, faults = len(results.summary.programs), 0, program_faults(results)
+        followed, lost, faults = results.summary.programs, 0, program_faults(results)
     else:
-        followed, lost = len(results.summary.paths), len(results.summary.not_followed)
-        faults = path_faults(results)
-    return {"stage": stage, "count": followed + lost, "lost": lost, "sound": followed - len(faults), "faults": faults}
+        followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
+    faulty = {fault.name for fault in faults}
+    sound = [each.name for each in followed if each.name not in faulty]
+    return {"stage": stage, "count": len(followed) + lost, "lost": lost, "sound": sound, "faults": faults}
 
 
 def _cell(head: Head) -> dict[str, Any]:

@@ -327,7 +327,12 @@ def render_stage(
 
     Parameters
     ----------
-    head : if it is another than the stage's results give; ``head_links`` : its links, if they give it
+    study : that the results are of; the command at the page's foot names its file
+    stored : what the stage found of a robot
+    output : replaced whole, or left as it is
+    head : if it is another than the results give
+    head_links : addresses that words of the head lead to; of the head that the results give
+    context : what the template needs besides, by name
     """
     name, stage = stored.robot, stored.stage
     shared = {

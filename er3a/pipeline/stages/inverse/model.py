@@ -164,11 +164,7 @@ class TargetCounts:
 
 @dataclass(frozen=True)
 class AllSolved(TargetCounts):
-    """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``).
-
-    ``collisions``: a scene was given, so that the solutions touch nothing of it. The arm never touches itself.
-    Demonstrations are not counted.
-    """
+    """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``)."""
 
     code: Literal["inverse.all_solved"] = "inverse.all_solved"
 

@@ -10,6 +10,7 @@ import numpy as np
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.programs import remedies, say
+from er3a.pipeline.messages.say import joined, say_first
 from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.viewing.numbers import fixed
@@ -20,7 +21,11 @@ WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "ca
 
 
 def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
-    """The programs as far as they were followed, each line's motion with its text, its verdict and what touches."""
+    """The programs as far as they were followed, the worst first, as the player shows them.
+
+    The motion of each line is an event with its text, its verdict and what touches; each finding is one at its moment.
+    ``q`` is (N, n), rad or m.
+    """
     motions = []
     for program in worst_first(results.summary.programs):
         rows = results.motion.take(results.motion.program == program.name)
@@ -50,14 +55,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
         worst = worst_finding(program)
         if worst is None or program.outcome == "pass":
             continue
-        where, own = say(worst.finding), worst in of_line(program, worst.line)
-        if worst.line and not own:
-            where = tr("{file}, line {line}: {text}", file=worst.file, line=worst.line, text=where)
-        elif worst.line and worst.program_s is not None:
-            where = tr("line {line}, at {time} s: {text}", line=worst.line, time=fixed(worst.program_s, 2), text=where)
-        elif worst.line:
-            where = tr("line {line}: {text}", line=worst.line, text=where)
-        place = line_id(program.name, worst.line if own else 0)
+        own = worst in of_line(program, worst.line)
         found.append(
             Fault(
                 program.name,
@@ -65,17 +63,28 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 WEIGHTS[worst.level],
                 outcome_word(program.outcome),
                 program.expect == program.outcome,
-                where,
-                " ".join(remedies_of(program, worst)),
-                address_of("programs", program.name, worst.program_s or 0.0, place),
+                _where(worst, own),
+                say_first(worst.finding),
+                "".join(remedies_of(program, worst)[:1]),
+                address_of("programs", program.name, worst.program_s or 0.0, line_id(program.name, worst.line * own)),
             )
         )
     return found
 
 
+def _where(found: FindingAt, own: bool) -> str:
+    """The line of a finding, with its file if it is not the program's ``own``, and the player's time."""
+    if not found.line:
+        return ""
+    line = tr("line {line}", line=found.line)
+    if not own:
+        return joined([found.file, line], ", ")
+    return line if found.program_s is None else joined([line, tr("{time} s", time=fixed(found.program_s, 2))], ", ")
+
+
 def line_id(program: str, line: int) -> str:
-    """Where a line of a program stands on the page; where the program does for no line."""
-    return f"{program}-{line}" if line else program
+    """Where a line of a program stands on the page; where the program does for no line. No name holds a full stop."""
+    return f"{program}.{line}" if line else program
 
 
 def when(each: FindingAt) -> float:
@@ -83,9 +92,14 @@ def when(each: FindingAt) -> float:
     return next((time for time in (each.program_s, each.motion_s) if time is not None), np.inf)
 
 
+def weight(each: FindingAt) -> tuple[int, float]:
+    """By which findings are sorted: the worst first, of these the earliest."""
+    return -RANKS[each.level], when(each)
+
+
 def worst_finding(program: ProgramSummary) -> FindingAt | None:
     """The first of the findings that weigh most; None where nothing was found."""
-    return min(program.findings, key=lambda each: (-RANKS[each.level], when(each)), default=None)
+    return min(program.findings, key=weight, default=None)
 
 
 def remedies_of(program: ProgramSummary, found: FindingAt) -> list[str]:

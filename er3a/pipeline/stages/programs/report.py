@@ -16,12 +16,12 @@ from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.played import (
+    faults,
     line_id,
     motions,
-    remedies_of,
     stretches,
+    weight,
     when,
-    worst_finding,
     worst_first,
 )
 from er3a.pipeline.study import Study
@@ -57,15 +57,12 @@ class ListingLine:
 
 @dataclass(frozen=True)
 class ProgramSection:
-    """A program on the page, and what it says in the page's language; ``worst``: the finding that weighs most, and
-    ``to_do`` about it."""
+    """A program on the page, and what it says in the page's language."""
 
     program: model.ProgramSummary
     status: str
     language: str
     cycle: str
-    worst: Markup
-    to_do: str
     lines: list[ListingLine]
     elsewhere: list[list[str]]
 
@@ -81,6 +78,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
+        faults={fault.name: fault for fault in faults(results)},
         player=player(robot, motions(robot, results), scene),
         bodies=[each.name for each in scene.solids] if scene else [],
         drawing_head=drawing_head(),
@@ -103,17 +101,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> P
     motion = results.motion.take(results.motion.program == program.name)
     lines = _listing(program, text, rows, motion, found)
     status = STATUSES[program.outcome]
-    texts = LANGUAGES[program.language].title, cycle_text(program), *_worst(program)
-    return ProgramSection(program, status, *texts, lines, elsewhere)
-
-
-def _worst(program: model.ProgramSummary) -> tuple[Markup, str]:
-    """The first of the findings that weigh most, with its line, and what to do there; empty where a program passes."""
-    found = worst_finding(program)
-    if found is None or program.outcome == "pass":
-        return Markup(), ""
-    remark, to_do = _remark(program.name, found), " ".join(remedies_of(program, found))
-    return Markup(tr("line {line}: {text}", line=found.line, text=remark)) if found.line else remark, to_do
+    return ProgramSection(program, status, LANGUAGES[program.language].title, cycle_text(program), lines, elsewhere)
 
 
 def _remark(name: str, each: model.FindingAt) -> Markup:
@@ -145,7 +133,9 @@ def _listing(
         text = text.take(np.arange(len(text) - 1))
     kept = set(range(1, len(text) + 1))
     if len(text) > MOST_LINES:
-        marked = sorted({*moves, *found})[: MOST_LINES // (2 * AROUND + 1)]
+        heaviest = {line: min(map(weight, here)) for line, here in found.items()}
+        urgent = sorted({*moves, *found}, key=lambda line: heaviest.get(line, (1, line)))
+        marked = urgent[: MOST_LINES // (2 * AROUND + 1)]
         kept = {line + k for line in marked for k in range(-AROUND, AROUND + 1)} & kept
     lines: list[ListingLine] = []
     skipped = False

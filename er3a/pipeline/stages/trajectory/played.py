@@ -7,9 +7,9 @@ from typing import Any
 
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import own_title, tr
-from er3a.pipeline.messages.programs import say
-from er3a.pipeline.messages.say import sentence
-from er3a.pipeline.messages.trajectory import advice, cause_text, event_word, path_text
+from er3a.pipeline.messages.programs import REMEDIES, say
+from er3a.pipeline.messages.say import joined, say_first, sentence, word
+from er3a.pipeline.messages.trajectory import advice, cause_text, end_text, event_word, path_text, repair_text
 from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
@@ -51,8 +51,7 @@ def motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
         )
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
-            name = tr("{path}, repaired", path=path.name)
-            motions.append(PlayedMotion(name, advice(path) or "", repair.t_s, meant(robot, repair.q_deg)))
+            motions.append(PlayedMotion(repaired(path), advice(path) or "", repair.t_s, meant(robot, repair.q_deg)))
     return motions
 
 
@@ -69,11 +68,11 @@ def faults(results: TrajectoryResults) -> list[Fault]:
         near = near_assumed(path, results.summary)
         if is_safe(path, results.summary.verdict.shapes):
             continue
-        where, t = near, path.clearance.t_s if path.clearance else 0.0
+        what, t = near, path.clearance.t_s if path.clearance else 0.0
         if path.verdict != "safe":
-            where, t = _first_fault(path)
-        todo = path_advice(path, results.checks.take(results.checks.path == path.name))
+            what, t = _first_fault(path)
         status, verdict = shown_verdict(path, near)
+        to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name))
         found.append(
             Fault(
                 path.name,
@@ -81,9 +80,11 @@ def faults(results: TrajectoryResults) -> list[Fault]:
                 status,
                 verdict,
                 path.expect == path.verdict != "safe",
-                where,
-                sentence("finding", finding=todo) if todo else "",
+                tr("{time} s", time=fixed(t, 2)),
+                what,
+                to_do,
                 address_of("trajectory", path.name, t, path.name),
+                instead,
             )
         )
     return found
@@ -91,24 +92,53 @@ def faults(results: TrajectoryResults) -> list[Fault]:
 
 def _first_fault(path: PathSummary) -> tuple[str, float]:
     """What is wrong first with a path that is not safe, and when (s); how fast it is counts where nothing else is,
-    singular poses before it."""
-    found = [(part.t0_s, word, part) for word, parts in kinds(path) for part in parts]
-    at_any_pace = [each for each in found if each[2] not in path.too_fast and each[2] not in path.undecided]
-    if at_any_pace or (found and path.verdict != "singular"):
-        t, word, part = min(at_any_pace or found, key=lambda each: each[0])
-        cause = say(part.cause.touches[0]) if isinstance(part.cause, BodiesOverlap) else cause_text(path, part)
-        return tr("at t = {time} s: {text}", time=fixed(t, 2), text=tr("{fault}: {cause}", fault=word, cause=cause)), t
-    return path_text(path), min((event.t_s for event in path.singularities), default=0.0)
+    singular poses before it, and assumed limits where no known one is exceeded."""
+    kinds: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
+    if not any(kinds) and path.verdict != "singular":
+        fast = [part for part in path.too_fast if path.verdict != "too fast" or not _assumed(part)]
+        kinds = [fast or path.undecided]
+    firsts = sorted((min(kind, key=_start) for kind in kinds if kind), key=_start)
+    if not firsts:
+        return path_text(path), min((event.t_s for event in path.singularities), default=0.0)
+    later = [tr("at t = {time} s: {text}", time=fixed(part.t0_s, 2), text=say_first(part.cause)) for part in firsts[1:]]
+    return joined([say_first(firsts[0].cause), *later]), firsts[0].t0_s
 
 
-def path_advice(path: PathSummary, rows: PathChecks) -> str | None:
-    """What to do about a path, with the last of its points (``rows``) before anything is wrong, if it leaves the reach;
-    None where nothing is to be done."""
+def _start(part: Stretch[Any]) -> float:
+    return part.t0_s
+
+
+def _assumed(part: Stretch[Any]) -> bool:
+    """Whether what a stretch exceeds is an assumed limit."""
+    return bool(part.cause.code.endswith("_if_assumed"))
+
+
+def _to_do(path: PathSummary, rows: PathChecks) -> tuple[str, tuple[str, str] | None]:
+    """What to do instead of running a path as it is, and the motion that may be run with its address."""
+    if path.chosen:
+        name = repaired(path)
+        return repair_text(path, in_short=True), (name, address_of("trajectory", name, 0.0, path.name))
+    if path.verdict == "safe":
+        return word("remedy", REMEDIES, "clear_of_assumed"), None
+    last = last_sound(path, rows)
+    if path.clear_until and not path.unreachable:
+        last = path.clear_until.t_s, path.clear_until.xyz_mm
+    if last is None:
+        return sentence("finding", finding=advice(path) or path_text(path)), None
+    name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 2))
+    return end_text(path, last[1]), (name, address_of("trajectory", path.name, last[0], path.name))
+
+
+def repaired(path: PathSummary) -> str:
+    """The name of the motion that repairs a path."""
+    return tr("{path}, repaired", path=path.name)
+
+
+def last_sound(path: PathSummary, rows: PathChecks) -> tuple[float, tuple[float, ...]] | None:
+    """Time (s) and place (mm) of the last point (of ``rows``) before anything is wrong; None where that is at once."""
     starts = [part.t0_s for _, stretches in kinds(path) for part in stretches]
     sound = rows.take(rows.reachable & (rows.t_s < min(starts, default=0.0)))
-    if not path.unreachable or not len(sound):
-        return advice(path)
-    return advice(path, (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())))
+    return (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())) if len(sound) else None
 
 
 def shown_verdict(path: PathSummary, near: str) -> tuple[Weight, str]:
@@ -129,17 +159,21 @@ def near_assumed(path: PathSummary, summary: TrajectorySummary) -> str:
 def events(path: PathSummary) -> list[PlayedEvent]:
     """Singular poses and faults of a path."""
     passes = [PlayedEvent(e.t_s, e.until_s, _singular(e), "caution") for e in path.singularities]
-    faults = [(word, stretch) for word, stretches in kinds(path) for stretch in stretches]
+    faults = [(kind, stretch) for kind, stretches in kinds(path) for stretch in stretches]
     return passes + [
         PlayedEvent(
             s.t0_s,
             s.t1_s,
-            tr("{fault}: {cause}", fault=word, cause=cause_text(path, s)),
-            "fail",
+            tr("{fault}: {cause}", fault=kind, cause=cause_text(path, s)),
+            _weight(path, s),
             _touching(s.cause),
         )
-        for word, s in faults
+        for kind, s in faults
     ]
+
+
+def _weight(path: PathSummary, part: Stretch[Any]) -> Weight:
+    return "caution" if _assumed(part) or part in path.undecided else "fail"
 
 
 def contact(path: PathSummary) -> list[Mark]:

@@ -12,6 +12,7 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.messages.trajectory import (
+    advice,
     cause_text,
     event_distance,
     event_word,
@@ -26,10 +27,11 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
 from er3a.pipeline.stages.trajectory.played import (
+    faults,
     kinds,
+    last_sound,
     motions,
     near_assumed,
-    path_advice,
     shown_verdict,
     worst_first,
 )
@@ -109,6 +111,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         output,
         head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
+        faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results, count),
         assumed=assumed,
@@ -139,7 +142,7 @@ def _section(
         verdict=verdict,
         kind=kind_word(path.kind),
         text=joined([path_text(path), near]),
-        advice=path_advice(path, rows),
+        advice=advice(path, last_sound(path, rows)),
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
         events=[_event_row(path.name, event) for event in path.singularities],
