@@ -13,6 +13,9 @@ ARGS   ?=
 export STUDY
 # A run starts dozens of short processes: without compiled modules kept on disk each would compile them anew.
 unexport PYTHONDONTWRITEBYTECODE
+# Many small matrices: threads of BLAS only wait for each other.
+export OPENBLAS_NUM_THREADS ?= 1
+export OMP_NUM_THREADS ?= 1
 .PHONY: help run test test-all view archive lint format schema words lock clean distclean campaigns docs pictures release-check
 
 help:  ## list the targets
