@@ -36,6 +36,7 @@ from er3a.calibration.fit import (
     fit,
     held_with,
     jacobian,
+    left_of_touched,
     scale_of,
     subspace,
     without_scale,
@@ -123,11 +124,12 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     rich = observations.rich(robot)
     placed = placements_of(observations.free)
     scale = scale_of(robot, observations) if isinstance(observations, PointObservations) else None
+    left = left_of_touched(robot, observations)
     more: list[MorePositions] = []
     for name in LEVELS[::-1]:
         for first in (placed, ()) if placed else ((),):
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
-            here, best = subspace(robot, parameters, observations), subspace(robot, parameters, rich)
+            here, best = (subspace(robot, parameters, seen, left) for seen in (observations, rich))
             spare = len(observations) - len(here.kept) - getattr(observations, "dropped", 0)
             if len(best.kept) == len(here.kept) and spare > 0:
                 return Level(name, parameters, here, more[-1] if more else None, scale)
@@ -473,7 +475,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     bars: tuple[BarLength, ...] = ()
     if isinstance(observations, PointObservations):
         errors = JointErrors(robot, found.terms, found.coefficients)
-        bars = bar_lengths(here, errors, kept, observations, covariance, float(quantiles.max()))
+        bars = bar_lengths(here, errors, kept, observations, covariance, quantiles)
     return Calibration(
         robot=_with_ratios(here, found),
         level=level.name,

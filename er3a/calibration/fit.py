@@ -26,9 +26,18 @@ from er3a.calibration.outcomes import (
     NotToldApart,
     SetsScale,
 )
-from er3a.calibration.parameters import DEPENDENT, MM, Parameter, corrected, parallel_pairs, parameters_of
+from er3a.calibration.parameters import (
+    DEPENDENT,
+    MM,
+    Parameter,
+    corrected,
+    parallel_pairs,
+    parameters_of,
+    placements_of,
+)
 from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
 from er3a.numerics.arrays import Integers, Reals
+from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
 STEP = 1e-5
@@ -42,6 +51,7 @@ LEAST_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
 slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
+SMALL_SHARE = 0.01  # of a variance: what adds less does not widen its interval
 LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Parameter("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
@@ -72,13 +82,21 @@ def jacobian(robot: Robot, parameters: Sequence[Parameter], observations: Observ
     return slopes
 
 
-def subspace(robot: Robot, parameters: Sequence[Parameter], observations: Observations) -> Subspace:
+def subspace(
+    robot: Robot, parameters: Sequence[Parameter], observations: Observations, left: float | None = None
+) -> Subspace:
     """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
     one that lies in the span of those before it (to 0.1 % of its length) is held. So is one that does no more to points
-    which touch something than to turn or shrink what the table leaves of them: all of these could be brought to one."""
+    which touch something than to turn or shrink what the table leaves of them: all of these could be brought to one.
+
+    Parameters
+    ----------
+    left : of a point that touches something, in standard deviations; what the table leaves, unless given
+    """
     J = SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None]
     norms = np.linalg.norm(J, axis=0)
-    turned = SCALE * _left_of_touched(robot, observations)
+    left = left_of_touched(robot, observations) if left is None else left
+    turned = SCALE * left * len(J) ** 0.5
     least = max(NO_EFFECT * norms.max(), turned / LEVER)
     kept: list[int] = []
     held: list[Held] = []
@@ -96,12 +114,17 @@ def subspace(robot: Robot, parameters: Sequence[Parameter], observations: Observ
     return Subspace(tuple(kept), tuple(held), singular_values)
 
 
-def _left_of_touched(robot: Robot, observations: Observations) -> float:
-    """Length of the differences, in standard deviations, that a table leaves where points touch something; else 0."""
+def left_of_touched(robot: Robot, observations: Observations) -> float:
+    """What a table leaves where points touch something, apart from what base and tool can take up: root mean square, in
+    standard deviations; 0 where nothing is touched."""
     if not (isinstance(observations, PointObservations) and observations.dropped):
         return 0.0
     off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
-    return float(np.linalg.norm(off[observations.touched[observations.pose_of] >= 0]))
+    touching = observations.touched[observations.pose_of] >= 0
+    taken = jacobian(robot, placements_of(observations.free), observations)[touching]
+    taken /= observations.deviation_mm[touching, None]
+    off = off[touching] - taken @ np.linalg.lstsq(taken, off[touching], rcond=None)[0]
+    return float(np.sqrt(np.mean(off**2)))
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
@@ -231,7 +254,7 @@ def bar_lengths(
     kept: Sequence[Parameter],
     observations: PointObservations,
     covariance: Reals,
-    quantile: float,
+    quantiles: Reals,
 ) -> tuple[BarLength, ...]:
     """The lengths of bars of unknown length, which are fitted beside the sockets.
 
@@ -239,7 +262,7 @@ def bar_lengths(
     ----------
     here : the corrected robot; errors : of its joints, with c coefficients
     covariance : (k + c, k + c), of what was kept and of the coefficients, m and rad
-    quantile : half-width of a 95 % interval in standard errors
+    quantiles : (k + c,), half-widths of 95 % intervals in standard errors
     """
     found = []
     for name, points in observations.unknown_bars():
@@ -257,6 +280,8 @@ def bar_lengths(
         by_numbers = (weights[:, None] * along).ravel() @ slopes
         variance = (weights * points.deviation_mm) @ (weights * points.deviation_mm)
         variance += by_numbers @ covariance @ by_numbers
+        shares = by_numbers**2 * np.diag(covariance)
+        quantile = float(quantiles[shares > SMALL_SHARE * variance].max(initial=INTERVAL_95))
         found.append(BarLength(name, MM * float(size.mean()), quantile * float(np.sqrt(variance))))
     return tuple(found)
 

@@ -301,5 +301,7 @@ def _half_widths(robot: Robot, parameters: Sequence[Parameter], seen: PointObser
 
 def _bars(robot: Robot, kept: Sequence[Parameter], seen: PointObservations, covariance: Reals) -> dict[str, float]:
     """Of bars whose length is settled half of its 95 % interval, mm; ``covariance`` (k, k) of what is kept."""
-    bars = bar_lengths(robot, JointErrors(robot, (), np.zeros(0)), kept, seen, covariance, INTERVAL_95)
+    bars = bar_lengths(
+        robot, JointErrors(robot, (), np.zeros(0)), kept, seen, covariance, np.full(len(kept), INTERVAL_95)
+    )
     return {f"bar_{each.name}": each.half_width_mm for each in bars if each.half_width_mm is not None}

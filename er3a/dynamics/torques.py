@@ -20,8 +20,6 @@ from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, Load
 from er3a.robots.robot import Robot
 
-"""A mass matrix whose smallest eigenvalue is less than that of its greatest has none that can be inverted."""
-
 AT_REST = 1e-5
 """rad/s or m/s: joints slower than that are at rest but for rounding."""
 

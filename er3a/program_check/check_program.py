@@ -526,7 +526,8 @@ def _moving(check: ProgramCheck) -> dict[Hashable, int]:
     for step in execution.steps:
         if isinstance(step.instruction, Unknown) and step.instruction.may_move:
             found[step.place] = execution.own_line(step)
-    return found | {each: each.place.line for each in check.not_examined if each.what != "way"}
+    lines = {step.place: execution.own_line(step) for step in execution.steps}
+    return found | {each: lines.get(each.place, each.place.line) for each in check.not_examined if each.what != "way"}
 
 
 def _same_for(check: ProgramCheck, number: int) -> Hashable:

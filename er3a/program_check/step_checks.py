@@ -898,6 +898,8 @@ class StepChecker:
                 near = self._round_corner(way, after, corners, (before, behind), margin)
                 if isinstance(near, found_in.ZoneCollides):
                     found.append(found_in.ClearOfAssumed(near.pair, -near.depth_mm, 1000 * margin))
+                elif near is not None:
+                    found.append(near)
         return tuple(found)
 
 

@@ -340,7 +340,8 @@ class SingleChange:
     column : of the table; "lower" and "upper" are limits
     joint : 1 to 6
     given, tried : in ``unit``
-    left_litres : bounds of the changed arm's enclosed voids together, as far as a coarse proof finds them
+    left_litres : bounds of the changed arm's enclosed voids together, as far as a coarse proof finds them; None where
+        only the proof for any arm serves: what it leaves undecided joins voids to the outside
     """
 
     column: Column
@@ -348,7 +349,7 @@ class SingleChange:
     unit: EntryUnit
     given: float
     tried: float
-    left_litres: tuple[float, float]
+    left_litres: tuple[float, float] | None
 
     @property
     def entry(self) -> str:
@@ -357,10 +358,7 @@ class SingleChange:
 
 
 def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleChange, ...]:
-    """Single changes of a table of an arm with a spherical wrist, those that leave least first.
-
-    Changes that bring the tool so near to the wrist, for the arm's reach, that the proof for such arms says little are
-    left out.
+    """Single changes of a table of an arm with a spherical wrist, those that leave least first, undecided ones last.
 
     Parameters
     ----------
@@ -369,12 +367,14 @@ def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleCha
     found = []
     for column, joint, given, tried in (*_of_table(robot), *_of_limits(robot, cause)):
         proven = prove_robot(with_entry(robot, column, joint, tried), CELLS, POINTS, seed)
-        if proven.arm is None:
-            continue  # what the general method leaves undecided joins voids to the outside: none found says nothing
-        enclosed, _ = cavities(proven.section)
-        left = tuple(round(1000 * sum(getattr(void, bound) for void in enclosed), 3) for bound in ("lower", "upper"))
-        found.append(SingleChange(column, joint, UNITS[column], given, tried, (left[0], left[1])))
-    return tuple(sorted(found, key=lambda change: (change.left_litres[1], change.entry, change.tried)))
+        enclosed = cavities(proven.section)[0] if proven.arm is not None else None
+        left = None if enclosed is None else (_litres(enclosed, "lower"), _litres(enclosed, "upper"))
+        found.append(SingleChange(column, joint, UNITS[column], given, tried, left))
+    return tuple(sorted(found, key=lambda each: ((each.left_litres or (0, np.inf))[1], each.entry, each.tried)))
+
+
+def _litres(voids: Sequence[Cavity], bound: Literal["lower", "upper"]) -> float:
+    return round(1000 * sum((void.lower if bound == "lower" else void.upper) for void in voids), 3)
 
 
 def with_entry(robot: Robot, column: Column, joint: int, value: float) -> Robot:

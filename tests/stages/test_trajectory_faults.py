@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,8 @@ from er3a.pipeline.messages.trajectory import advice
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.played import faults
+from er3a.pipeline.stages.trajectory.model import Singularity
+from er3a.pipeline.stages.trajectory.played import faults, last_sound
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
@@ -129,9 +131,22 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
 
 
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
-    (path,) = paths_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0})
+    results = compute(study_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0}), ROBOT)
+    (path,), (fault,) = results.summary.paths, faults(results)
     assert path.clear_until is None
     assert "end the path there" not in advice(path)
+    assert fault.instead is None
+
+
+def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
+    results = compute(study_of(tmp_path, "line_collides"), ROBOT)
+    (path,), rows = results.summary.paths, results.checks
+    assert last_sound(path, rows)[0] == path.clear_until.t_s > 0.5
+    passed, crossed = (Singularity(0.5, 0.5, "wrist", crossing, 0.0, None) for crossing in (False, True))
+    assert last_sound(replace(path, singularities=(passed,)), rows)[0] == path.clear_until.t_s
+    early = replace(path, singularities=(crossed,))
+    assert 0.4 < last_sound(early, rows)[0] < 0.5
+    assert "keeps" not in advice(early, last_sound(early, rows))
 
 
 @pytest.mark.parametrize(

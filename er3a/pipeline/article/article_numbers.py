@@ -161,6 +161,7 @@ class ArticleNumbers:
     round_trip_deg: float
     round_trips: int
     changes_tried: int
+    changes_undecided: int
     changes_gone: tuple[SingleChange, ...]
     changes_meeting: tuple[SingleChange, ...]
 
@@ -287,9 +288,15 @@ def _changes_of_the_void(robot: Robot, workspace: WorkspaceSummary, printed: Tab
     finding = workspace.verdict.finding
     changes = finding.single_changes if isinstance(finding, VoidUnexpected) else ()
     least = 0.1 * printed.void_litres[0] if printed.void_litres else 0.0
-    gone = tuple(change for change in changes if change.left_litres[1] < least)
+    gone = tuple(change for change in changes if change.left_litres and change.left_litres[1] < least)
     meeting = [each for each in gone if _meets_zero_pose(with_entry(robot, each.column, each.joint, each.tried))]
-    return {"changes_tried": len(changes), "changes_gone": gone, "changes_meeting": tuple(meeting)}
+    undecided = sum(change.left_litres is None for change in changes)
+    return {
+        "changes_tried": len(changes),
+        "changes_undecided": undecided,
+        "changes_gone": gone,
+        "changes_meeting": tuple(meeting),
+    }
 
 
 def _summary(results: Path, robot: str, stage: str):  # type: ignore[no-untyped-def]  # the stage's own

@@ -99,7 +99,7 @@ def check_program(
             for line in lines_of(each, verdicts):
                 print(line)
         of_files = [line(each) for each in checked for line in (cycle_line, not_examined_line)]
-        missed = next((each.missed for each in checked if each.missed), ())
+        missed = tuple(dict.fromkeys(left for each in checked for left in each.missed))
         for line in filter(None, (*of_files, shapes_line(arm), missed_line(missed), summary_line(checked))):
             print_note(line)
     if any(each.check is None for each in checked):

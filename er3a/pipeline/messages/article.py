@@ -471,7 +471,7 @@ ITEMS = (
         N_(
             "The hole is there as printed ({p_void_low:.0f} L). {changes_gone} of {changes_tried} single changes "
             "of offsets, directions, lengths and limits would take it away: {changes_named}. Of these the "
-            "article's zero pose is met by: {changes_meeting}."
+            "article's zero pose is met by: {changes_meeting}. Of {changes_undecided} changes it is not decided."
         ),
         N_(
             "Offsets belong on the list, and the hole alone does not tell which entry is wrong: a wider limit "

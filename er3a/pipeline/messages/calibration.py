@@ -134,7 +134,11 @@ def held_back_lines(found: Calibration, fitted: Sequence[Measurement], others: S
 def bar_texts(found: Calibration) -> list[str]:
     """How long the bars are whose lengths were unknown."""
     return [
-        tr("The length of the bar {name} is not settled: its points lie to one side of its socket.", name=each.name)
+        tr(
+            "The length of the bar {name} is not settled: its points lie to one side of its socket, for what the fit "
+            "leaves of them.",
+            name=each.name,
+        )
         if each.length_mm is None or each.half_width_mm is None
         else tr(
             "The bar {name} is {length:.3f} mm long, ± {half_width:.3f} mm (95 %).",

@@ -10,7 +10,9 @@ from er3a.pipeline.results import LeftOut, LeftOutSubject, NoPass
 
 TEXTS = texts(
     {
-        "left_out.obstacles": "obstacles: none are given, and the arm was checked against itself only",
+        "left_out.obstacles": (
+            "obstacles: none are given, and the arm was checked against itself and what it carries only"
+        ),
         "no_pass": "Not examined, and therefore no pass: {missed}.",
         "left_out.bare_links": "what links hit to which no shape is given, and which lie within those of others",
         "left_out.uncovered_links": "what links hit to which no shape is given, and which reach out of all others'",

@@ -316,18 +316,22 @@ def advice(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None = No
         (only,) = path.avoidance
         if only.name == "planned":
             no_way = sentence("advice.no_way", reason=reasons(only))
-            return joined([no_way, _clear(path)], ". ")
+            return joined([no_way, _until(path, sound)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
-    if path.clear_until and not path.unreachable:
-        sound = None
-    last = sentence("advice.sound", t=sound[0], xyz=_numbers(sound[1], 1)) if sound else ""
-    return joined([sentence("advice.none", why=why), _within_reach(path), last, _clear(path)], ". ")
+    return joined([sentence("advice.none", why=why), _within_reach(path), _until(path, sound)], ". ")
+
+
+def _until(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> str:
+    """Up to where a path may be run: to the last point with the margin, unless something else is wrong before."""
+    if sound and not (path.clear_until and sound[0] >= path.clear_until.t_s):
+        return sentence("advice.sound", t=sound[0], xyz=_numbers(sound[1], 1))
+    return _clear(path)
 
 
 def end_text(path: PathSummary, xyz_mm: tuple[float, ...]) -> str:
     """That a path may be run to a point of it (mm), and by how much it is clear up to there, if that was measured."""
-    if path.clear_until and not path.unreachable:
+    if path.clear_until:
         return sentence("advice.end#clear", xyz=_numbers(xyz_mm, 1), margin=path.clear_until.margin_mm)
     return sentence("advice.end", xyz=_numbers(xyz_mm, 1))
 

@@ -101,6 +101,10 @@ TEXTS = texts(
             "{count} of {tried} single changes of the table leave less than a tenth of it: {named}. References must "
             "tell which is right."
         ),
+        "void_changes#undecided": (
+            "{count} of {tried} single changes of the table leave less than a tenth of it, of {undecided} more it is "
+            "not decided: {named}. References must tell which is right."
+        ),
         "single_change#deg": "{entry} = {tried} deg",
         "single_change#mm": "{entry} = {tried} mm",
         "single_change#sign": "{entry} = {tried}",
@@ -221,12 +225,15 @@ NAMED_CHANGES = 4
 
 def _changes(found: VoidUnexpected) -> str:
     """The single changes of the table that take the void away; empty where none was tried or none does."""
-    least = [change for change in found.single_changes if change.left_litres[1] < 0.1 * found.litres]
+    decided = [(change, change.left_litres[1]) for change in found.single_changes if change.left_litres]
+    least = [change for change, litres in decided if litres < 0.1 * found.litres]
     if not least:
         return ""
     shown = sorted(least, key=lambda change: CHANGED_FIRST.index(change.column))
     named = joined([*map(change_text, shown[:NAMED_CHANGES]), *(["…"] if len(shown) > NAMED_CHANGES else [])], ", ")
-    return sentence("void_changes", count=len(least), tried=len(found.single_changes), named=named)
+    tried, undecided = len(found.single_changes), len(found.single_changes) - len(decided)
+    form = "void_changes#undecided" if undecided else "void_changes"
+    return sentence(form, count=len(least), tried=tried, named=named, undecided=undecided)
 
 
 def change_text(change: SingleChange) -> str:

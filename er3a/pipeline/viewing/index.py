@@ -620,9 +620,9 @@ def _proposed(finding: object) -> dict[str, str]:
     step, entry = page.whole_sentence(say(finding.next_measurement)), finding.next_measurement.entry
     others = len({*finding.unbounded} - {entry})
     if others:
-        more = N_("{step} It settles {entry}; {others} more entries rest on one source.")
-        step = tr(more, step=step, entry=shortened([entry]), others=others)
-    return {"measurement": step, "entry": entry}
+        more = N_("{step} It settles {entry}; entries that rest on one source besides: {others}.")
+        step = tr(more, step=step, entry=entry if " " in entry else shortened([entry]), others=others)
+    return {"measurement": step, "entry": entry.replace(" ", "")}
 
 
 def _settled(finding: object) -> tuple[bool, str]:

@@ -195,7 +195,7 @@ def _left_out(study: Study, name: str, found: model.TargetClearances, motions: l
         yield LeftOut("paths", skipped)
     if unknown := tuple(each.name for each in motions if each.motion and np.isnan(each.motion.q).any()):
         yield LeftOut("path_stretches", unknown)
-    yield from left_out_of_programs({each.listed: each.rest for each in motions})
+    yield from left_out_of_programs({each.listed: each.rest for each in motions if each.expect in (None, "safe")})
 
 
 def _matrix(bodies: Bodies) -> model.MatrixRows:

@@ -403,7 +403,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     trips = batch_round_trips(robot, random, wanted) if complete else None
     worst = _worst_residuals(solutions, trips)
     summary = model.InverseSummary(
-        verdict=_verdict(results, worst, trips, scene is not None)
+        verdict=_verdict(results, worst, trips, bool(scene and scene.solids))
         .without(bodies_of(robot, scene).unexamined)
         .resting_on(rests_on),
         figures=_figures(results, worst, trips),

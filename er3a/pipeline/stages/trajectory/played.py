@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.programs import REMEDIES, say
@@ -68,9 +70,8 @@ def faults(results: TrajectoryResults) -> list[Fault]:
         near = near_assumed(path, results.summary)
         if is_safe(path, results.summary.verdict.shapes):
             continue
-        what, t = near, path.clearance.t_s if path.clearance else 0.0
-        if path.verdict != "safe":
-            what, t = _first_fault(path)
+        safe = path.verdict == "safe" and path.clearance
+        what, t = (near, safe.t_s) if safe else _first_fault(path)
         status, verdict = shown_verdict(path, near)
         to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name))
         found.append(
@@ -80,28 +81,37 @@ def faults(results: TrajectoryResults) -> list[Fault]:
                 status,
                 verdict,
                 path.expect == path.verdict != "safe",
-                tr("{time} s", time=fixed(t, 2)),
+                "" if t is None else tr("{time} s", time=fixed(t, 2)),
                 what,
                 to_do,
-                address_of("trajectory", path.name, t, path.name),
+                address_of("trajectory", path.name, t or 0.0, path.name),
                 instead,
             )
         )
     return found
 
 
-def _first_fault(path: PathSummary) -> tuple[str, float]:
-    """What is wrong first with a path that is not safe, and when (s); how fast it is counts where nothing else is,
-    singular poses before it, and assumed limits where no known one is exceeded."""
-    kinds: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
-    if not any(kinds) and path.verdict != "singular":
+def _first_fault(path: PathSummary) -> tuple[str, float | None]:
+    """What is wrong first with a path that is not safe, and when (s), if it has a time; how fast it is counts where
+    nothing else is, singular poses before it, and assumed limits where no known one is exceeded."""
+    if path.no_way:
+        return path_text(path), None
+    faults: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
+    if not any(faults) and path.verdict != "singular":
         fast = [part for part in path.too_fast if path.verdict != "too fast" or not _assumed(part)]
-        kinds = [fast or path.undecided]
-    firsts = sorted((min(kind, key=_start) for kind in kinds if kind), key=_start)
+        faults = [fast or path.undecided]
+    firsts = sorted((min(each, key=_start) for each in faults if each), key=_start)
     if not firsts:
-        return path_text(path), min((event.t_s for event in path.singularities), default=0.0)
+        times = _singular_times(path) or [event.t_s for event in path.singularities]
+        return path_text(path), min(times, default=None)
     later = [tr("at t = {time} s: {text}", time=fixed(part.t0_s, 2), text=say_first(part.cause)) for part in firsts[1:]]
     return joined([say_first(firsts[0].cause), *later]), firsts[0].t0_s
+
+
+def _singular_times(path: PathSummary) -> list[float]:
+    """When (s) a path of the tool crosses singular poses, or the arm jumps."""
+    crossed = [] if path.in_joint_space else [event.t_s for event in path.singularities if event.crossing]
+    return [*crossed, *(jump.t_s for jump in path.jumps)]
 
 
 def _start(part: Stretch[Any]) -> float:
@@ -121,10 +131,9 @@ def _to_do(path: PathSummary, rows: PathChecks) -> tuple[str, tuple[str, str] | 
     if path.verdict == "safe":
         return word("remedy", REMEDIES, "clear_of_assumed"), None
     last = last_sound(path, rows)
-    if path.clear_until and not path.unreachable:
-        last = path.clear_until.t_s, path.clear_until.xyz_mm
     if last is None:
-        return sentence("finding", finding=advice(path) or path_text(path)), None
+        todo = advice(path)
+        return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 2))
     return end_text(path, last[1]), (name, address_of("trajectory", path.name, last[0], path.name))
 
@@ -135,8 +144,17 @@ def repaired(path: PathSummary) -> str:
 
 
 def last_sound(path: PathSummary, rows: PathChecks) -> tuple[float, tuple[float, ...]] | None:
-    """Time (s) and place (mm) of the last point (of ``rows``) before anything is wrong; None where that is at once."""
-    starts = [part.t0_s for _, stretches in kinds(path) for part in stretches]
+    """Time (s) and place (mm) of the last point (of ``rows``, or where the margin is kept) before anything is wrong.
+
+    None where something is wrong at once, no point of a path that collides keeps the margin, or none was planned.
+    """
+    until = path.clear_until
+    if path.no_way or (path.collisions and until is None):
+        return None
+    others = path.unreachable, path.out_of_limits, path.too_fast, path.undecided
+    starts = [part.t0_s for stretches in others for part in stretches] + _singular_times(path)
+    if until and until.t_s < min(starts, default=np.inf):
+        return until.t_s, until.xyz_mm
     sound = rows.take(rows.reachable & (rows.t_s < min(starts, default=0.0)))
     return (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())) if len(sound) else None
 

@@ -136,7 +136,9 @@ def _change_rows(summary: model.WorkspaceSummary) -> list[list[str]]:
             bracketed(entry_word(change), tr(change.unit)),
             f"{change.given:g}".replace("-", "−"),
             f"{change.tried:g}".replace("-", "−"),
-            tr("{low} to {high}", low=number(change.left_litres[0], 3), high=number(change.left_litres[1], 3)),
+            tr("{low} to {high}", low=number(change.left_litres[0], 3), high=number(change.left_litres[1], 3))
+            if change.left_litres
+            else tr("undecided"),
         ]
         for change in (finding.single_changes if isinstance(finding, model.VoidUnexpected) else ())
     ]
