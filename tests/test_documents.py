@@ -62,7 +62,6 @@ def all_blocks(*languages: str) -> list[Any]:
     ]
 
 
-@pytest.mark.long  # README's compiles what nothing else of the fast set needs
 @pytest.mark.parametrize("block", all_blocks("python"))
 def test_python_in_documents_runs(block, monkeypatch):
     monkeypatch.chdir(ROOT)

@@ -30,7 +30,6 @@ def test_all_equivalent_rows_put_the_flange_where_the_table_does(convention, ran
     assert len(np.unique(rows, axis=0)) > 500
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("reach", [AxisDistance("flange", "greatest", 1), SectionExtent("flange", "greatest", "z")])
 def test_climbing_takes_the_flange_where_it_stands_off_the_table(reach, random):
     """The kernels that climb to an extreme look at the same point as the search, which goes through forward."""
