@@ -193,17 +193,17 @@ def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("findings", "missed", "told"),
+    ("findings", "missed", "reason"),
     [((TargetsLeftOut(1),), (), "left out"), ((), (LeftOut("program_rest", ("line: 3",)),), "holds (line: 3)")],
 )
-def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findings, missed, told):
+def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findings, missed, reason):
     made = PathProgram("line", "safe", {"line.src": "DEF line( )\nEND\n"}, findings, missed)
     monkeypatch.setattr(program_reports, "programs_of", lambda *_: iter([made]))
     words = ("program", "write", "data/paths/er3a_c60.yaml", "--robot", "er3a_c60", "--language", "krl")
     done = run(*words, "--output", str(tmp_path))
     assert (tmp_path / "line.src").is_file()
     assert done.exit_code == 1
-    assert told in done.stderr
+    assert reason in done.stderr
     assert "assumed shapes" in done.stderr
 
 

@@ -326,14 +326,14 @@ def test_conflicts_excuse_only_what_another_trustworthy_row_outweighs(stated, st
 
 
 @pytest.mark.parametrize(
-    ("documented", "claims", "told"),
+    ("documented", "claims", "reported"),
     [(24, CheckTally(5, 1), (6, 1)), (24, CheckTally(6), None), (0, CheckTally(6), (6, 0))],
 )
-def test_claims_among_documents_are_told_where_they_do_not_hold(documented, claims, told):
+def test_claims_among_documents_are_reported_where_they_do_not_hold(documented, claims, reported):
     counts = CheckCounts(CheckTally(documented), CheckTally(), claims)
     sets = (SetSummary("mine", ("cad", "claim"), counts, False, None, None, None),)
     found = verdict_of([], [], sets, {}, None).finding.claims
-    assert [(each.claims, each.failed) for each in found] == ([told] if told else [])
+    assert [(each.claims, each.failed) for each in found] == ([reported] if reported else [])
 
 
 def test_table_checks_see_faults_that_a_file_could_not_hold():

@@ -128,9 +128,9 @@ def test_void_centres_have_no_inverse_solution(small_results, random):
     assert summary.verdict.status == "caution"
     (void,) = (void for void in summary.enclosed_voids if not void.holds_shoulder)
     larger = replace(void, holds_shoulder=True, volume_m3=Bounds(0.5, 0.6))
-    told = void_text(replace(summary, voids=(larger, *summary.voids)))
-    assert "away from the shoulder" in told  # as the verdict has it
-    assert "1 other enclosed one" in told
+    text = void_text(replace(summary, voids=(larger, *summary.voids)))
+    assert "away from the shoulder" in text  # as the verdict has it
+    assert "1 other enclosed one" in text
 
     def solvable(position):
         T = np.eye(4)

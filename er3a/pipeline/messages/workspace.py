@@ -386,9 +386,9 @@ def void_text(summary: Summary) -> str:
         return ""
     voids = summary.enclosed_voids
     unexpected = (void for void in voids if void.status == "proven_empty" and not void.holds_shoulder)
-    told = next(unexpected, voids[0])
-    where = sentence("void.shoulder" if told.holds_shoulder else "void.away", **_void_parts(told))
-    cause = sentence("void.cause#it" if is_predicate(told.cause) else "void.cause#noun", cause=say(told.cause))
+    judged = next(unexpected, voids[0])
+    where = sentence("void.shoulder" if judged.holds_shoulder else "void.away", **_void_parts(judged))
+    cause = sentence("void.cause#it" if is_predicate(judged.cause) else "void.cause#noun", cause=say(judged.cause))
     more = sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else ""
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""

@@ -70,8 +70,8 @@ def faults(results: TrajectoryResults) -> list[Fault]:
         near = near_assumed(path, results.summary)
         if is_safe(path, results.summary.verdict.shapes):
             continue
-        safe = path.verdict == "safe" and path.clearance
-        what, t = (near, safe.t_s) if safe else _first_fault(path)
+        clearance = path.clearance if path.verdict == "safe" else None
+        what, t = (near, clearance.t_s) if clearance else _first_fault(path)
         status, verdict = shown_verdict(path, near)
         to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name))
         found.append(
