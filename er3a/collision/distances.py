@@ -30,7 +30,7 @@ import numpy as np
 import scipy
 
 from er3a.kinematics.forward import rows_of, slide_row, step_row, turn_row, write_rows
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
 from er3a.numerics.jit import inner_kernel, kernel
 
 HULL, CYLINDER, HALF_SPACE = 0, 1, 2
@@ -313,9 +313,10 @@ def apart_along(
 def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
     """Distances (N,) of points (N, 3) from the hull of points (m, 3); 0 inside."""
     w, room, near = np.empty((len(hull) + 1, 3)), np.empty((ROOM, 3)), np.empty((2, 3))
-    w[1:] = hull
+    for i in range(len(hull)):
+        copy_values(hull[i], w[1 + i])
     for n in range(len(points)):
-        w[0] = points[n]
+        copy_values(points[n], w[0])
         found[n] = _cores(w, (0, 1, 1, len(w)), 0.0, 0.0, room, near)
 
 
@@ -394,7 +395,8 @@ def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> No
 @inner_kernel
 def _place_frames(layout: Layout, q: Reals, T: Reals) -> None:
     direction, starts, sliding, links = layout.direction, layout.starts, layout.sliding, layout.links
-    T[0] = layout.base
+    x, y, z = rows_of(layout.base)
+    write_rows(x, y, z, T[0])
     x, y, z = rows_of(links[0])
     for k in range(direction.shape[0]):
         moved = direction[k] * _row_value(layout.coupling, q, k) + starts[k]

@@ -29,7 +29,7 @@ import numpy as np
 
 from er3a.identifiability.entries import TableNumber, shifted
 from er3a.kinematics.table_batch import Tables, fill_frames, frames_of, kernel_columns, tables_of
-from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
+from er3a.numerics.arrays import Flags, Integers, Reals, copy_values, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references import quantities
@@ -267,7 +267,7 @@ def _climb(
         if values[other] > best + ENOUGH_M:
             second = _from(ends, columns, bounds, starts[other], joints, what)
             if second > best:
-                starts[0] = starts[other]
+                copy_values(starts[other], starts[0])
                 best = second
     return best
 
@@ -299,7 +299,7 @@ def _from(ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, j
             if definite:
                 longest = np.abs(step).max()
                 share = min(1.0, LONGEST_STEP / longest) if longest > 0 else 0.0
-                trial[0] = q
+                copy_values(q, trial[0])
                 for i in range(k):
                     j = joints[i]
                     trial[0, j] = min(max(q[j] + share * step[i], lower[j]), upper[j])
@@ -310,10 +310,10 @@ def _from(ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, j
             damping = max(4 * damping, 1e-3)
         if gained <= ENOUGH_M:
             if gained > 0:
-                q[:] = trial[0]
+                copy_values(trial[0], q)
                 here = trial_value[0]
             break
-        q[:] = trial[0]
+        copy_values(trial[0], q)
         here = trial_value[0]
         damping = damping / 8 if damping > 1e-3 else 0.0
     return here
@@ -323,7 +323,8 @@ def _from(ends: Ends, columns: Columns, bounds: tuple[Reals, Reals], q: Reals, j
 def _fill_stencil(q: Reals, joints: Integers, stencil: Reals) -> None:
     k = joints.shape[0]
     at = 1 + 2 * k
-    stencil[:] = q
+    for i in range(stencil.shape[0]):
+        copy_values(q, stencil[i])
     for i in range(k):
         stencil[1 + i, joints[i]] += STEP
         stencil[1 + k + i, joints[i]] -= STEP

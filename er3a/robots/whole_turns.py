@@ -20,7 +20,7 @@ from itertools import combinations
 import numpy as np
 
 from er3a.geometry.vectors import TURN
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Reals, copy_values
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot, derived
 
@@ -237,6 +237,24 @@ def _room(q: Reals, lattice: Lattice, limits: Limits) -> tuple[Reals, Reals, Rea
     return least, most, adds, addable
 
 
+@inner_kernel
+def _some(least: Reals, most: Reals) -> bool:
+    """Whether there is a turn of each row between the two."""
+    for i in range(least.shape[0]):
+        if least[i] > most[i]:
+            return False
+    return True
+
+
+@inner_kernel
+def _combine(combinations: Reals, q: Reals, out: Reals) -> None:
+    """Fill out (k,) with combinations (k, n) of joints (n,)."""
+    for i in range(combinations.shape[0]):
+        out[i] = 0.0
+        for j in range(q.shape[0]):
+            out[i] += combinations[i, j] * q[j]
+
+
 @kernel
 def _all_within(q: Reals, lattice: Lattice, limits: Limits, found: Reals) -> int:
     """Fill ``found`` (k, n) with joints (n,) by all turns that keep limits (m,), as many as there is room for; returns
@@ -245,9 +263,9 @@ def _all_within(q: Reals, lattice: Lattice, limits: Limits, found: Reals) -> int
     m, rows = G.shape
     least, most, low, high = _room(q, lattice, limits)
     value, at, count, i = np.empty((rows + 1, m)), least - 1.0, 0, 0
-    value[0] = lines @ q
-    if (least > most).any():
+    if not _some(least, most):
         return 0
+    _combine(lines, q, value[0])
     while i >= 0:
         if i < rows:
             at[i] += 1.0
@@ -267,7 +285,7 @@ def _all_within(q: Reals, lattice: Lattice, limits: Limits, found: Reals) -> int
         if fits:
             if count == found.shape[0]:
                 return count
-            found[count] = value[rows, : q.shape[0]]
+            copy_values(value[rows], found[count])
             count += 1
         i -= 1
     return count
@@ -280,16 +298,18 @@ def _nearest(Q: Reals, refs: Reals, lattice: Lattice, limits: Limits, out: tuple
     are none."""
     (G, counts, lines), (lowers, uppers, away), (found, left) = lattice, limits, out
     (m, rows), n = G.shape, Q.shape[1]
-    value, at = np.empty((rows + 1, m)), np.zeros(rows, np.int64)
+    value, at, middle = np.empty((rows + 1, m)), np.zeros(rows, np.int64), np.empty(rows)
     for pose in range(Q.shape[0]):
         q, ref, lower, upper = Q[pose], refs[pose], lowers[pose], uppers[pose]
         left[pose], max_move, total = np.inf, np.inf, np.inf
         least, most, low, high = _room(q, lattice, (lower, upper, away))
-        if (least > most).any():
+        if not _some(least, most):
             continue
-        middle = np.minimum(np.maximum(np.rint(counts @ (ref - q)), least), most)
-        value[0], i = lines @ q, 0
-        at[:] = -1
+        _combine(counts, ref - q, middle)
+        for i in range(rows):
+            at[i], middle[i] = -1, min(max(np.rint(middle[i]), least[i]), most[i])
+        _combine(lines, q, value[0])
+        i = 0
         while i >= 0:
             if i < rows:
                 at[i] += 1  # from the nearest turn on to both sides
@@ -324,5 +344,5 @@ def _nearest(Q: Reals, refs: Reals, lattice: Lattice, limits: Limits, out: tuple
                 continue
             if fits:
                 left[pose], max_move, total = beyond, move, moves
-                found[pose] = value[rows, :n]
+                copy_values(value[rows], found[pose])
             i -= 1

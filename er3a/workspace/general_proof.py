@@ -50,7 +50,7 @@ import numpy as np
 
 from er3a.kinematics.chain import constant_links, moving_tip
 from er3a.kinematics.forward import forward, jacobian
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
@@ -185,7 +185,8 @@ def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimu
     at = known.used[0]
     if at >= known.v.shape[0] or known.counts[i, j] >= _PER_BUCKET:
         return
-    known.v[at], known.azimuth[at] = v, azimuth
+    copy_values(v, known.v[at])
+    known.azimuth[at] = azimuth
     known.following[at], known.first[i, j] = known.first[i, j], at
     known.counts[i, j] += 1
     known.used[0] = at + 1
@@ -384,7 +385,7 @@ def _try(
     x, y, _ = point_of(arm, memory.theta, memory.radii)
     azimuth = _azimuth(arm, x, y)
     if np.isnan(witness[0]):
-        witness[:] = memory.v
+        copy_values(memory.v, witness)
     a, b = own_range(arm, memory.v)
     if not arm.full_turn and not meets(arcs, count, a + azimuth, b + azimuth):
         return count
@@ -442,7 +443,7 @@ def fill_cells(
                         azimuth, (a, b) = known.azimuth[at], own_range(arm, known.v[at])
                         if arm.full_turn or meets(unfilled[n], counts[n], a + azimuth, b + azimuth):
                             tried += 1
-                            memory.v[:] = known.v[at]
+                            copy_values(known.v[at], memory.v)
                             hold = 0.0 if arm.full_turn or tried % 2 == 0 else 1e3
                             counts[n] = _try(arm, cell, hold, known, memory, unfilled[n], counts[n], witness[n])
                         at = known.following[at]
