@@ -118,6 +118,11 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 50)
 
 
+def pytest_sessionfinish() -> None:
+    """Libraries written in C complain of what is left when Python ends."""
+    gc.unfreeze()
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _ask_nobody() -> Iterator[None]:
     """Rerun's programs that tests start collect no statistics; Snakemake's plugin waits for no Slurm.

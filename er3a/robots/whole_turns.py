@@ -240,10 +240,10 @@ def _room(q: Reals, lattice: Lattice, limits: Limits) -> tuple[Reals, Reals, Rea
 @inner_kernel
 def _some(least: Reals, most: Reals) -> bool:
     """Whether there is a turn of each row between the two."""
+    some = True
     for i in range(least.shape[0]):
-        if least[i] > most[i]:
-            return False
-    return True
+        some &= least[i] <= most[i]
+    return some
 
 
 @inner_kernel
