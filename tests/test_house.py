@@ -27,11 +27,19 @@ def trees() -> dict[str, ast.Module]:
     return {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in paths}
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """All statements within a module or a statement; expressions hold no definition and no import."""
+    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for child in getattr(node, part, ()):
+            yield child
+            yield from statements(child)
+
+
 @cache
 def definitions() -> tuple[tuple[str, ast.FunctionDef | ast.ClassDef], ...]:
     """All functions and classes of the package, with the place that each begins at."""
     kinds = (ast.FunctionDef, ast.ClassDef)
-    walked = ((path, node) for path, tree in trees().items() for node in ast.walk(tree) if isinstance(node, kinds))
+    walked = ((path, node) for path, tree in trees().items() for node in statements(tree) if isinstance(node, kinds))
     return tuple((f"{path}:{node.lineno}", node) for path, node in walked)
 
 
@@ -98,7 +106,7 @@ def test_no_two_classes_share_a_name():
 def modules_imported(tree: ast.Module) -> set[str]:
     """Full names that a module may import, those within functions and for type checkers too."""
     found = set()
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Import):
