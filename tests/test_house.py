@@ -27,11 +27,19 @@ def trees() -> dict[str, ast.Module]:
     return {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in paths}
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """All statements within a module or a statement; expressions hold no definition and no import."""
+    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for child in getattr(node, part, ()):
+            yield child
+            yield from statements(child)
+
+
 @cache
 def definitions() -> tuple[tuple[str, ast.FunctionDef | ast.ClassDef], ...]:
     """All functions and classes of the package, with the place that each begins at."""
     kinds = (ast.FunctionDef, ast.ClassDef)
-    walked = ((path, node) for path, tree in trees().items() for node in ast.walk(tree) if isinstance(node, kinds))
+    walked = ((path, node) for path, tree in trees().items() for node in statements(tree) if isinstance(node, kinds))
     return tuple((f"{path}:{node.lineno}", node) for path, node in walked)
 
 
@@ -98,7 +106,7 @@ def test_no_two_classes_share_a_name():
 def modules_imported(tree: ast.Module) -> set[str]:
     """Full names that a module may import, those within functions and for type checkers too."""
     found = set()
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Import):
@@ -140,8 +148,38 @@ def test_docstrings_name_modules_that_are_there():
     assert [each for each in sorted(named) if each[1].split(".")[-1] not in names] == []
 
 
-def test_a_rooms_face_that_names_its_modules_names_all():
-    for face in (ROOT / "er3a").rglob("__init__.py"):
-        modules = {path.stem for path in face.parent.glob("*.py")} - {"__init__"}
-        named = set(re.findall(r"``(\w+)``", ast.get_docstring(ast.parse(face.read_text(encoding="utf-8"))) or ""))
+def names_of(module: ast.Module) -> set[str]:
+    """What a module defines or imports at its top level."""
+    targets = [target for node in module.body if isinstance(node, ast.Assign) for target in node.targets]
+    targets += [node.target for node in module.body if isinstance(node, ast.AnnAssign)]
+    assigned = {each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)}
+    imported = [alias for node in module.body if isinstance(node, ast.Import | ast.ImportFrom) for alias in node.names]
+    defined = [node.name for node in module.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    return {*defined, *assigned, *(alias.asname or alias.name for alias in imported)}
+
+
+def test_a_rooms_face_names_all_of_its_modules_or_few_and_nothing_else():
+    for face in (path for path in trees() if path.endswith("/__init__.py") and path.count("/") > 1):
+        room = face.removesuffix("__init__.py")
+        inside = {path for path in trees() if path.startswith(room) and path != face}
+        modules = {Path(path).stem for path in inside if path.count("/") == room.count("/")}
+        known = {path.removeprefix(room).partition("/")[0].removesuffix(".py") for path in inside}
+        known.update(*(names_of(trees()[path]) for path in inside))
+        named = set(re.findall(r"``(\w+)``", ast.get_docstring(trees()[face]) or ""))
+        assert named <= known, (face, named - known)
         assert len(named & modules) < 2 or modules <= named, (face, modules - named)
+
+
+def test_the_guide_names_rooms_and_modules_that_are_there():
+    guide = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`([\w/]+(?:/|\.py))`", " ".join(re.findall(r"^\| (`.+?) \|", guide, flags=re.MULTILINE)))
+    assert len(named) > 30
+    assert [
+        each for each in named if not (ROOT / each).exists() and not any(f"/{each}" in path for path in trees())
+    ] == []
+
+
+def test_what_the_package_offers_is_there():
+    (offered,) = (node.value for node in trees()["er3a/__init__.py"].body if "_PUBLIC" in names_of(ast.Module([node])))
+    for name, module in ast.literal_eval(offered).items():
+        assert name in names_of(trees()[f"{module.replace('.', '/')}.py"]), (name, module)

@@ -21,7 +21,6 @@ from er3a.robots.robot import Robot
 LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")
 BASE_COLUMNS = ("base_x", "base_y", "base_z", "base_rx", "base_ry", "base_rz")
 TOOL_COLUMNS = ("tool_x", "tool_y", "tool_z")
-PLACED = BASE_COLUMNS + TOOL_COLUMNS
 IN_MM = ("a", "d", *BASE_COLUMNS[:3], *TOOL_COLUMNS)
 PARALLEL_RAD = np.radians(1.0)
 MM = 1000.0
@@ -35,7 +34,7 @@ class Parameter:
 
     Attributes
     ----------
-    column : a, alpha, beta, d or offset of the table, or one of ``PLACED``
+    column : a, alpha, beta, d or offset of the table, or one of ``BASE_COLUMNS`` and ``TOOL_COLUMNS``
     joint : from 1; 0 for base and tool
     """
 

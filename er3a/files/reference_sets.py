@@ -223,7 +223,8 @@ def _limit_faults(fields: Fields) -> Iterator[Fault]:
     for unit in ("deg", "mm"):
         lower, upper = fields[f"lower_{unit}"], fields[f"upper_{unit}"]
         if lower is not None and upper is not None and lower >= upper:
-            yield f"lower_{unit}", f"{lower:g} is not below upper_{unit} {upper:g}", "Swap them"
+            remedy = "Swap them" if lower > upper else "Correct one of them"
+            yield f"lower_{unit}", f"{lower:g} is not below upper_{unit} {upper:g}", remedy
 
 
 def _speed_faults(fields: Fields) -> Iterator[Fault]:

@@ -258,11 +258,6 @@ class CodeBuilder:
                 self.code[at] = replace(operation, to=len(self.code))
 
 
-def negated(condition: syntax.Expression) -> syntax.Expression:
-    """The opposite of a condition."""
-    return syntax.Unary("NOT", condition)
-
-
 def fault(place: Place, problem: str, remedy: str) -> InputError:
     """An error at a place of a program."""
     return InputError(place.file, place.where, problem, remedy)

@@ -55,7 +55,11 @@ def test_exact_positions_give_an_arm_with_the_same_positions_everywhere(name, co
     """But for terms of second order: entries that are held because they act alike do so at the nominal table."""
     robot = convert(load_robot(name))
     truth = bent(robot, random)
-    found = er3a.calibrate(robot, exact(truth, robot, random))
+    rows = exact(truth, robot, random)
+    found = er3a.calibrate(robot, rows)
+    (x, _, z), row = rows[0].xyz_mm, rows[0]
+    partly = type(row)(row.row, row.pose, row.point, (x + 3, None, z + 4))
+    assert found.distances_mm((partly,)) == pytest.approx(5, abs=0.02)
     q = poses_in(robot, random, 500)
     gap = er3a.forward(found.robot, q)[:, :3, 3] - er3a.forward(truth.without_tool(), q)[:, :3, 3]
     assert found.level == "all_entries"

@@ -209,6 +209,18 @@ def test_couplings_and_counts_and_kinds():
     assert (slides.verdict, slides.geometry.differences[0].entry) == ("other_arm", "type3")
 
 
+def test_limits_are_compared_as_the_other_arms_zeros_and_directions_have_them():
+    right = er3a.load_robot("er3a_c60")
+    moved, turned = np.radians([0, 30, -20, 0, 10, 0]), np.where(np.arange(6) == 2, -1, 1)
+    ends = turned * (right.lower - right.direction * moved), turned * (right.upper - right.direction * moved)
+    same = {"offset": right.offset + moved, "direction": turned * right.direction}
+    other = right.replace(**same, lower=np.minimum(*ends), upper=np.maximum(*ends))
+    assert er3a.compare(right, other).limits.same
+    found = er3a.compare(right, other.replace(upper=other.upper + np.radians([0, 0, 0, 0, 2, 0]))).limits
+    assert [(each.joint, each.entry) for each in found.differences] == [(5, "upper")]
+    assert found.differences[0].b - found.differences[0].a == pytest.approx(2)
+
+
 def test_the_arm_that_fits_best_comes_first():
     right = er3a.load_robot("er3_600")
     others = {f"{mm}": right.replace(a=right.a + np.array([0, mm / 1000, 0, 0, 0, 0])) for mm in (300, 20, 0, -50)}

@@ -16,7 +16,7 @@ from er3a.files.robot_library import load_robot
 from er3a.identifiability.alternatives import Flip
 from er3a.identifiability.entries import TableNumber, continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
-from er3a.identifiability.evidence import evidence_of, parts_of
+from er3a.identifiability.evidence import NOT_OFF, Extent, _interval, evidence_of, parts_of
 from er3a.identifiability.proposals import (
     LookAtMotion,
     MeasureAngle,
@@ -132,6 +132,11 @@ def test_the_table_read_from_the_step_model_is_consistent_with_it():
     assert {found[f"direction{joint}"].status for joint in (2, 3)} == {"consistent"}
     assert found["speed1"].status == found["lower1"].status == "consistent"
     assert [round(bound, 1) for bound in found["upper2"].interval] == [84.6, 85.0]  # the drawing's least x
+
+
+def test_an_entry_for_which_no_table_meets_the_documents_has_no_interval():
+    assert _interval(Extent(np.nan, np.nan, NOT_OFF, True)) is None
+    assert _interval(Extent(1 - 1e-12, 2.0, NOT_OFF, True)) == (1, 2)
 
 
 @pytest.mark.long

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from er3a.numerics.jit import compile_seconds, inner_kernel, kernel
+from er3a.numerics.jit import cache_folder, compile_seconds, inner_kernel, kernel
 from testing.small_study import ROOT
 
 
@@ -40,6 +40,13 @@ def test_waiting_for_kernels_is_counted_and_their_work_is_not():
 def test_an_inner_kernel_is_not_called_from_python():
     with pytest.raises(TypeError, match="compiled for kernels only"):
         _power(2.0, 3)
+
+
+def test_kernels_are_kept_where_numba_is_told_to_else_in_the_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    for told, home in (("", "cache"), (str(tmp_path / "numba"), "numba")):
+        monkeypatch.setenv("NUMBA_CACHE_DIR", told)
+        assert cache_folder() == tmp_path / home / "er3a"
 
 
 @pytest.mark.long

@@ -186,6 +186,7 @@ VALUES = {  # what stands behind n:=, and the number
     "power": ("Pow(2,10)", 1024),
     "truncated": ("Trunc(-2.7)", -2),
     "rounded": ("Round(2.345\\Dec:=2)", 2.35),
+    "rounded_from_zero": ("Round(-2.5)", -3),
     "distance": ("Distance([0,3,0],[4,0,0])", 5),
     "dot": ("DotProd([1,2,3],[4,5,6])", 32),
     "length": ("VectMagn([2,3,6])", 7),

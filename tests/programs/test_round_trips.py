@@ -222,6 +222,9 @@ def test_what_a_language_has_no_equal_for_is_said_in_the_head():
         assert words in head
     rpl = write_program(Listing("mixed", moves[1:2]), "rpl", WriteOptions(ROBOT, start=a))
     assert {type(each) for each in rpl.findings} == {SpeedsEstimated, ValuesRounded}
+    narrow = ArmMotion("joint", JointTarget(a), speed=Rate(0.5, "share"), zone=Zone("distance", 0.0))
+    rapid = write_program(Listing("narrow", (narrow,)), "rapid", WriteOptions(ROBOT))
+    assert (rapid.findings, ",vmax,fine," in rapid.files[".mod"]) == ((ZonesDropped(1),), True)
 
 
 def test_a_pose_without_an_arm_is_left_out_where_joints_are_written():

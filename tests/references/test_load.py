@@ -73,6 +73,7 @@ def test_a_limit_that_is_not_given_is_kept_as_not_given():
         ("limits.csv", LIMITS + "1,-170,170,0.5,,official\n", ["row 2", "source", "empty"]),
         ("limits.csv", LIMITS + "11,-170,170,0.5,m,official\n", ["row 2", "joint 11"]),
         ("limits.csv", LIMITS + "1,170,-170,0.5,m,official\n", ["row 2", "lower_deg", "Swap"]),
+        ("limits.csv", LIMITS + "1,170,170,0.5,m,official\n", ["row 2", "lower_deg", "Correct one of them"]),
         ("limits.csv", LIMITS + "1,-170,170,0,m,official\n", ["row 2", "uncertainty_deg", "positive"]),
         ("limits.csv", LIMITS + "1,-2.9,2.9,0.5,m,official\n2,-1,1,0.5,m,official\n", ["radians"]),
         ("limits.csv", LIMITS + "1,-170,170,0.5,m,official\n" * 2, ["row 3", "repeats row 2"]),

@@ -83,8 +83,12 @@ def test_grippers_and_linkages_that_only_follow_are_left_out(written):
         "p2", "revolute", "p1", "p2", more=follows("j2")
     )
     fingers = joint("f1", "prismatic", "hand", "f1") + joint("f2", "prismatic", "hand", "f2", more=follows("f1"))
+    inertial = '<inertial><origin xyz="0 0 0.1"/><mass value="0.3"/><inertia/></inertial>'
+    fingers = fingers.replace('<link name="f2"/>', f'<link name="f2">{inertial}</link>')
     hand = joint("h", "fixed", "l5", "hand", more="")
     imported = import_urdf(written(row(6), linkage, hand, fingers))
+    weighs, last = imported.robot.masses.body(6), frames(imported.robot, np.zeros(6))[5]
+    np.testing.assert_allclose([weighs.mass, *(last @ [*weighs.centre, 1])], [0.3, 0, 0, 8 * 0.2 + 0.1, 1], atol=1e-9)
     assert imported.robot.joints == 6
     assert imported.tip == "hand"
     assert any("only follow" in note and "p1" in note for note in imported.notes)

@@ -639,6 +639,19 @@ def test_circles_show_the_axes_that_the_frames_have(random):
         assert found.roundness_mm.max() < 1e-8
 
 
+def test_each_stated_axis_stands_beside_the_nearest_point_of_the_models():
+    """The model's lines are its frames' z axes, and the right table misses none of those that documents state."""
+    arm = load_robot("er3a_c60")
+    found = compute_module.axes_table(circle_points(arm), [load_references("er3a_c60")])
+    T = frames(arm.replace(tool=np.eye(4)), np.zeros(6))[found.joint - 1]
+    assert np.linalg.norm(np.cross(found.model_point_mm - 1000 * T[:, :3, 3], T[:, :3, 2]), axis=1).max() < 1e-6
+    across = found.model_point_mm - found.point_mm
+    np.testing.assert_allclose(np.sum(across * T[:, :3, 2], axis=1), 0, atol=1e-6)
+    np.testing.assert_allclose(found.distance_mm, np.linalg.norm(across, axis=1), atol=1e-9)
+    assert len(found) == 12
+    assert not found.is_off.any()
+
+
 def test_a_circle_is_found_in_noisy_points(random):
     angles = np.linspace(-1.0, 2.0, 200)
     turn = Rotation.from_euler("xyz", [0.4, -0.9, 1.7]).as_matrix()

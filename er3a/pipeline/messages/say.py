@@ -96,11 +96,6 @@ def english(key: str) -> tuple[str, ...]:
     return (text.one, text.many) if isinstance(text, Plural) else (text,)
 
 
-def is_known(key: str) -> bool:
-    """Whether there is a text for a finding's code, in one form or several."""
-    return key in _texts or key in _fields
-
-
 @singledispatch
 def say(finding: Any) -> str:
     """A finding as a text in the language in use, by its code; functions for types are registered with it."""
