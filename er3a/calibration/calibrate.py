@@ -499,7 +499,7 @@ def _covariance(observations: Observations, found: Fit) -> tuple[Reals, Reals]:
     """By the stated deviations; where none was stated, by what remains at each pose; and half-widths (k + c,) of 95 %
     intervals in standard errors."""
     if isinstance(observations, PointObservations) and not observations.deviation_known:
-        covariance, freedom = covariance_by_poses(found, observations.pose_of)
+        covariance, freedom = covariance_by_poses(found, observations.pose_of[found.last])
         return covariance, np.asarray(scipy.special.stdtrit(freedom, 0.975))
     return found.covariance, np.full(found.J.shape[1], INTERVAL_95)
 
@@ -633,15 +633,20 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) 
 
 
 def _left_out(observations: PointObservations, found: Fit) -> HeldOutErrors | None:
-    return left_out(observations, found) if can_leave_out(observations, found.J.shape[1]) else None
+    return left_out(observations, found) if can_leave_out(observations.pose_of[found.last], found.J.shape[1]) else None
 
 
 def _structure(robot: Robot, observations: PointObservations, found: Fit) -> ResidualStructure | None:
-    residuals = np.zeros(observations.seen.shape)
-    residuals[observations.seen] = found.after * observations.deviation_mm
+    """Of what is independent, which is as many as poses minus those that place and planes take to be known."""
+    residuals, known = np.zeros(observations.seen.shape), np.zeros(observations.seen.shape, dtype=bool)
+    where = np.flatnonzero(observations.seen)[found.last]
+    residuals.flat[where], known.flat[where] = found.rest * found.deviation_mm, True
     effect = 1000 * effects(robot, observations.row_values, observations.points(robot))
     effect *= ((observations.touched < 0)[:, None] & observations.seen)[:, None]
-    return structure_of(residuals, observations.row_values, observations.lines, effect)
+    used, columns = known.any(axis=1), known.any(axis=0)
+    off = np.sqrt(np.bincount(observations.pose_of, weights=(found.after * observations.deviation_mm) ** 2))
+    worst = int(observations.lines[off.argmax()]), float(off.max())
+    return structure_of(residuals[used][:, columns], observations.row_values[used], effect[used][..., columns], worst)
 
 
 def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse
 
 from er3a.calibration.observations import Observations, PointObservations, directions, socket
 from er3a.calibration.outcomes import (
@@ -43,7 +44,7 @@ from er3a.robots.robot import Robot
 STEP = 1e-5
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
-STEPS = 30
+STEPS = 100
 SMALL_STEP = 1e-12  # m and rad
 SMALL_CHANGE = 1e-6  # of the weighted differences, of measured points
 HALVINGS = 12
@@ -174,8 +175,9 @@ class Fit:
     kept, terms : what was fitted
     amounts : (k,), added to what the robot has, in m and rad; coefficients : (c,), of the terms
     before, after : (n,), differences to the measurements in standard deviations
-    J : (n, k + c), weighted derivatives
-    dropped : numbers of places and planes that have dropped out
+    J, rest : (m, k + c) and (m,), derivatives and differences of what is independent of places, planes and sockets
+        that nobody knows, in standard deviations of it, ``deviation_mm`` (m,)
+    last : (m,), the last of the n observed values that it is made of
     """
 
     kept: tuple[Parameter, ...]
@@ -185,12 +187,14 @@ class Fit:
     before: Reals
     after: Reals
     J: Reals
-    dropped: int = 0
+    rest: Reals
+    deviation_mm: Reals
+    last: Integers
 
     @property
     def freedom(self) -> int:
         """Degrees of freedom of what remains."""
-        return max(int(len(self.after) - self.J.shape[1] - self.dropped), 1)
+        return max(len(self.rest) - self.J.shape[1], 1)
 
     @property
     def covariance(self) -> Reals:
@@ -203,7 +207,7 @@ class Fit:
     @property
     def scatter(self) -> float:
         """Root mean square of what remains, in standard deviations, per degree of freedom."""
-        return float(np.sqrt((self.after @ self.after) / self.freedom))
+        return float(np.sqrt((self.rest @ self.rest) / self.freedom))
 
 
 def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
@@ -224,7 +228,7 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
         J = found.J[rows]  # (poses, count, k + c)
         size, axes = np.linalg.eigh(np.eye(count) - J @ C @ J.swapaxes(1, 2))
         weight = (axes / np.sqrt(np.maximum(size, LEAST_OWN))[:, None]) @ axes.swapaxes(1, 2)
-        push = (J.swapaxes(1, 2) @ weight @ found.after[rows][..., None])[..., 0]
+        push = (J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0]
         middle += push.T @ push
         shares = weight @ J @ C
         sizes.append((shares**2).sum(axis=1))
@@ -334,8 +338,11 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
         unknowns, rest = trial, new
         still = isinstance(observations, PointObservations) and gain < SMALL_CHANGE * np.linalg.norm(rest)
         if still or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
-            dropped = observations.dropped if isinstance(observations, PointObservations) else 0
-            return Fit(kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], J[:n], dropped)
+            rows, last = scipy.sparse.eye_array(n), np.arange(n)
+            if isinstance(seen := with_errors(unknowns[k:]), PointObservations):
+                rows, last = seen.independent(seen.positions(here))
+            own = np.sqrt(rows**2 @ deviation**2)
+            return Fit(kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], rows @ J[:n], rows @ rest[:n], own, last)
     rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
     raise CalibrationError(
         NoCorrectionFits(STEPS, rest_mm),

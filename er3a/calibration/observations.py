@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import scipy.sparse
 
 from er3a.calibration.outcomes import FixedName, PlacementName
 from er3a.calibration.parameters import DEPENDENT, MM, Parameter, moved, placed
@@ -179,11 +180,15 @@ class PointObservations:
 
     @property
     def dropped(self) -> int:
-        """How many numbers of places, planes and bars have dropped out."""
+        """How many numbers of places, planes and bars drop out, at most as many as there are of them."""
         return sum(
-            0 if kind == "pair" else 3 + (kind == "bar" and not self._lengths_mm(rows).any())
-            for kind, rows in self.groups()
+            (3 if kind == "place" else 1) * min(len(rows), self._unknowns(kind, rows)) for kind, rows in self.groups()
         )
+
+    def _unknowns(self, kind: TouchKind, rows: Integers) -> int:
+        """How many numbers of each coordinate drop out, by which poses are too few."""
+        bar = 3 + (not self._lengths_mm(rows).any())
+        return {"place": 1, "plane": 3, "pair": 0, "bar": bar}[kind]
 
     @property
     def has_scale(self) -> bool:
@@ -209,7 +214,7 @@ class PointObservations:
             if kind == "place":
                 found[rows] = own - own.mean(axis=0)
             elif kind == "plane":
-                found[rows, 0] = _off_plane(own, own)
+                found[rows, 0] = (own - own.mean(axis=0)) @ _plane(own)[0]
             elif kind == "pair":
                 found[rows, 0] = np.linalg.norm(own[0] - own[-1])
             else:
@@ -223,21 +228,50 @@ class PointObservations:
         """By how much small shifts (P, 3) of points ``around`` change what is observed, m."""
         found = shift.copy()
         for kind, rows in self.groups():
-            own, here = shift[rows], around[rows]
-            if kind == "place":
-                found[rows] = own - own.mean(axis=0)
-            elif kind == "plane":
-                found[rows, 0] = _off_plane(own, here)
-            elif kind == "pair":
-                apart = here[0] - here[-1]
-                found[rows, 0] = (own[0] - own[-1]) @ apart / max(float(np.linalg.norm(apart)), LEAST_LENGTH)
-            else:
-                lengths = self._lengths_mm(rows) / MM
-                along = directions(here - socket(here, lengths))[0]
-                basis = along if lengths.any() else np.column_stack([along, np.ones(len(rows))])
-                longer = np.einsum("pi,pi->p", along, own)
-                found[rows, 0] = longer - basis @ np.linalg.lstsq(basis, longer, rcond=None)[0]
+            along, basis = self._dropping(kind, rows, around)
+            own = shift[rows] - shift[rows[::-1]] if kind == "pair" else shift[rows]
+            own = own if kind == "place" else np.einsum("pi,pi->p", along, own)[:, None]
+            found[rows, : own.shape[1]] = own - basis @ np.linalg.lstsq(basis, own, rcond=None)[0]
         return found
+
+    def _dropping(self, kind: TouchKind, rows: Integers, around: Reals) -> tuple[Reals, Reals]:
+        """For points ``around``: the directions (k, 3) in which those of a plane, pair or bar are observed, and what
+        drops out, (k, r), the same for each coordinate of a place."""
+        here, every = around[rows], np.ones((len(rows), 1))
+        if kind == "place":
+            return here, every
+        if kind == "plane":
+            normal, inside = _plane(here)
+            return every * normal, np.hstack([every, inside])
+        if kind == "pair":
+            return directions(here - here[::-1])[0], every[:, :0]
+        along = directions(here - socket(here, self._lengths_mm(rows) / MM))[0]
+        return along, along if self._unknowns(kind, rows) == 3 else np.hstack([along, every])
+
+    def independent(self, around: Reals) -> tuple[scipy.sparse.csr_array, Integers]:
+        """What is observed at points ``around`` without what drops out, in standard deviations.
+
+        Returns
+        -------
+        rows : (c, n), orthonormal; they take n observed values to as many as are independent of each other
+        last : (c,), the last of the observed values that each is made of
+        """
+        at = np.full(self.seen.shape, -1)
+        at[self.seen] = np.arange(len(self))
+        alone = np.flatnonzero((self.touched < 0)[self.pose_of])
+        parts = [(np.arange(len(alone)), alone, np.ones(len(alone)))]
+        last = [alone]
+        for kind, rows in self.groups():
+            basis = self._dropping(kind, rows, around)[1]
+            for every in at[rows].T:
+                own = every[every >= 0]
+                known = _innovations(basis[every >= 0] / self.deviation_mm[own, None])
+                first = sum(len(part) for part in last)
+                parts.append((np.repeat(first + np.arange(len(known)), len(own)), np.tile(own, len(known)), known.ravel()))
+                last.append(own[len(own) - len(known) :][::-1])
+        row, column, values = (np.concatenate(part) for part in zip(*parts))
+        latest = np.concatenate(last)
+        return scipy.sparse.csr_array((values, (row, column)), shape=(len(latest), len(self))), latest
 
     @property
     def poses(self) -> int:
@@ -340,14 +374,18 @@ class PointObservations:
         )
 
 
-def _off_plane(xyz: Reals, around: Reals) -> Reals:
-    """Distances (P,) of points, or of their shifts, from the plane that fits points ``around`` best, which drops
-    out."""
-    here = around - around.mean(axis=0)
-    axes = np.linalg.svd(here, full_matrices=False)[2]
-    normal = axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
-    across, inside = (xyz - xyz.mean(axis=0)) @ normal, here @ axes[:2].T
-    found: Reals = across - inside @ np.linalg.lstsq(inside, across, rcond=None)[0]
+def _plane(xyz: Reals) -> tuple[Reals, Reals]:
+    """Normal (3,) of the plane that fits points (P, 3) best, and where they are in it, (P, 2)."""
+    here = xyz - xyz.mean(axis=0)
+    axes = np.linalg.svd(np.linalg.qr(here, mode="r"))[2]
+    return axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()]), here @ axes[:2].T
+
+
+def _innovations(basis: Reals) -> Reals:
+    """Orthonormal rows (k - r, k) beside a basis (k, r), each with no part in one more of the last places than the row
+    before it."""
+    outside = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :].T
+    found: Reals = np.linalg.qr(outside[:, ::-1], mode="r")[:, ::-1]
     return found
 
 

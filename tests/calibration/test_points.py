@@ -456,9 +456,9 @@ def test_intervals_rest_on_as_many_degrees_of_freedom_as_two_means_have():
     J = np.column_stack([np.ones(first + second), np.arange(first + second) < first])
     rest = np.random.default_rng(1).normal(size=(first + second))
     off = rest - J @ np.linalg.lstsq(J, rest, rcond=None)[0]
-    covariance, freedom = covariance_by_poses(
-        Fit((), (), np.zeros(2), np.zeros(0), rest, off, J), np.arange(first + second)
-    )
+    every = np.arange(first + second)
+    found = Fit((), (), np.zeros(2), np.zeros(0), rest, off, J, off, np.ones(len(every)), every)
+    covariance, freedom = covariance_by_poses(found, every)
     variances = rest[:first].var(ddof=1) / first, rest[first:].var(ddof=1) / second
     assert covariance[1, 1] == pytest.approx(sum(variances))
     shares = 1 / (first**2 * (first - 1)), 1 / (second**2 * (second - 1))
