@@ -41,12 +41,13 @@ from er3a.calibration.fit import (
     subspace,
     without_scale,
 )
-from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
+from er3a.calibration.observations import Measurement, Observations, PointObservations, Touched, observed, spread
 from er3a.calibration.outcomes import (
     CalibrationError,
     FixedName,
     LevelName,
     MorePositions,
+    MoreTouches,
     NoPositions,
     PlacementName,
 )
@@ -58,7 +59,7 @@ from er3a.calibration.parameters import (
     placements_of,
     with_ratios,
 )
-from er3a.calibration.plan import d_optimal
+from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
 from er3a.calibration.terms import JointErrors, TermKind, effects, places_of
 from er3a.kinematics.chain import row_values
@@ -96,7 +97,7 @@ class Level:
     name: LevelName
     parameters: tuple[Parameter, ...]
     subspace: Subspace
-    more: MorePositions | None
+    more: MorePositions | MoreTouches | None
     scale: Parameter | None = None
 
     @property
@@ -121,19 +122,22 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     """
     if not len(observations):
         raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
-    rich = observations.rich(robot)
     placed = placements_of(observations.free)
     scale = scale_of(robot, observations) if isinstance(observations, PointObservations) else None
     left = left_of_touched(robot, observations)
-    more: list[MorePositions] = []
+    spare = len(observations) - getattr(observations, "dropped", 0)
+    rich = _rich(robot, observations, spare)
+    more: list[MorePositions | MoreTouches] = []
     for name in LEVELS[::-1]:
         for first in (placed, ()) if placed else ((),):
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
-            here, best = (subspace(robot, parameters, seen, left) for seen in (observations, rich))
-            spare = len(observations) - len(here.kept) - getattr(observations, "dropped", 0)
-            if len(best.kept) == len(here.kept) and spare > 0:
-                return Level(name, parameters, here, more[-1] if more else None, scale)
-            more.append(_what_more(robot, name, parameters, (here, best), observations))
+            here = subspace(robot, parameters, observations, left)
+            best = subspace(robot, parameters, rich, left) if rich else here
+            settled = len(best.kept) <= len(here.kept)
+            if not settled or spare <= len(here.kept):
+                more.append(_what_more(robot, name, parameters, (here, best), observations))
+            if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept):
+                return Level(name, parameters, here, more[0] if more else None, scale)
     problem = f"{len(observations)} coordinates determine too little; positions to be added: {more[-1].least} at least"
     raise CalibrationError(more[-1], problem)
 
@@ -144,9 +148,11 @@ def _what_more(
     parameters: tuple[Parameter, ...],
     subspaces: tuple[Subspace, Subspace],
     observations: Observations,
-) -> MorePositions:
+) -> MorePositions | MoreTouches:
     here, best = subspaces
     lacking = len(best.kept) - len(here.kept)
+    if isinstance(observations, PointObservations) and observations.all_touched:
+        return _what_touches(len(here.kept), max(len(best.kept), len(here.kept)), observations)
     return MorePositions(
         coordinates=len(observations),
         poses=observations.poses,
@@ -157,6 +163,25 @@ def _what_more(
         entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
         examples_deg=_examples(robot, [parameters[k] for k in best.kept], observations),
     )
+
+
+def _what_touches(settled: int, best: int, observations: PointObservations) -> MoreTouches:
+    """How many poses at each place, for ``best`` of the numbers to be settled, with one to spare."""
+    things = observations.things()
+    numbers = sum(each.numbers for each in things)
+    least, each = max(best - settled, best + 1 - numbers), []
+    for kind in dict.fromkeys(thing.kind for thing in things):
+        own = [thing for thing in things if thing.kind == kind]
+        whole = least + sum(thing.numbers for thing in own)
+        each.append((kind, len(own), max(thing.unknown for thing in own) - (-whole // (own[0].coordinates * len(own)))))
+    return MoreTouches(observations.poses, numbers, settled, best, least, tuple(each))
+
+
+def _rich(robot: Robot, observations: Observations, spare: int) -> Observations | None:
+    """The same points all over the joint range; None where touched ones are so many that they settle all they can."""
+    if not (isinstance(observations, PointObservations) and observations.all_touched):
+        return observations.rich(robot)
+    return touches(robot, observations) if spare < len(parameters_of(robot, "all_entries")) else None
 
 
 def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -> tuple[Pose, ...]:
@@ -275,6 +300,7 @@ class Calibration(ByValue, Displayed):
     scatter : root mean square of what remains, in standard deviations, per degree of freedom: near 1 if table and
         stated deviations are right; 1 if the deviation was estimated
     more : what it takes to estimate more entries; None if all are estimated
+    idle : what was touched at too few poses to say anything
     deviation_mm : standard deviation of a coordinate, estimated from what remains; None if it was stated
     outliers : measurements that were set aside
     bars : ball bars of unknown length, by the table alone
@@ -296,11 +322,12 @@ class Calibration(ByValue, Displayed):
     rms_before_mm: float
     rms_after_mm: float
     scatter: float
-    more: outcomes.MorePositions | None
+    more: MorePositions | MoreTouches | None
     deviation_mm: float | None = None
     outliers: tuple[Outlier, ...] = ()
     ratios: tuple[TermEstimate, ...] = ()
     bars: tuple[BarLength, ...] = ()
+    idle: tuple[Touched, ...] = ()
     left_out: HeldOutErrors | None = None
     residuals: ResidualStructure | None = None
     tried: tuple[TriedTerm, ...] = ()
@@ -473,7 +500,9 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
     kept, deviation, here = found.kept, observations.deviation_mm, corrected(robot, found.kept, found.amounts)
     bars: tuple[BarLength, ...] = ()
+    idle: tuple[Touched, ...] = ()
     if isinstance(observations, PointObservations):
+        idle = tuple(each for each in observations.things() if not each.numbers)
         errors = JointErrors(robot, found.terms, found.coefficients)
         bars = bar_lengths(here, errors, kept, observations, covariance, quantiles)
     return Calibration(
@@ -492,6 +521,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
         scatter=found.scatter,
         more=level.more,
         bars=bars,
+        idle=idle,
     )
 
 

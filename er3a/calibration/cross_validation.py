@@ -179,7 +179,7 @@ def choose_terms(
     """
     fixed_terms, count = candidates(robot), len(kept)
     numbers = count + sum(term.count for term in fixed_terms) + 2 * int((~robot.sliding).sum())
-    rows, last = observations.independent(observations.positions(here))
+    rows, last = observations.independent(here)
     pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm
     if not can_leave_out(pose_of, 0) or len(last) < LEAST_SPARE * numbers:
         return ChosenTerms((), ())

@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 
 from er3a.calibration.observations import Observations, PointObservations, directions, socket
 from er3a.calibration.outcomes import (
@@ -44,9 +43,9 @@ from er3a.robots.robot import Robot
 STEP = 1e-5
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
-STEPS = 100
+STEPS, MOST_STEPS = 30, 100
 SMALL_STEP = 1e-12  # m and rad
-SMALL_CHANGE = 1e-6  # of the weighted differences, of measured points
+SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
 HALVINGS = 12
 LEAST_OWN = 1e-9
 CLEAR = 10.0
@@ -94,11 +93,12 @@ def subspace(
     ----------
     left : of a point that touches something, in standard deviations; what the table leaves, unless given
     """
-    J = SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None]
+    rows = observations.independent(robot)[0]
+    J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
     norms = np.linalg.norm(J, axis=0)
     left = left_of_touched(robot, observations) if left is None else left
     turned = SCALE * left * len(J) ** 0.5
-    least = max(NO_EFFECT * norms.max(), turned / LEVER)
+    least = max(NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm), NO_EFFECT * norms.max(), turned / LEVER)
     kept: list[int] = []
     held: list[Held] = []
     basis: Reals = np.empty((len(J), 0))
@@ -324,7 +324,7 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
     unknowns, here = np.zeros(k + len(prior)), robot
     rest = weighted(here, unknowns[k:])
     before = rest[:n]
-    for _ in range(STEPS):
+    for number in range(MOST_STEPS):
         J = slopes(here, unknowns[k:])
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
@@ -336,16 +336,17 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
                 break
             step = step / 2
         unknowns, rest = trial, new
-        still = isinstance(observations, PointObservations) and gain < SMALL_CHANGE * np.linalg.norm(rest)
+        small = SMALL_CHANGE if number < STEPS else SLOW_CHANGE
+        still = isinstance(observations, PointObservations) and gain < small * np.linalg.norm(rest)
         if still or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
-            rows, last = scipy.sparse.eye_array(n), np.arange(n)
-            if isinstance(seen := with_errors(unknowns[k:]), PointObservations):
-                rows, last = seen.independent(seen.positions(here))
+            rows, last = with_errors(unknowns[k:]).independent(here)
             own = np.sqrt(rows**2 @ deviation**2)
-            return Fit(kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], rows @ J[:n], rows @ rest[:n], own, last)
+            return Fit(
+                kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], rows @ J[:n], rows @ rest[:n], own, last
+            )
     rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
     raise CalibrationError(
-        NoCorrectionFits(STEPS, rest_mm),
-        f"no corrections make the table fit: after {STEPS} steps the positions are still {rest_mm:.3g} mm off. The "
-        "table has a gross fault or is another arm's; er3a.diagnose names single faults",
+        NoCorrectionFits(MOST_STEPS, rest_mm),
+        f"no corrections make the table fit: after {MOST_STEPS} steps the positions are still {rest_mm:.3g} mm off. "
+        "The table has a gross fault or is another arm's; er3a.diagnose names single faults",
     )

@@ -124,9 +124,40 @@ class QuantityObservations:
         """The flange at poses."""
         return self._of(tuple(PointCoordinate(pose, "flange", c) for pose in poses for c in COORDINATES))
 
+    def independent(self, _robot: Robot) -> tuple[scipy.sparse.csr_array, Integers]:
+        """As of :class:`PointObservations`: each alone."""
+        every = np.arange(len(self))
+        return scipy.sparse.csr_array((np.ones(len(every)), (every, every))), every
+
     def _of(self, quantities: tuple[Quantity, ...]) -> QuantityObservations:
         deviation = np.full(len(quantities), np.median(self.deviation_mm))
         return QuantityObservations(quantities, np.zeros(len(quantities)), deviation)
+
+
+@dataclass(frozen=True)
+class Touched:
+    """A place, plane, pair or bar.
+
+    Attributes
+    ----------
+    poses : at which it is touched; a pair's two are one
+    unknown : how many of these say nothing, because nobody knows where it is
+    """
+
+    kind: TouchKind
+    name: str
+    poses: int
+    unknown: int
+
+    @property
+    def numbers(self) -> int:
+        """How many independent numbers its poses give."""
+        return self.coordinates * max(self.poses - self.unknown, 0)
+
+    @property
+    def coordinates(self) -> int:
+        """How many numbers one more pose gives."""
+        return 3 if self.kind == "place" else 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,29 +206,44 @@ class PointObservations:
         return [
             (self.names[self.touched[rows[0]]], self.take(np.isin(np.arange(len(self.touched)), rows)))
             for kind, rows in self.groups()
-            if kind == "bar" and not self._lengths_mm(rows).any()
+            if kind == "bar" and not self.lengths_mm(rows).any()
         ]
+
+    @property
+    def all_touched(self) -> bool:
+        """Whether no coordinates were measured."""
+        return bool((self.touched >= 0).all())
 
     @property
     def dropped(self) -> int:
         """How many numbers of places, planes and bars drop out, at most as many as there are of them."""
-        return sum(
-            (3 if kind == "place" else 1) * min(len(rows), self._unknowns(kind, rows)) for kind, rows in self.groups()
-        )
+        return sum(each.coordinates * min(each.poses, each.unknown) for each in self.things())
+
+    def things(self) -> list[Touched]:
+        """What is touched, and how often; the poses of a pair are one."""
+        return [
+            Touched(
+                kind,
+                self.names[self.touched[rows[0]]],
+                len(self.seen[rows, 0].nonzero()[0]),
+                self._unknowns(kind, rows),
+            )
+            for kind, rows in self.groups()
+        ]
 
     def _unknowns(self, kind: TouchKind, rows: Integers) -> int:
-        """How many numbers of each coordinate drop out, by which poses are too few."""
-        bar = 3 + (not self._lengths_mm(rows).any())
+        """How many numbers of each coordinate drop out: how many poses say nothing."""
+        bar = 3 + (not self.lengths_mm(rows).any())
         return {"place": 1, "plane": 3, "pair": 0, "bar": bar}[kind]
 
     @property
     def has_scale(self) -> bool:
         """Whether coordinates or lengths were measured, which set the scale of the arm."""
         return bool((self.touched < 0).any()) or any(
-            kind in ("pair", "bar") and self._lengths_mm(rows).any() for kind, rows in self.groups()
+            kind in ("pair", "bar") and self.lengths_mm(rows).any() for kind, rows in self.groups()
         )
 
-    def _lengths_mm(self, rows: Integers) -> Reals:
+    def lengths_mm(self, rows: Integers) -> Reals:
         """Measured lengths of a pair or bar; 0 if they are unknown."""
         lengths = np.zeros(self.seen.shape)
         lengths[self.seen] = self.values_mm
@@ -218,7 +264,7 @@ class PointObservations:
             elif kind == "pair":
                 found[rows, 0] = np.linalg.norm(own[0] - own[-1])
             else:
-                lengths = self._lengths_mm(rows) / MM
+                lengths = self.lengths_mm(rows) / MM
                 found[rows, 0] = np.linalg.norm(own - socket(own, lengths), axis=1)
                 if not lengths.any():
                     found[rows, 0] -= found[rows, 0].mean()
@@ -245,18 +291,18 @@ class PointObservations:
             return every * normal, np.hstack([every, inside])
         if kind == "pair":
             return directions(here - here[::-1])[0], every[:, :0]
-        along = directions(here - socket(here, self._lengths_mm(rows) / MM))[0]
+        along = directions(here - socket(here, self.lengths_mm(rows) / MM))[0]
         return along, along if self._unknowns(kind, rows) == 3 else np.hstack([along, every])
 
-    def independent(self, around: Reals) -> tuple[scipy.sparse.csr_array, Integers]:
-        """What is observed at points ``around`` without what drops out, in standard deviations.
+    def independent(self, robot: Robot) -> tuple[scipy.sparse.csr_array, Integers]:
+        """What is observed without what drops out, in standard deviations, near to a robot's table.
 
         Returns
         -------
         rows : (c, n), orthonormal; they take n observed values to as many as are independent of each other
         last : (c,), the last of the observed values that each is made of
         """
-        at = np.full(self.seen.shape, -1)
+        at, around = np.full(self.seen.shape, -1), self.positions(robot)
         at[self.seen] = np.arange(len(self))
         alone = np.flatnonzero((self.touched < 0)[self.pose_of])
         parts = [(np.arange(len(alone)), alone, np.ones(len(alone)))]
@@ -267,7 +313,9 @@ class PointObservations:
                 own = every[every >= 0]
                 known = _innovations(basis[every >= 0] / self.deviation_mm[own, None])
                 first = sum(len(part) for part in last)
-                parts.append((np.repeat(first + np.arange(len(known)), len(own)), np.tile(own, len(known)), known.ravel()))
+                parts.append(
+                    (np.repeat(first + np.arange(len(known)), len(own)), np.tile(own, len(known)), known.ravel())
+                )
                 last.append(own[len(own) - len(known) :][::-1])
         row, column, values = (np.concatenate(part) for part in zip(*parts))
         latest = np.concatenate(last)
@@ -343,9 +391,7 @@ class PointObservations:
         return replace(self, deviation_mm=np.full(len(self), deviation_mm))
 
     def rich(self, robot: Robot) -> PointObservations:
-        """The same points at poses all over the joint range; those that touch something can't be elsewhere."""
-        if (self.touched >= 0).all():
-            return self
+        """The same points, with their coordinates, at poses all over the joint range."""
         points = np.unique(self.on_tool)
         return self._at(robot, np.repeat(np.array(spread(robot)), len(points), axis=0), np.tile(points, RICH_POSES))
 
