@@ -57,25 +57,25 @@ def table() -> str:
         "",
         "## What the robot file holds",
         "",
-        "A robot file holds table, base and tool, and ratios of joints (as its coupling), chosen as terms are, without",
-        "the others. The table alone, and with ratios: mean distance at the poses that it is fitted to, and left out",
-        f"(tenths at random and neighbourhoods); and in what share of {DRAWS} draws the mean over {few} poses is at most",
-        f"{MOST_MEAN_MM} mm.",
+        "A robot file holds table, base and tool, and ratios and couplings of joints (as its coupling), chosen as",
+        "terms are, without the others. The table alone, and with these: mean distance at the poses that it is fitted",
+        "to, and left out (tenths at random and neighbourhoods); and in what share of",
+        f"{DRAWS} draws the mean over {many} poses is at most {MOST_MEAN_MM} mm.",
         "",
-        "| arm | ratios (1/1000) | table alone: fitted | left out | far away "
-        f"| with ratios: fitted | left out | far away | {few} poses <= {MOST_MEAN_MM} |",
+        "| arm | coupling (1/1000) | table alone: fitted | left out | far away "
+        f"| with coupling: fitted | left out | far away | {many} poses <= {MOST_MEAN_MM} |",
         "|---|---|---|---|---|---|---|---|---|",
-        *(_file_row(name, found[name], runs[name, False], few) for name in ARMS),
+        *(_file_row(name, found[name], runs[name, False], many) for name in ARMS),
         "",
         "## Are the worst poses outliers?",
         "",
         "If what remains were noise of one size in three coordinates, distances would be as Maxwell's distribution has",
         "them. Worst of all poses as found and as its median is for noise of that size; the median of the worst of",
-        f"{few} and of {many} poses drawn from these, and how often it is at most {MOST_WORST_MM} mm in {DRAWS} draws; of the 10",
-        "worst poses how many are among the 10 worst by the other models (robot file, plain fit).",
+        f"{few} and of {many} poses drawn from these, and how often it is at most {MOST_WORST_MM} mm in {DRAWS} draws;",
+        "of the 10 worst poses how many are among the 10 worst by the other models (robot file, plain fit).",
         "",
-        f"| arm | model | poses | worst | worst by noise | of {few} | <= {MOST_WORST_MM} | of {many} | <= {MOST_WORST_MM} "
-        "| 10 worst: robot file | plain fit |",
+        f"| arm | model | poses | worst | worst by noise | of {few} | <= {MOST_WORST_MM} | of {many} "
+        f"| <= {MOST_WORST_MM} | 10 worst: robot file | plain fit |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
         *(line for name in ARMS for line in _worst_rows(name, runs[name, False], (few, many))),
         "",
@@ -171,11 +171,11 @@ def _worst_rows(name: str, run: Unseen, sizes: tuple[int, ...]) -> list[str]:
 
 
 def _file_row(name: str, found: Calibration, run: Unseen, count: int) -> str:
-    """Errors by the robot's file with and without ratios."""
+    """Errors by the robot's file with and without a coupling."""
     robot, rows = load(name)
     alone, random = er3a.calibrate(robot, rows, ["ratios"]), np.random.default_rng(SEED)
     means = [random.choice(run.table, count, replace=False).mean() for _ in range(DRAWS)]
-    ratios = ", ".join(f"J{each.joint} {each.coefficients[0]:+.2f}" for each in found.ratios)
+    ratios = ", ".join(f"{term_name(each)} {each.coefficients[0]:+.2f}" for each in found.ratios)
     errors = [
         f"{each.without_terms().distances_mm(rows).mean():.4f} | {each.left_out.mean_mm:.4f} "
         f"| {each.left_out.far_mean_mm:.4f}"

@@ -4,7 +4,7 @@ Base and tool are estimated with the table's entries where points were measured,
 base and a reflector is not where the drawing has it. Only parameters that the measurements can tell apart are
 estimated; the others keep the table's values. Errors of joints that no table holds are estimated beside it where they
 lower the error at poses left out (:mod:`er3a.calibration.cross_validation`). Of these the robot's file can hold the
-ratios of joints, as its coupling; the table that goes there is fitted with these alone.
+ratios of joints, and what couples them, as its coupling; the table that goes there is fitted with these alone.
 """
 
 from __future__ import annotations
@@ -55,13 +55,13 @@ from er3a.calibration.parameters import (
     LEVELS,
     Parameter,
     corrected,
+    coupled,
     parameters_of,
     placements_of,
-    with_ratios,
 )
 from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
-from er3a.calibration.terms import JointErrors, TermKind, effects, places_of
+from er3a.calibration.terms import IN_ROBOT_FILE, JointErrors, TermKind, effects, places_of
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import frames_of, tables_of
@@ -249,7 +249,7 @@ class TermEstimate:
     Attributes
     ----------
     coefficients, standard_errors : one for a ratio and for sag; else of sine and cosine
-    turns : how often a ripple returns in a turn
+    turns : how often a ripple returns in a turn; by : the joint that it is coupled to
     """
 
     kind: TermKind
@@ -257,6 +257,7 @@ class TermEstimate:
     coefficients: tuple[float, ...]
     standard_errors: tuple[float, ...]
     turns: int = 0
+    by: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,10 +290,10 @@ class Calibration(ByValue, Displayed):
 
     Attributes
     ----------
-    robot : with the corrected table, base and tool, the best without terms but for ratios, which are its coupling
+    robot : with the corrected table, base and tool, the best without terms but for those of its coupling
     level : which entries were estimated
     estimates : one per identifiable entry; correlation : (k, k), of their errors
-    ratios : of joints, where poses left out are met better with them
+    ratios : of joints, and couplings, where poses left out are met better with them
     held : why the other entries of the level keep their values
     singular_values : of the scaled Jacobian (standard deviations per mm or mrad), descending
     coordinates, poses : how many measured coordinates at how many poses
@@ -506,7 +507,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
         errors = JointErrors(robot, found.terms, found.coefficients)
         bars = bar_lengths(here, errors, kept, observations, covariance, quantiles)
     return Calibration(
-        robot=_with_ratios(here, found),
+        robot=coupled(here, {(t.joint, t.by or t.joint): float(c) for t, c in zip(found.terms, found.coefficients)}),
         level=level.name,
         estimates=_estimates(robot, found, error, quantiles),
         correlation=correlation,
@@ -565,11 +566,6 @@ class _Model:
         return off
 
 
-def _with_ratios(robot: Robot, found: Fit) -> Robot:
-    own = zip(found.terms, places_of(found.terms))
-    return with_ratios(robot, {t.joint: float(found.coefficients[at[0]]) for t, at in own if t.kind == "ratio"})
-
-
 def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> _Model:
     level = choose_level(robot, observations)
     table = fit(robot, level.kept, observations)
@@ -580,7 +576,7 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
     choice = choose_terms(robot, here, table.kept, observations)
     whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
     if choice.terms and free_ratios:
-        ratios = choose_terms(robot, here, table.kept, observations, ("ratio",)).terms
+        ratios = choose_terms(robot, here, table.kept, observations, IN_ROBOT_FILE).terms
         table = fit(robot, level.kept, observations, ratios) if ratios else table
     return _Model(observations, level, table, choice, whole)
 
@@ -688,6 +684,7 @@ def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
             tuple((1000 * found.coefficients[own]).tolist()),
             tuple((1000 * own_error[own]).tolist()),
             term.turns,
+            term.by,
         )
         for term, own in zip(found.terms, places_of(found.terms))
     )

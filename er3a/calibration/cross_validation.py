@@ -87,6 +87,7 @@ class TriedTerm:
     probability: float
     verdict: TermVerdict
     turns: int = 0
+    by: int = 0
 
 
 class _Linear:
@@ -186,7 +187,7 @@ def choose_terms(
     J = rows @ jacobian(here, kept, observations)
     rest = rows @ (observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0])
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
-    fixed_terms = tuple(term for term in fixed_terms if term.kind in kinds)
+    fixed_terms = candidates(robot, kinds)
     parts = [part for seed in SEEDS for part in parts_of(observations.row_values, seed)]
     ripples = "ripple" in kinds and not (observations.touched >= 0).any()
     search = _RippleSearch(here, observations) if ripples else None
@@ -204,9 +205,9 @@ def choose_terms(
         by_gain = sorted((trial for trial in trials if trial.probability <= SURE), key=lambda trial: trial.rest)
         outcome = next((found for trial in by_gain if (found := trial.outcome(before)).verdict == "taken"), None)
         if outcome is not None:
-            taken[JointTerm(outcome.kind, outcome.joint, outcome.turns)] = outcome
+            taken[JointTerm(outcome.kind, outcome.joint, outcome.turns, outcome.by)] = outcome
         elif (needless := _needless(linear, used, list(taken), count)) is not None:
-            dropped[JointTerm(needless.kind, needless.joint, needless.turns)] = needless
+            dropped[JointTerm(needless.kind, needless.joint, needless.turns, needless.by)] = needless
             taken = {term: each for term, each in taken.items() if term not in dropped}
         else:
             others = (trial.outcome(before) for trial in trials)
@@ -249,9 +250,8 @@ class _Trial:
             verdict = "not_lower"
         elif wrong_way(term, self._amounts):
             verdict = "wrong_way"
-        return TriedTerm(
-            term.kind, term.joint, float(change[0]), float(change[1]), self.probability, verdict, term.turns
-        )
+        near, far = change.tolist()
+        return TriedTerm(term.kind, term.joint, near, far, self.probability, verdict, term.turns, term.by)
 
 
 class _RippleSearch:

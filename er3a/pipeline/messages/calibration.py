@@ -23,6 +23,7 @@ TERMS = {
     "sag": N_("sag under a load"),
     "weight": N_("sag under its own weight"),
     "ripple": N_("{turns} times a turn"),
+    "coupling": N_("coupled to J{by}"),
 }
 KINDS = {"place": N_("place"), "plane": N_("plane"), "pair": N_("pair"), "bar": N_("bar")}
 VERDICTS = {
@@ -176,8 +177,8 @@ def file_text(found: Calibration) -> str | None:
     if found.beyond is None or found.left_out is None or found.beyond.left_out is None:
         return None
     return tr(
-        "A robot file can hold ratios of joints, as its coupling, and no other terms beyond the table: at poses left "
-        "out it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm.",
+        "A robot file can hold ratios and couplings of joints, as its coupling, and no other terms beyond the table: "
+        "at poses left out it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm.",
         table=found.left_out.mean_mm,
         model=found.beyond.left_out.mean_mm,
     )
@@ -190,7 +191,7 @@ def term_name(term: TriedTerm | TermEstimate) -> str:
 
 def term_kind(term: TriedTerm | TermEstimate) -> str:
     """Such as once a turn."""
-    return tr(TERMS[term.kind], turns=term.turns) if term.turns else tr(TERMS[term.kind])
+    return tr(TERMS[term.kind], turns=term.turns, by=term.by) if term.turns or term.by else tr(TERMS[term.kind])
 
 
 def _entry_lines(estimates: Sequence[Estimate]) -> list[str]:
@@ -257,7 +258,9 @@ def _beyond_lines(found: Beyond) -> list[str]:
         lines.append(f"with terms, {_left_out_line(found.left_out)}")
     if found.residuals:
         lines.append(f"with terms, {_residual_line(found.residuals)}")
-    lines.append("all terms are in --json and in found.forward(q) in Python; a robot file holds ratios alone")
+    lines.append(
+        "all terms are in --json and in found.forward(q) in Python; a robot file holds ratios and couplings alone"
+    )
     return lines
 
 
