@@ -14,16 +14,21 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 import er3a
-from er3a.calibration.fit import Fit, covariance_by_poses
-from er3a.calibration.observations import Measurement, PointObservations
+from er3a.calibration.calibrate import choose_level
+from er3a.calibration.cross_validation import choose_terms
+from er3a.calibration.fit import Fit, covariance_by_poses, fit
+from er3a.calibration.observations import Measurement, PointObservations, observed
 from er3a.calibration.outcomes import CalibrationError, NotToldApart
+from er3a.calibration.parameters import corrected, coupled
 from er3a.calibration.plan import plan
-from er3a.calibration.terms import JointErrors, JointTerm, candidates
+from er3a.calibration.terms import IN_ROBOT_FILE, JointErrors, JointTerm, candidates
 from er3a.dynamics.arm_model import arm_model
 from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
 from er3a.files.robot_library import load_robot
+from er3a.files.robot_writer import write_robot
 from er3a.geometry.transforms import rot_x, rot_y, translation
+from er3a.kinematics.chain import row_values
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.calibration import bar_texts, held_back_line, idle_texts
 from er3a.pipeline.messages.say import say
@@ -539,3 +544,18 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     assert idle_texts(found) == ["plane lone: 2 poses, 4 or more are needed"]
     alone = [each.correction for each in er3a.calibrate(robot, rows).estimates]
     assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
+
+
+def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(random, tmp_path):
+    """J4 turns a little with J2; the arm's coupling holds it, beside that which it has."""
+    bench = Bench("six", random, {JointTerm("coupling", 4, by=2): [1e-3]})
+    seen = observed(bench.measured(60, 0.01), bench.robot)
+    kept = choose_level(bench.robot, seen).kept
+    here = corrected(bench.robot, kept, fit(bench.robot, kept, seen).amounts)
+    (term,) = choose_terms(bench.robot, here, kept, seen, IN_ROBOT_FILE).terms
+    assert (term.kind, term.joint, term.by) == ("coupling", 4, 2)
+    robot = bench.robot.replace(coupling=np.eye(6) - np.eye(6, k=-1) * [0, 1, 0, 0, 0, 0])  # J3 - J2
+    file, q = coupled(robot, {(4, 2): 1e-3}).replace(name="coupled"), bench.joints(20)
+    write_robot(file, tmp_path / "coupled.yaml")
+    assert row_values(file, q)[:, 3] == pytest.approx(row_values(robot, q) @ [0, 1e-3, 0, 1, 0, 0])
+    assert er3a.forward(load_robot(tmp_path / "coupled.yaml"), q) == pytest.approx(er3a.forward(file, q), abs=1e-12)
