@@ -476,7 +476,7 @@ def test_intervals_rest_on_as_many_degrees_of_freedom_as_two_means_have():
 
 def test_two_poses_at_a_place_count_once(random):
     """An arm of three joints has few poses at a place: corrections, deviation and intervals are those of a fit without
-    er3a to the differences of the two; 45 places are 45 poses more, not 90."""
+    er3a to the differences of the two."""
     a, alpha, d, tool = [0.05, 0.4, 0.35], np.radians([-90, 0, 0]), [0.4, 0.02, 0], [0.03, 0.02, 0.05]
     robot = er3a.Robot.from_dh(a, alpha, d, tool=translation(*tool), lower=[-3.1] * 3, upper=[3.1] * 3)
     truth, q = robot.replace(alpha=alpha + np.array([1e-3, -8e-4, 0]), offset=np.array([0, 2e-3, 0])), []
@@ -518,7 +518,6 @@ def test_two_poses_at_a_place_count_once(random):
     by_places = in_unit * np.sqrt(np.diag(C @ middle @ C))
     np.testing.assert_allclose([e.standard_error for e in found.estimates], by_places, rtol=0.01)
     assert found.left_out.mean_mm == pytest.approx(2 * np.sqrt(2 / np.pi) * deviation, rel=0.15)
-    assert er3a.calibrate(robot, rows[:78]).left_out is None  # 39 places
 
 
 @pytest.mark.parametrize(
@@ -549,7 +548,7 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
 def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(random, tmp_path):
     """J4 turns a little with J2; the arm's coupling holds it, beside that which it has."""
     bench = Bench("six", random, {JointTerm("coupling", 4, by=2): [1e-3]})
-    seen = observed(bench.measured(60, 0.01), bench.robot)
+    seen = observed(bench.measured(130, 0.02), bench.robot)
     kept = choose_level(bench.robot, seen).kept
     here = corrected(bench.robot, kept, fit(bench.robot, kept, seen).amounts)
     (term,) = choose_terms(bench.robot, here, kept, seen, IN_ROBOT_FILE).terms
