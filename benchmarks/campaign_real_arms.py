@@ -18,7 +18,7 @@ PUBLISHED = {"ur5": 0.1549, "wam": 2.9178}
 REPEATABILITY = {"ur5": 0.1, "wam": 2.0}
 SPLITS, SEED = sized(400), 20261123
 TRIED_PARTS = {False: sized(PARTS), True: sized(PARTS // 2)}
-DRAWS = 2000
+DRAWS, DRAWN = 2000, (20, 40)
 MOST_WORST_MM, MOST_MEAN_MM = 0.16, 0.1
 NEAREST = 4
 
@@ -27,6 +27,7 @@ def table() -> str:
     """The evidence as Markdown."""
     found = {name: er3a.calibrate(*load(name)) for name in ARMS}
     runs = {(name, far): unseen(name, far, SEED, parts) for name in ARMS for far, parts in TRIED_PARTS.items()}
+    few, many = (min(count, *(len(runs[name, False].table) for name in ARMS)) for count in DRAWN)
     lines = [
         "# Two real arms",
         "",
@@ -56,27 +57,27 @@ def table() -> str:
         "",
         "## What the robot file holds",
         "",
-        "A robot file holds table, base and tool, and ratios of joints (as its coupling), chosen as terms are, without",
-        "the others. The table alone, and with ratios: mean distance at the poses that it is fitted to, and left out",
-        f"(tenths at random and neighbourhoods); and in what share of {DRAWS} draws the mean over 20 poses is at most",
-        f"{MOST_MEAN_MM} mm.",
+        "A robot file holds table, base and tool, and ratios and couplings of joints (as its coupling), chosen as",
+        "terms are, without the others. The table alone, and with these: mean distance at the poses that it is fitted",
+        "to, and left out (tenths at random and neighbourhoods); and in what share of",
+        f"{DRAWS} draws the mean over {many} poses is at most {MOST_MEAN_MM} mm.",
         "",
-        "| arm | ratios (1/1000) | table alone: fitted | left out | far away "
-        f"| with ratios: fitted | left out | far away | 20 poses <= {MOST_MEAN_MM} |",
+        "| arm | coupling (1/1000) | table alone: fitted | left out | far away "
+        f"| with coupling: fitted | left out | far away | {many} poses <= {MOST_MEAN_MM} |",
         "|---|---|---|---|---|---|---|---|---|",
-        *(_file_row(name, found[name], runs[name, False]) for name in ARMS),
+        *(_file_row(name, found[name], runs[name, False], many) for name in ARMS),
         "",
         "## Are the worst poses outliers?",
         "",
         "If what remains were noise of one size in three coordinates, distances would be as Maxwell's distribution has",
-        "them. Worst of all poses as found and as its median is for noise of that size; the median of the worst of 20",
-        f"and of 40 poses drawn from these, and how often it is at most {MOST_WORST_MM} mm in {DRAWS} draws; of the 10",
-        "worst poses how many are among the 10 worst by the other models (robot file, plain fit).",
+        "them. Worst of all poses as found and as its median is for noise of that size; the median of the worst of",
+        f"{few} and of {many} poses drawn from these, and how often it is at most {MOST_WORST_MM} mm in {DRAWS} draws;",
+        "of the 10 worst poses how many are among the 10 worst by the other models (robot file, plain fit).",
         "",
-        f"| arm | model | poses | worst | worst by noise | of 20 | <= {MOST_WORST_MM} | of 40 | <= {MOST_WORST_MM} "
-        "| 10 worst: robot file | plain fit |",
+        f"| arm | model | poses | worst | worst by noise | of {few} | <= {MOST_WORST_MM} | of {many} "
+        f"| <= {MOST_WORST_MM} | 10 worst: robot file | plain fit |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
-        *(line for name in ARMS for line in _worst_rows(name, runs[name, False])),
+        *(line for name in ARMS for line in _worst_rows(name, runs[name, False], (few, many))),
         "",
         "The pose that is worst with terms:",
         "",
@@ -150,7 +151,7 @@ def table() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _worst_rows(name: str, run: Unseen) -> list[str]:
+def _worst_rows(name: str, run: Unseen, sizes: tuple[int, ...]) -> list[str]:
     """Whether the greatest distances are those that noise of the same size would have."""
     random = np.random.default_rng(SEED)
     models = {"plain fit": run.plain, "robot file": run.table, "with terms": run.model}
@@ -159,7 +160,6 @@ def _worst_rows(name: str, run: Unseen) -> list[str]:
     for model, distances in models.items():
         size = float(np.sqrt((distances**2).mean() / 3))
         by_noise = size * scipy.stats.maxwell.ppf(0.5 ** (1 / len(distances)))
-        sizes = [min(count, len(distances)) for count in (20, 40)]
         drawn = [[random.choice(distances, count, replace=False).max() for _ in range(DRAWS)] for count in sizes]
         of_few = " | ".join(f"{np.median(w):.3f} | {np.mean(np.array(w) <= MOST_WORST_MM):.1%}" for w in drawn)
         shared = " | ".join(str(len(worst[model] & worst[other])) for other in ("robot file", "plain fit"))
@@ -170,12 +170,12 @@ def _worst_rows(name: str, run: Unseen) -> list[str]:
     return rows
 
 
-def _file_row(name: str, found: Calibration, run: Unseen) -> str:
-    """Errors by the robot's file with and without ratios."""
+def _file_row(name: str, found: Calibration, run: Unseen, count: int) -> str:
+    """Errors by the robot's file with and without a coupling."""
     robot, rows = load(name)
     alone, random = er3a.calibrate(robot, rows, ["ratios"]), np.random.default_rng(SEED)
-    means = [random.choice(run.table, 20, replace=False).mean() for _ in range(DRAWS)]
-    ratios = ", ".join(f"J{each.joint} {each.coefficients[0]:+.2f}" for each in found.ratios)
+    means = [random.choice(run.table, count, replace=False).mean() for _ in range(DRAWS)]
+    ratios = ", ".join(f"{term_name(each)} {each.coefficients[0]:+.2f}" for each in found.ratios)
     errors = [
         f"{each.without_terms().distances_mm(rows).mean():.4f} | {each.left_out.mean_mm:.4f} "
         f"| {each.left_out.far_mean_mm:.4f}"

@@ -98,7 +98,7 @@ def halves(name: str, splits: int, seed: int) -> tuple[tuple[str, ...], NDArray[
         for half in (seen.take(first), seen.take(~first)):
             found = fit(whole, kept, half)
             values.append(found.amounts)
-            covariance, freedom = covariance_by_poses(found, half.pose_of)
+            covariance, freedom = covariance_by_poses(found, half.pose_of[found.last])
             squares.append(scipy.special.stdtrit(freedom, 0.975) ** 2 * np.diag(covariance))
         inside[split] = np.abs(values[0] - values[1]) <= np.sqrt(squares[0] + squares[1])
     return tuple(parameter.name for parameter in kept), inside

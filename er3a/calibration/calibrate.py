@@ -4,7 +4,7 @@ Base and tool are estimated with the table's entries where points were measured,
 base and a reflector is not where the drawing has it. Only parameters that the measurements can tell apart are
 estimated; the others keep the table's values. Errors of joints that no table holds are estimated beside it where they
 lower the error at poses left out (:mod:`er3a.calibration.cross_validation`). Of these the robot's file can hold the
-ratios of joints, as its coupling; the table that goes there is fitted with these alone.
+ratios of joints, and what couples them, as its coupling; the table that goes there is fitted with these alone.
 """
 
 from __future__ import annotations
@@ -41,12 +41,13 @@ from er3a.calibration.fit import (
     subspace,
     without_scale,
 )
-from er3a.calibration.observations import Measurement, Observations, PointObservations, observed, spread
+from er3a.calibration.observations import Measurement, Observations, PointObservations, Touched, observed, spread
 from er3a.calibration.outcomes import (
     CalibrationError,
     FixedName,
     LevelName,
     MorePositions,
+    MoreTouches,
     NoPositions,
     PlacementName,
 )
@@ -54,13 +55,13 @@ from er3a.calibration.parameters import (
     LEVELS,
     Parameter,
     corrected,
+    coupled,
     parameters_of,
     placements_of,
-    with_ratios,
 )
-from er3a.calibration.plan import d_optimal
+from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
-from er3a.calibration.terms import JointErrors, TermKind, effects, places_of
+from er3a.calibration.terms import IN_ROBOT_FILE, JointErrors, TermKind, effects, places_of
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import frames_of, tables_of
@@ -96,7 +97,7 @@ class Level:
     name: LevelName
     parameters: tuple[Parameter, ...]
     subspace: Subspace
-    more: MorePositions | None
+    more: MorePositions | MoreTouches | None
     scale: Parameter | None = None
 
     @property
@@ -121,19 +122,22 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     """
     if not len(observations):
         raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
-    rich = observations.rich(robot)
     placed = placements_of(observations.free)
     scale = scale_of(robot, observations) if isinstance(observations, PointObservations) else None
     left = left_of_touched(robot, observations)
-    more: list[MorePositions] = []
+    spare = len(observations) - getattr(observations, "dropped", 0)
+    rich = _rich(robot, observations, spare)
+    more: list[MorePositions | MoreTouches] = []
     for name in LEVELS[::-1]:
         for first in (placed, ()) if placed else ((),):
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
-            here, best = (subspace(robot, parameters, seen, left) for seen in (observations, rich))
-            spare = len(observations) - len(here.kept) - getattr(observations, "dropped", 0)
-            if len(best.kept) == len(here.kept) and spare > 0:
-                return Level(name, parameters, here, more[-1] if more else None, scale)
-            more.append(_what_more(robot, name, parameters, (here, best), observations))
+            here = subspace(robot, parameters, observations, left)
+            best = subspace(robot, parameters, rich, left) if rich else here
+            settled = len(best.kept) <= len(here.kept)
+            if not settled or spare <= len(here.kept):
+                more.append(_what_more(robot, name, parameters, (here, best), observations))
+            if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept):
+                return Level(name, parameters, here, more[0] if more else None, scale)
     problem = f"{len(observations)} coordinates determine too little; positions to be added: {more[-1].least} at least"
     raise CalibrationError(more[-1], problem)
 
@@ -144,9 +148,11 @@ def _what_more(
     parameters: tuple[Parameter, ...],
     subspaces: tuple[Subspace, Subspace],
     observations: Observations,
-) -> MorePositions:
+) -> MorePositions | MoreTouches:
     here, best = subspaces
     lacking = len(best.kept) - len(here.kept)
+    if isinstance(observations, PointObservations) and observations.all_touched:
+        return _what_touches(len(here.kept), max(len(best.kept), len(here.kept)), observations)
     return MorePositions(
         coordinates=len(observations),
         poses=observations.poses,
@@ -157,6 +163,25 @@ def _what_more(
         entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
         examples_deg=_examples(robot, [parameters[k] for k in best.kept], observations),
     )
+
+
+def _what_touches(settled: int, best: int, observations: PointObservations) -> MoreTouches:
+    """How many poses at each place, for ``best`` of the numbers to be settled, with one to spare."""
+    things = observations.things()
+    numbers = sum(each.numbers for each in things)
+    least, each = max(best - settled, best + 1 - numbers), []
+    for kind in dict.fromkeys(thing.kind for thing in things):
+        own = [thing for thing in things if thing.kind == kind]
+        whole = least + sum(thing.numbers for thing in own)
+        each.append((kind, len(own), max(thing.unknown for thing in own) - (-whole // (own[0].coordinates * len(own)))))
+    return MoreTouches(observations.poses, numbers, settled, best, least, tuple(each))
+
+
+def _rich(robot: Robot, observations: Observations, spare: int) -> Observations | None:
+    """The same points all over the joint range; None where touched ones are so many that they settle all they can."""
+    if not (isinstance(observations, PointObservations) and observations.all_touched):
+        return observations.rich(robot)
+    return touches(robot, observations) if spare < len(parameters_of(robot, "all_entries")) else None
 
 
 def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -> tuple[Pose, ...]:
@@ -224,7 +249,7 @@ class TermEstimate:
     Attributes
     ----------
     coefficients, standard_errors : one for a ratio and for sag; else of sine and cosine
-    turns : how often a ripple returns in a turn
+    turns : how often a ripple returns in a turn; by : the joint that it is coupled to
     """
 
     kind: TermKind
@@ -232,6 +257,7 @@ class TermEstimate:
     coefficients: tuple[float, ...]
     standard_errors: tuple[float, ...]
     turns: int = 0
+    by: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,10 +290,10 @@ class Calibration(ByValue, Displayed):
 
     Attributes
     ----------
-    robot : with the corrected table, base and tool, the best without terms but for ratios, which are its coupling
+    robot : with the corrected table, base and tool, the best without terms but for those of its coupling
     level : which entries were estimated
     estimates : one per identifiable entry; correlation : (k, k), of their errors
-    ratios : of joints, where poses left out are met better with them
+    ratios : of joints, and couplings, where poses left out are met better with them
     held : why the other entries of the level keep their values
     singular_values : of the scaled Jacobian (standard deviations per mm or mrad), descending
     coordinates, poses : how many measured coordinates at how many poses
@@ -275,6 +301,7 @@ class Calibration(ByValue, Displayed):
     scatter : root mean square of what remains, in standard deviations, per degree of freedom: near 1 if table and
         stated deviations are right; 1 if the deviation was estimated
     more : what it takes to estimate more entries; None if all are estimated
+    idle : what was touched at too few poses to say anything
     deviation_mm : standard deviation of a coordinate, estimated from what remains; None if it was stated
     outliers : measurements that were set aside
     bars : ball bars of unknown length, by the table alone
@@ -296,11 +323,12 @@ class Calibration(ByValue, Displayed):
     rms_before_mm: float
     rms_after_mm: float
     scatter: float
-    more: outcomes.MorePositions | None
+    more: MorePositions | MoreTouches | None
     deviation_mm: float | None = None
     outliers: tuple[Outlier, ...] = ()
     ratios: tuple[TermEstimate, ...] = ()
     bars: tuple[BarLength, ...] = ()
+    idle: tuple[Touched, ...] = ()
     left_out: HeldOutErrors | None = None
     residuals: ResidualStructure | None = None
     tried: tuple[TriedTerm, ...] = ()
@@ -473,11 +501,13 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
     rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
     kept, deviation, here = found.kept, observations.deviation_mm, corrected(robot, found.kept, found.amounts)
     bars: tuple[BarLength, ...] = ()
+    idle: tuple[Touched, ...] = ()
     if isinstance(observations, PointObservations):
+        idle = tuple(each for each in observations.things() if not each.numbers)
         errors = JointErrors(robot, found.terms, found.coefficients)
         bars = bar_lengths(here, errors, kept, observations, covariance, quantiles)
     return Calibration(
-        robot=_with_ratios(here, found),
+        robot=coupled(here, {(t.joint, t.by or t.joint): float(c) for t, c in zip(found.terms, found.coefficients)}),
         level=level.name,
         estimates=_estimates(robot, found, error, quantiles),
         correlation=correlation,
@@ -492,6 +522,7 @@ def _result(robot: Robot, level: Level, observations: Observations, found: Fit) 
         scatter=found.scatter,
         more=level.more,
         bars=bars,
+        idle=idle,
     )
 
 
@@ -499,7 +530,7 @@ def _covariance(observations: Observations, found: Fit) -> tuple[Reals, Reals]:
     """By the stated deviations; where none was stated, by what remains at each pose; and half-widths (k + c,) of 95 %
     intervals in standard errors."""
     if isinstance(observations, PointObservations) and not observations.deviation_known:
-        covariance, freedom = covariance_by_poses(found, observations.pose_of)
+        covariance, freedom = covariance_by_poses(found, observations.pose_of[found.last])
         return covariance, np.asarray(scipy.special.stdtrit(freedom, 0.975))
     return found.covariance, np.full(found.J.shape[1], INTERVAL_95)
 
@@ -535,11 +566,6 @@ class _Model:
         return off
 
 
-def _with_ratios(robot: Robot, found: Fit) -> Robot:
-    own = zip(found.terms, places_of(found.terms))
-    return with_ratios(robot, {t.joint: float(found.coefficients[at[0]]) for t, at in own if t.kind == "ratio"})
-
-
 def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> _Model:
     level = choose_level(robot, observations)
     table = fit(robot, level.kept, observations)
@@ -550,7 +576,7 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
     choice = choose_terms(robot, here, table.kept, observations)
     whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
     if choice.terms and free_ratios:
-        ratios = choose_terms(robot, here, table.kept, observations, ("ratio",)).terms
+        ratios = choose_terms(robot, here, table.kept, observations, IN_ROBOT_FILE).terms
         table = fit(robot, level.kept, observations, ratios) if ratios else table
     return _Model(observations, level, table, choice, whole)
 
@@ -633,15 +659,20 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) 
 
 
 def _left_out(observations: PointObservations, found: Fit) -> HeldOutErrors | None:
-    return left_out(observations, found) if can_leave_out(observations, found.J.shape[1]) else None
+    return left_out(observations, found) if can_leave_out(observations.pose_of[found.last], found.J.shape[1]) else None
 
 
 def _structure(robot: Robot, observations: PointObservations, found: Fit) -> ResidualStructure | None:
-    residuals = np.zeros(observations.seen.shape)
-    residuals[observations.seen] = found.after * observations.deviation_mm
+    """Of what is independent, which is as many as poses minus those that place and planes take to be known."""
+    residuals, known = np.zeros(observations.seen.shape), np.zeros(observations.seen.shape, dtype=bool)
+    where = np.flatnonzero(observations.seen)[found.last]
+    residuals.flat[where], known.flat[where] = found.rest * found.deviation_mm, True
     effect = 1000 * effects(robot, observations.row_values, observations.points(robot))
     effect *= ((observations.touched < 0)[:, None] & observations.seen)[:, None]
-    return structure_of(residuals, observations.row_values, observations.lines, effect)
+    used, columns = known.any(axis=1), known.any(axis=0)
+    off = np.sqrt(np.bincount(observations.pose_of, weights=(found.after * observations.deviation_mm) ** 2))
+    worst = int(observations.lines[off.argmax()]), float(off.max())
+    return structure_of(residuals[used][:, columns], observations.row_values[used], effect[used][..., columns], worst)
 
 
 def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
@@ -653,6 +684,7 @@ def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
             tuple((1000 * found.coefficients[own]).tolist()),
             tuple((1000 * own_error[own]).tolist()),
             term.turns,
+            term.by,
         )
         for term, own in zip(found.terms, places_of(found.terms))
     )

@@ -87,6 +87,7 @@ class TriedTerm:
     probability: float
     verdict: TermVerdict
     turns: int = 0
+    by: int = 0
 
 
 class _Linear:
@@ -144,18 +145,19 @@ class ChosenTerms:
     tried: tuple[TriedTerm, ...]
 
 
-def can_leave_out(observations: PointObservations, numbers: int) -> bool:
-    """Whether there are poses enough to leave some out."""
-    return len(observations.row_values) >= LEAST_POSES and len(observations) >= 2 * numbers
+def can_leave_out(pose_of: Integers, numbers: int) -> bool:
+    """Whether there are poses enough to leave some out; ``pose_of`` (m,) those of independent coordinates."""
+    return len(np.unique(pose_of)) >= LEAST_POSES and len(pose_of) >= 2 * numbers
 
 
 def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
     """What the model of a fit errs by at poses left out; other parts than those that terms are chosen by."""
     parts = parts_of(observations.row_values, seed)
     unknowns = np.r_[found.amounts, found.coefficients]
-    linear = _Linear(found.J, found.J @ unknowns - found.after, len(found.amounts), observations.pose_of, parts)
+    poses, pose_of = np.unique(observations.pose_of[found.last], return_inverse=True)
+    linear = _Linear(found.J, found.J @ unknowns - found.rest, len(found.amounts), poses[pose_of], parts)
     near, far = (
-        np.sqrt(np.bincount(observations.pose_of, weights=(errors * observations.deviation_mm) ** 2))
+        np.sqrt(np.bincount(pose_of, weights=(errors * found.deviation_mm) ** 2))
         for errors in linear.errors(list(range(len(unknowns))))
     )
     return HeldOutErrors(float(near.mean()), float(near.max()), float(far.mean()), float(far.max()))
@@ -178,33 +180,34 @@ def choose_terms(
     """
     fixed_terms, count = candidates(robot), len(kept)
     numbers = count + sum(term.count for term in fixed_terms) + 2 * int((~robot.sliding).sum())
-    if not can_leave_out(observations, 0) or len(observations) < LEAST_SPARE * numbers:
+    rows, last = observations.independent(here)
+    pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm
+    if not can_leave_out(pose_of, 0) or len(last) < LEAST_SPARE * numbers:
         return ChosenTerms((), ())
-    weights = observations.deviation_mm[:, None]
-    J = jacobian(here, kept, observations) / weights
-    rest = (observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0]) / weights[:, 0]
+    J = rows @ jacobian(here, kept, observations)
+    rest = rows @ (observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0])
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
-    fixed_terms = tuple(term for term in fixed_terms if term.kind in kinds)
+    fixed_terms = candidates(robot, kinds)
     parts = [part for seed in SEEDS for part in parts_of(observations.row_values, seed)]
     ripples = "ripple" in kinds and not (observations.touched >= 0).any()
     search = _RippleSearch(here, observations) if ripples else None
     taken: dict[JointTerm, TriedTerm] = {}
     dropped: dict[JointTerm, TriedTerm] = {}
     while True:
-        own = term_jacobian(here, robot, tuple(taken), observations) / weights
+        own = rows @ term_jacobian(here, robot, tuple(taken), observations)
         open_terms = [*fixed_terms, *(search.best(np.hstack([J, own]), rest) if search else [])]
         open_terms = [term for term in open_terms if term not in taken and term not in dropped]
-        more = term_jacobian(here, robot, open_terms, observations) / weights
-        linear = _Linear(np.hstack([J, own, more]), rest, count, observations.pose_of, parts)
+        more = rows @ term_jacobian(here, robot, open_terms, observations)
+        linear = _Linear(np.hstack([J, own, more]), rest, count, pose_of, parts)
         used, places = list(range(count + own.shape[1])), places_of(open_terms, count + own.shape[1])
         trials = [_Trial(linear, used, *pair) for pair in zip(open_terms, places)]
         before = linear.squares(used)
         by_gain = sorted((trial for trial in trials if trial.probability <= SURE), key=lambda trial: trial.rest)
         outcome = next((found for trial in by_gain if (found := trial.outcome(before)).verdict == "taken"), None)
         if outcome is not None:
-            taken[JointTerm(outcome.kind, outcome.joint, outcome.turns)] = outcome
+            taken[JointTerm(outcome.kind, outcome.joint, outcome.turns, outcome.by)] = outcome
         elif (needless := _needless(linear, used, list(taken), count)) is not None:
-            dropped[JointTerm(needless.kind, needless.joint, needless.turns)] = needless
+            dropped[JointTerm(needless.kind, needless.joint, needless.turns, needless.by)] = needless
             taken = {term: each for term, each in taken.items() if term not in dropped}
         else:
             others = (trial.outcome(before) for trial in trials)
@@ -247,9 +250,8 @@ class _Trial:
             verdict = "not_lower"
         elif wrong_way(term, self._amounts):
             verdict = "wrong_way"
-        return TriedTerm(
-            term.kind, term.joint, float(change[0]), float(change[1]), self.probability, verdict, term.turns
-        )
+        near, far = change.tolist()
+        return TriedTerm(term.kind, term.joint, near, far, self.probability, verdict, term.turns, term.by)
 
 
 class _RippleSearch:

@@ -43,9 +43,9 @@ from er3a.robots.robot import Robot
 STEP = 1e-5
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
-STEPS = 30
+STEPS, MOST_STEPS = 30, 100
 SMALL_STEP = 1e-12  # m and rad
-SMALL_CHANGE = 1e-6  # of the weighted differences, of measured points
+SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
 HALVINGS = 12
 LEAST_OWN = 1e-9
 CLEAR = 10.0
@@ -93,11 +93,12 @@ def subspace(
     ----------
     left : of a point that touches something, in standard deviations; what the table leaves, unless given
     """
-    J = SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None]
+    rows = observations.independent(robot)[0]
+    J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
     norms = np.linalg.norm(J, axis=0)
     left = left_of_touched(robot, observations) if left is None else left
     turned = SCALE * left * len(J) ** 0.5
-    least = max(NO_EFFECT * norms.max(), turned / LEVER)
+    least = max(NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm), NO_EFFECT * norms.max(), turned / LEVER)
     kept: list[int] = []
     held: list[Held] = []
     basis: Reals = np.empty((len(J), 0))
@@ -174,8 +175,9 @@ class Fit:
     kept, terms : what was fitted
     amounts : (k,), added to what the robot has, in m and rad; coefficients : (c,), of the terms
     before, after : (n,), differences to the measurements in standard deviations
-    J : (n, k + c), weighted derivatives
-    dropped : numbers of places and planes that have dropped out
+    J, rest : (m, k + c) and (m,), derivatives and differences of what is independent of places, planes and sockets
+        that nobody knows, in standard deviations of it, ``deviation_mm`` (m,)
+    last : (m,), the last of the n observed values that it is made of
     """
 
     kept: tuple[Parameter, ...]
@@ -185,12 +187,14 @@ class Fit:
     before: Reals
     after: Reals
     J: Reals
-    dropped: int = 0
+    rest: Reals
+    deviation_mm: Reals
+    last: Integers
 
     @property
     def freedom(self) -> int:
         """Degrees of freedom of what remains."""
-        return max(int(len(self.after) - self.J.shape[1] - self.dropped), 1)
+        return max(len(self.rest) - self.J.shape[1], 1)
 
     @property
     def covariance(self) -> Reals:
@@ -203,7 +207,7 @@ class Fit:
     @property
     def scatter(self) -> float:
         """Root mean square of what remains, in standard deviations, per degree of freedom."""
-        return float(np.sqrt((self.after @ self.after) / self.freedom))
+        return float(np.sqrt((self.rest @ self.rest) / self.freedom))
 
 
 def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
@@ -224,7 +228,7 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
         J = found.J[rows]  # (poses, count, k + c)
         size, axes = np.linalg.eigh(np.eye(count) - J @ C @ J.swapaxes(1, 2))
         weight = (axes / np.sqrt(np.maximum(size, LEAST_OWN))[:, None]) @ axes.swapaxes(1, 2)
-        push = (J.swapaxes(1, 2) @ weight @ found.after[rows][..., None])[..., 0]
+        push = (J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0]
         middle += push.T @ push
         shares = weight @ J @ C
         sizes.append((shares**2).sum(axis=1))
@@ -320,7 +324,7 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
     unknowns, here = np.zeros(k + len(prior)), robot
     rest = weighted(here, unknowns[k:])
     before = rest[:n]
-    for _ in range(STEPS):
+    for number in range(MOST_STEPS):
         J = slopes(here, unknowns[k:])
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
@@ -332,13 +336,17 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
                 break
             step = step / 2
         unknowns, rest = trial, new
-        still = isinstance(observations, PointObservations) and gain < SMALL_CHANGE * np.linalg.norm(rest)
+        small = SMALL_CHANGE if number < STEPS else SLOW_CHANGE
+        still = isinstance(observations, PointObservations) and gain < small * np.linalg.norm(rest)
         if still or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
-            dropped = observations.dropped if isinstance(observations, PointObservations) else 0
-            return Fit(kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], J[:n], dropped)
+            rows, last = with_errors(unknowns[k:]).independent(here)
+            own = np.sqrt(rows**2 @ deviation**2)
+            return Fit(
+                kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], rows @ J[:n], rows @ rest[:n], own, last
+            )
     rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
     raise CalibrationError(
-        NoCorrectionFits(STEPS, rest_mm),
-        f"no corrections make the table fit: after {STEPS} steps the positions are still {rest_mm:.3g} mm off. The "
-        "table has a gross fault or is another arm's; er3a.diagnose names single faults",
+        NoCorrectionFits(MOST_STEPS, rest_mm),
+        f"no corrections make the table fit: after {MOST_STEPS} steps the positions are still {rest_mm:.3g} mm off. "
+        "The table has a gross fault or is another arm's; er3a.diagnose names single faults",
     )

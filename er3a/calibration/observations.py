@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import scipy.sparse
 
 from er3a.calibration.outcomes import FixedName, PlacementName
 from er3a.calibration.parameters import DEPENDENT, MM, Parameter, moved, placed
@@ -123,9 +124,40 @@ class QuantityObservations:
         """The flange at poses."""
         return self._of(tuple(PointCoordinate(pose, "flange", c) for pose in poses for c in COORDINATES))
 
+    def independent(self, _robot: Robot) -> tuple[scipy.sparse.csr_array, Integers]:
+        """As of :class:`PointObservations`: each alone."""
+        every = np.arange(len(self))
+        return scipy.sparse.csr_array((np.ones(len(every)), (every, every))), every
+
     def _of(self, quantities: tuple[Quantity, ...]) -> QuantityObservations:
         deviation = np.full(len(quantities), np.median(self.deviation_mm))
         return QuantityObservations(quantities, np.zeros(len(quantities)), deviation)
+
+
+@dataclass(frozen=True)
+class Touched:
+    """A place, plane, pair or bar.
+
+    Attributes
+    ----------
+    poses : at which it is touched; a pair's two are one
+    unknown : how many of these say nothing, because nobody knows where it is
+    """
+
+    kind: TouchKind
+    name: str
+    poses: int
+    unknown: int
+
+    @property
+    def numbers(self) -> int:
+        """How many independent numbers its poses give."""
+        return self.coordinates * max(self.poses - self.unknown, 0)
+
+    @property
+    def coordinates(self) -> int:
+        """How many numbers one more pose gives."""
+        return 3 if self.kind == "place" else 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,25 +206,44 @@ class PointObservations:
         return [
             (self.names[self.touched[rows[0]]], self.take(np.isin(np.arange(len(self.touched)), rows)))
             for kind, rows in self.groups()
-            if kind == "bar" and not self._lengths_mm(rows).any()
+            if kind == "bar" and not self.lengths_mm(rows).any()
         ]
 
     @property
+    def all_touched(self) -> bool:
+        """Whether no coordinates were measured."""
+        return bool((self.touched >= 0).all())
+
+    @property
     def dropped(self) -> int:
-        """How many numbers of places, planes and bars have dropped out."""
-        return sum(
-            0 if kind == "pair" else 3 + (kind == "bar" and not self._lengths_mm(rows).any())
+        """How many numbers of places, planes and bars drop out, at most as many as there are of them."""
+        return sum(each.coordinates * min(each.poses, each.unknown) for each in self.things())
+
+    def things(self) -> list[Touched]:
+        """What is touched, and how often; the poses of a pair are one."""
+        return [
+            Touched(
+                kind,
+                self.names[self.touched[rows[0]]],
+                len(self.seen[rows, 0].nonzero()[0]),
+                self._unknowns(kind, rows),
+            )
             for kind, rows in self.groups()
-        )
+        ]
+
+    def _unknowns(self, kind: TouchKind, rows: Integers) -> int:
+        """How many numbers of each coordinate drop out: how many poses say nothing."""
+        bar = 3 + (not self.lengths_mm(rows).any())
+        return {"place": 1, "plane": 3, "pair": 0, "bar": bar}[kind]
 
     @property
     def has_scale(self) -> bool:
         """Whether coordinates or lengths were measured, which set the scale of the arm."""
         return bool((self.touched < 0).any()) or any(
-            kind in ("pair", "bar") and self._lengths_mm(rows).any() for kind, rows in self.groups()
+            kind in ("pair", "bar") and self.lengths_mm(rows).any() for kind, rows in self.groups()
         )
 
-    def _lengths_mm(self, rows: Integers) -> Reals:
+    def lengths_mm(self, rows: Integers) -> Reals:
         """Measured lengths of a pair or bar; 0 if they are unknown."""
         lengths = np.zeros(self.seen.shape)
         lengths[self.seen] = self.values_mm
@@ -209,11 +260,11 @@ class PointObservations:
             if kind == "place":
                 found[rows] = own - own.mean(axis=0)
             elif kind == "plane":
-                found[rows, 0] = _off_plane(own, own)
+                found[rows, 0] = (own - own.mean(axis=0)) @ _plane(own)[0]
             elif kind == "pair":
                 found[rows, 0] = np.linalg.norm(own[0] - own[-1])
             else:
-                lengths = self._lengths_mm(rows) / MM
+                lengths = self.lengths_mm(rows) / MM
                 found[rows, 0] = np.linalg.norm(own - socket(own, lengths), axis=1)
                 if not lengths.any():
                     found[rows, 0] -= found[rows, 0].mean()
@@ -223,21 +274,52 @@ class PointObservations:
         """By how much small shifts (P, 3) of points ``around`` change what is observed, m."""
         found = shift.copy()
         for kind, rows in self.groups():
-            own, here = shift[rows], around[rows]
-            if kind == "place":
-                found[rows] = own - own.mean(axis=0)
-            elif kind == "plane":
-                found[rows, 0] = _off_plane(own, here)
-            elif kind == "pair":
-                apart = here[0] - here[-1]
-                found[rows, 0] = (own[0] - own[-1]) @ apart / max(float(np.linalg.norm(apart)), LEAST_LENGTH)
-            else:
-                lengths = self._lengths_mm(rows) / MM
-                along = directions(here - socket(here, lengths))[0]
-                basis = along if lengths.any() else np.column_stack([along, np.ones(len(rows))])
-                longer = np.einsum("pi,pi->p", along, own)
-                found[rows, 0] = longer - basis @ np.linalg.lstsq(basis, longer, rcond=None)[0]
+            along, basis = self._dropping(kind, rows, around)
+            own = shift[rows] - shift[rows[::-1]] if kind == "pair" else shift[rows]
+            own = own if kind == "place" else np.einsum("pi,pi->p", along, own)[:, None]
+            found[rows, : own.shape[1]] = own - basis @ np.linalg.lstsq(basis, own, rcond=None)[0]
         return found
+
+    def _dropping(self, kind: TouchKind, rows: Integers, around: Reals) -> tuple[Reals, Reals]:
+        """For points ``around``: the directions (k, 3) in which those of a plane, pair or bar are observed, and what
+        drops out, (k, r), the same for each coordinate of a place."""
+        here, every = around[rows], np.ones((len(rows), 1))
+        if kind == "place":
+            return here, every
+        if kind == "plane":
+            normal, inside = _plane(here)
+            return every * normal, np.hstack([every, inside])
+        if kind == "pair":
+            return directions(here - here[::-1])[0], every[:, :0]
+        along = directions(here - socket(here, self.lengths_mm(rows) / MM))[0]
+        return along, along if self._unknowns(kind, rows) == 3 else np.hstack([along, every])
+
+    def independent(self, robot: Robot) -> tuple[scipy.sparse.csr_array, Integers]:
+        """What is observed without what drops out, in standard deviations, near to a robot's table.
+
+        Returns
+        -------
+        rows : (c, n), orthonormal; they take n observed values to as many as are independent of each other
+        last : (c,), the last of the observed values that each is made of
+        """
+        at, around = np.full(self.seen.shape, -1), self.positions(robot)
+        at[self.seen] = np.arange(len(self))
+        alone = np.flatnonzero((self.touched < 0)[self.pose_of])
+        parts = [(np.arange(len(alone)), alone, np.ones(len(alone)))]
+        last = [alone]
+        for kind, rows in self.groups():
+            basis = self._dropping(kind, rows, around)[1]
+            for every in at[rows].T:
+                own = every[every >= 0]
+                known = _innovations(basis[every >= 0] / self.deviation_mm[own, None])
+                first = sum(len(part) for part in last)
+                parts.append(
+                    (np.repeat(first + np.arange(len(known)), len(own)), np.tile(own, len(known)), known.ravel())
+                )
+                last.append(own[len(own) - len(known) :][::-1])
+        row, column, values = (np.concatenate(part) for part in zip(*parts))
+        latest = np.concatenate(last)
+        return scipy.sparse.csr_array((values, (row, column)), shape=(len(latest), len(self))), latest
 
     @property
     def poses(self) -> int:
@@ -309,9 +391,7 @@ class PointObservations:
         return replace(self, deviation_mm=np.full(len(self), deviation_mm))
 
     def rich(self, robot: Robot) -> PointObservations:
-        """The same points at poses all over the joint range; those that touch something can't be elsewhere."""
-        if (self.touched >= 0).all():
-            return self
+        """The same points, with their coordinates, at poses all over the joint range."""
         points = np.unique(self.on_tool)
         return self._at(robot, np.repeat(np.array(spread(robot)), len(points), axis=0), np.tile(points, RICH_POSES))
 
@@ -340,14 +420,18 @@ class PointObservations:
         )
 
 
-def _off_plane(xyz: Reals, around: Reals) -> Reals:
-    """Distances (P,) of points, or of their shifts, from the plane that fits points ``around`` best, which drops
-    out."""
-    here = around - around.mean(axis=0)
-    axes = np.linalg.svd(here, full_matrices=False)[2]
-    normal = axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
-    across, inside = (xyz - xyz.mean(axis=0)) @ normal, here @ axes[:2].T
-    found: Reals = across - inside @ np.linalg.lstsq(inside, across, rcond=None)[0]
+def _plane(xyz: Reals) -> tuple[Reals, Reals]:
+    """Normal (3,) of the plane that fits points (P, 3) best, and where they are in it, (P, 2)."""
+    here = xyz - xyz.mean(axis=0)
+    axes = np.linalg.svd(np.linalg.qr(here, mode="r"))[2]
+    return axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()]), here @ axes[:2].T
+
+
+def _innovations(basis: Reals) -> Reals:
+    """Orthonormal rows (k - r, k) beside a basis (k, r), each with no part in one more of the last places than the row
+    before it."""
+    outside = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :].T
+    found: Reals = np.linalg.qr(outside[:, ::-1], mode="r")[:, ::-1]
     return found
 
 

@@ -83,6 +83,27 @@ class MorePositions:
 
 
 @dataclass(frozen=True)
+class MoreTouches:
+    """Places, planes, pairs or bars are touched at too few poses.
+
+    Attributes
+    ----------
+    poses, numbers : how many poses there are, and independent numbers that they give
+    determined, determinable : entries that they settle, and that such poses can settle
+    least : how many more numbers it takes
+    each : of each kind how many there are, and how many poses of each it takes if each has as many
+    """
+
+    poses: int
+    numbers: int
+    determined: int
+    determinable: int
+    least: int
+    each: tuple[tuple[str, int, int], ...]
+    code: Literal["more_touches"] = "more_touches"
+
+
+@dataclass(frozen=True)
 class NoCorrectionFits:
     """The steps do not end: the table has a gross fault or is another arm's."""
 
@@ -97,7 +118,7 @@ NotCalibrated = NoPositions | MorePositions | NoCorrectionFits
 class CalibrationError(Er3aError):
     """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
 
-    def __init__(self, finding: NotCalibrated, problem: str):
+    def __init__(self, finding: NotCalibrated | MoreTouches, problem: str):
         self.finding = finding
         super().__init__(problem)
 

@@ -117,13 +117,13 @@ def placed(parameters: Sequence[Parameter], amounts: Reals) -> tuple[Reals, Real
     return S, np.array([by_column.get(column, 0.0) for column in TOOL_COLUMNS])
 
 
-def with_ratios(robot: Robot, errors: Mapping[int, float]) -> Robot:
-    """The robot whose rows (from 1) move by ``1 + error`` times what they are meant to, by its coupling."""
-    factors = np.ones(robot.rows)
-    for row, error in errors.items():
-        factors[row - 1] += error
-    coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-    return robot.replace(coupling=factors[:, None] * coupling) if errors else robot
+def coupled(robot: Robot, errors: Mapping[tuple[int, int], float]) -> Robot:
+    """The robot whose rows (from 1) move, for each (row, other), by ``error`` times what the other is meant to move by
+    more than they are meant to, by its coupling."""
+    factors = np.eye(robot.rows)
+    for (row, other), error in errors.items():
+        factors[row - 1, other - 1] += error
+    return robot.replace(coupling=factors if robot.coupling is None else factors @ robot.coupling) if errors else robot
 
 
 def corrected(robot: Robot, parameters: Sequence[Parameter], amounts: Reals) -> Robot:

@@ -26,6 +26,7 @@ from er3a.calibration.observations import (
     TouchKind,
     observed,
     socket,
+    spread,
 )
 from er3a.calibration.outcomes import FixedName, Held
 from er3a.calibration.parameters import Parameter, parameters_of, placements_of
@@ -41,6 +42,7 @@ from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
 CANDIDATES = 256
+FEW = 6
 RIDGE, RELATIVE_RIDGE = 1e-9, 1e-13
 NEWTON_STEPS = 40
 LONGEST_STEP = 0.2  # rad, m
@@ -91,6 +93,7 @@ class Plan:
     proposals : poses, the one that adds most first
     beyond : where these go beyond the measured poses
     widths : of all numbers that are settled with the proposals, for the deviation stated or else 0.1 mm
+    untold : bars of unknown length of which nothing can be said: by the table their points are no ball's
     """
 
     settled: tuple[str, ...]
@@ -99,6 +102,7 @@ class Plan:
     proposals: tuple[Proposal, ...]
     beyond: tuple[OutOfMeasured, ...]
     widths: tuple[Width, ...]
+    untold: tuple[str, ...] = ()
 
 
 ASSUMED_MM = 0.1
@@ -136,6 +140,7 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
         proposals=proposals,
         beyond=_beyond(measurements, proposals),
         widths=tuple(Width(name, units.get(name, "mm"), now.get(name), width) for name, width in new.items()),
+        untold=tuple(name for name, _ in seen.unknown_bars() if f"bar_{name}" not in ever),
     )
 
 
@@ -210,20 +215,47 @@ def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObser
         rows = np.array(
             [k for k, each in enumerate(measurements) if each.touched == touched or (not touched[1] and each.pair)]
         )
-        kind, name = touched
         lengths = np.array([measurements[k].length_mm or 0.0 for k in rows]) / 1000
-        first = own[: len(own) // 2] if kind == "pair" else own
-        around = _points(robot, own[: len(first)], seen)
-        second, size, done = _touching(
-            robot, own[-len(first) :], seen, kind=kind, x=x[rows], lengths=lengths, others=around
-        )
-        for k in np.flatnonzero(done):
-            if kind == "pair":
-                label, length = f"next {len(options) + 1}", 1000 * float(size[k])
-                options.append(tuple(Proposal(_pose(robot, each[k]), kind, label, length) for each in (first, second)))
-            else:
-                options.append((Proposal(_pose(robot, second[k]), kind, name, 1000 * float(size[k])),))
+        options += _touches(robot, own, seen, touched, x[rows], lengths, len(options))
     return options
+
+
+def _touches(
+    robot: Robot,
+    q: Reals,
+    seen: PointObservations,
+    touched: tuple[TouchKind, str],
+    x: Reals,
+    lengths: Reals,
+    known: int = 0,
+) -> list[tuple[Proposal, ...]]:
+    """What joint values near to q (N, n) touch of what points x (P, 3) have touched; ``known`` options have names."""
+    kind, name = touched
+    first = q[: len(q) // 2] if kind == "pair" else q
+    around = _points(robot, first, seen)
+    second, size, done = _touching(robot, q[-len(first) :], seen, kind=kind, x=x, lengths=lengths, others=around)
+    found: list[tuple[Proposal, ...]] = []
+    for k in np.flatnonzero(done):
+        length = 1000 * float(size[k])
+        if kind == "pair":
+            label = f"next {known + len(found) + 1}"
+            found.append(tuple(Proposal(_pose(robot, each[k]), kind, label, length) for each in (first, second)))
+        else:
+            found.append((Proposal(_pose(robot, second[k]), kind, name, length),))
+    return found
+
+
+def touches(robot: Robot, seen: PointObservations) -> PointObservations:
+    """Touches all over the joint range of the first few things that are touched, as they would be by the table."""
+    x, q, new = seen.positions(robot), meant(robot, np.array(spread(robot))), []
+    point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
+    for thing, (_, rows) in list(zip(seen.things(), seen.groups()))[:FEW]:
+        lengths = seen.lengths_mm(rows) / 1000
+        for option in _touches(robot, q, seen, (thing.kind, thing.name), x[rows], lengths, len(new)):
+            new += [_as_measured(each, point, bool(lengths.any())) for each in option]
+    found = observed(new, robot, [name for name in PLACEMENTS if name not in seen.free])
+    assert isinstance(found, PointObservations)
+    return found.with_deviation(float(np.median(seen.deviation_mm)))
 
 
 def _touching(

@@ -70,13 +70,14 @@ class ResidualStructure:
 
 
 def structure_of(
-    residuals_mm: Reals, row_values: Reals, lines: Integers, effects_mm: Reals
+    residuals_mm: Reals, row_values: Reals, effects_mm: Reals, worst: tuple[int, float]
 ) -> ResidualStructure | None:
-    """Structure of residuals (P, 3), mm, at poses (P, m); None of fewer than 40.
+    """Structure of residuals (P, c), mm, at poses (P, m); None of fewer than 40.
 
     Parameters
     ----------
-    effects_mm : (P, m, 3), how the measured point moves with what the rows move by, mm per rad or m
+    effects_mm : (P, m, c), how the measured point moves with what the rows move by, mm per rad or m
+    worst : line of the file with the largest residual, and how large it is, mm
     """
     count = len(residuals_mm)
     if count < LEAST_POSES:
@@ -92,7 +93,6 @@ def structure_of(
     every = tuple(min(1.0, own * len(shares)) for _, own in shares)
     plays = [_play(residuals_mm, row_values[:, k], effects_mm[:, k]) for k in range(row_values.shape[1])]
     loosest = min(range(len(plays)), key=lambda k: plays[k][1])
-    distance = np.linalg.norm(residuals_mm, axis=1)
     return ResidualStructure(
         neighbours=neighbours,
         neighbours_probability=by_neighbours,
@@ -107,8 +107,8 @@ def structure_of(
         play_share=plays[loosest][0],
         play_probability=min(1.0, plays[loosest][1] * len(plays)),
         play=1000 * plays[loosest][2],
-        worst_row=int(lines[distance.argmax()]),
-        worst_mm=float(distance.max()),
+        worst_row=worst[0],
+        worst_mm=worst[1],
     )
 
 
@@ -131,7 +131,7 @@ def _explained(residuals: Reals, values: Reals) -> tuple[float, float]:
         return 0.0, 1.0
     basis = np.polynomial.legendre.legvander(2 * (values - values.min()) / span - 1, DEGREE)
     left = residuals - basis @ np.linalg.lstsq(basis, residuals, rcond=None)[0]
-    count, numbers = residuals.size, 3 * (DEGREE + 1)
+    count, numbers = residuals.size, residuals.shape[1] * (DEGREE + 1)
     whole, rest = float((residuals**2).sum()), float((left**2).sum())
     ratio = (whole - rest) / numbers / (rest / (count - numbers))
     return max(0.0, 1 - (rest / (count - numbers)) / (whole / count)), float(

@@ -1,6 +1,7 @@
 """Errors of joints that no table holds: of a gear's ratio, once, twice and many times a turn, and sag under a load.
 
-A row that is meant to move by x moves by ``x + sum_k c_k s_k``: ``s = x`` for its ratio, ``(sin kx, cos kx)`` for what
+A row that is meant to move by x moves by ``x + sum_k c_k s_k``: ``s = x`` for its ratio, what another row is meant to
+move by for a coupling to it, ``(sin kx, cos kx)`` for what
 returns k times a turn (eccentric gears and encoders once and twice, teeth many times), and ``-dh/dx`` for sag: the
 torque of a unit weight, by its Jacobian [1]_. h is the height (m) of the measured point, for a load there; or, where
 the robot's file gives masses, that of the centre of mass of its known links, for the arm's own weight. A weight that
@@ -26,8 +27,9 @@ from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
-TermKind = Literal["ratio", "once", "twice", "sag", "weight", "ripple"]
-KINDS: tuple[TermKind, ...] = get_args(TermKind)
+TermKind = Literal["ratio", "once", "twice", "sag", "weight", "ripple", "coupling"]
+KINDS: tuple[TermKind, ...] = get_args(TermKind)[:-1]
+IN_ROBOT_FILE: tuple[TermKind, ...] = ("ratio", "coupling")
 RIPPLES = range(3, 257)
 """How many times a turn an error is looked for; strain wave gears have some 200 a turn."""
 TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma
@@ -35,16 +37,18 @@ TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large
 
 @dataclass(frozen=True)
 class JointTerm:
-    """One kind of error of the joint of one row, from 1; ``turns``: how often a ripple returns in a turn."""
+    """One kind of error of the joint of one row, from 1; ``turns``: how often a ripple returns in a turn; ``by``: the
+    row that it is coupled to."""
 
     kind: TermKind
     joint: int
     turns: int = 0
+    by: int = 0
 
     @property
     def count(self) -> int:
         """How many coefficients it has."""
-        return 1 if self.kind in ("ratio", "sag", "weight") else 2
+        return 2 if self.kind in ("once", "twice", "ripple") else 1
 
     def shapes(self, x: Reals, climb: Reals, own_climb: Reals) -> Reals:
         """(P, count), what the coefficients are multiplied by.
@@ -54,8 +58,8 @@ class JointTerm:
         x : (P, m), what the rows are meant to move by
         climb, own_climb : (P, m), derivative of the measured point's height by it, and of the centre of mass's
         """
-        own = x[:, self.joint - 1]
-        if self.kind == "ratio":
+        own = x[:, (self.by or self.joint) - 1]
+        if self.kind in IN_ROBOT_FILE:
             return own[:, None]
         if self.kind == "sag":
             return -climb[:, [self.joint - 1]]
@@ -65,13 +69,14 @@ class JointTerm:
         return np.column_stack([np.sin(turns * own), np.cos(turns * own)])
 
 
-def candidates(robot: Robot) -> tuple[JointTerm, ...]:
+def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTerm, ...]:
     """The terms that are tried beside ripples; prismatic joints have no turns."""
-    return tuple(
+    joints = range(1, robot.rows + 1) if "coupling" in kinds else ()
+    return tuple(JointTerm("coupling", row, by=by) for row in joints for by in joints if row != by) + tuple(
         JointTerm(kind, row + 1)
-        for kind in KINDS
+        for kind in kinds
         for row in range(robot.rows)
-        if kind != "ripple"
+        if kind not in ("ripple", "coupling")
         and (kind != "weight" or any(each.link > row for each in robot.masses.links))
         and (kind in ("ratio", "sag", "weight") or not robot.sliding[row])
     )

@@ -4,28 +4,37 @@ what is no noise is said."""
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import cycle
 
 import numpy as np
 import pytest
+from scipy.linalg import sqrtm
+from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 import er3a
-from er3a.calibration.fit import Fit, covariance_by_poses
-from er3a.calibration.observations import Measurement, PointObservations
-from er3a.calibration.outcomes import NotToldApart
+from er3a.calibration.calibrate import choose_level
+from er3a.calibration.cross_validation import choose_terms
+from er3a.calibration.fit import Fit, covariance_by_poses, fit
+from er3a.calibration.observations import Measurement, PointObservations, observed
+from er3a.calibration.outcomes import CalibrationError, NotToldApart
+from er3a.calibration.parameters import corrected, coupled
 from er3a.calibration.plan import plan
-from er3a.calibration.terms import JointErrors, JointTerm, candidates
+from er3a.calibration.terms import IN_ROBOT_FILE, JointErrors, JointTerm, candidates
 from er3a.dynamics.arm_model import arm_model
 from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
 from er3a.files.robot_library import load_robot
+from er3a.files.robot_writer import write_robot
 from er3a.geometry.transforms import rot_x, rot_y, translation
+from er3a.kinematics.chain import row_values
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.calibration import bar_texts, held_back_line
+from er3a.pipeline.messages.calibration import bar_texts, held_back_line, idle_texts
+from er3a.pipeline.messages.say import say
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import GRAVITY
-from testing.plain_calibration import distances, measured_arm, plain_fit
+from testing.plain_calibration import MeasuredArm, distances, measured_arm, plain_fit, positions
 from testing.real_arms import MEASUREMENTS, load
 
 TOOL = translation(0.05, 0.02, 0.1)
@@ -456,10 +465,96 @@ def test_intervals_rest_on_as_many_degrees_of_freedom_as_two_means_have():
     J = np.column_stack([np.ones(first + second), np.arange(first + second) < first])
     rest = np.random.default_rng(1).normal(size=(first + second))
     off = rest - J @ np.linalg.lstsq(J, rest, rcond=None)[0]
-    covariance, freedom = covariance_by_poses(
-        Fit((), (), np.zeros(2), np.zeros(0), rest, off, J), np.arange(first + second)
-    )
+    every = np.arange(first + second)
+    found = Fit((), (), np.zeros(2), np.zeros(0), rest, off, J, off, np.ones(len(every)), every)
+    covariance, freedom = covariance_by_poses(found, every)
     variances = rest[:first].var(ddof=1) / first, rest[first:].var(ddof=1) / second
     assert covariance[1, 1] == pytest.approx(sum(variances))
     shares = 1 / (first**2 * (first - 1)), 1 / (second**2 * (second - 1))
     assert freedom == pytest.approx([second - 1, (1 / first + 1 / second) ** 2 / sum(shares)])
+
+
+def test_two_poses_at_a_place_count_once(random):
+    """An arm of three joints has few poses at a place: corrections, deviation and intervals are those of a fit without
+    er3a to the differences of the two."""
+    a, alpha, d, tool = [0.05, 0.4, 0.35], np.radians([-90, 0, 0]), [0.4, 0.02, 0], [0.03, 0.02, 0.05]
+    robot = er3a.Robot.from_dh(a, alpha, d, tool=translation(*tool), lower=[-3.1] * 3, upper=[3.1] * 3)
+    truth, q = robot.replace(alpha=alpha + np.array([1e-3, -8e-4, 0]), offset=np.array([0, 2e-3, 0])), []
+    for one in random.uniform([-3, -1, -1.6], [3, 1, -0.6], (45, 3)):
+        target, other = er3a.forward(truth, one)[:3, 3] + random.normal(0, 3e-5, 3), one * [1, 1, -1]
+        other[1] += 2 * np.arctan2(0.35 * np.sin(one[2]), 0.4 + 0.35 * np.cos(one[2]))
+        for _ in range(20):
+            off = target - er3a.forward(truth, other)[:3, 3]
+            other = other + np.linalg.solve(er3a.jacobian(truth, other)[:3], off)
+        q += [one, other]
+    rows = [
+        Measurement(k, tuple(pose), "tool", (None,) * 3, place=f"p{k // 2}")
+        for k, pose in enumerate(np.degrees(q).tolist())
+    ]
+    found, stated = er3a.calibrate(robot, rows), er3a.calibrate(robot, [replace(r, deviation_mm=0.02) for r in rows])
+    arm = MeasuredArm(1000 * robot.a, robot.alpha, 1000 * robot.d, 1000 * robot.tool[:3, 3], np.array(q), np.empty(0))
+    names = [f"base_{k}" for k in range(6)] + [f"tool_{c}" for c in "xyz"]
+    names += [f"{column}{k}" for column in ("a", "d", "alpha", "beta", "offset") for k in (1, 2, 3)]
+    own = [names.index(each.name) for each in found.estimates]
+
+    def apart(values: np.ndarray) -> np.ndarray:
+        numbers = np.zeros(len(names))
+        numbers[own] = values
+        return np.diff(positions(arm, numbers, arm.q).reshape(-1, 2, 3), axis=1).ravel() / np.sqrt(2)
+
+    plain = least_squares(apart, np.zeros(len(own)), xtol=1e-12, ftol=1e-12)
+    in_unit = np.array([1.0 if each.unit == "mm" else 180 / np.pi / 1000 for each in found.estimates])
+    errors = in_unit * np.sqrt(np.diag(np.linalg.inv(plain.jac.T @ plain.jac)))
+    deviation = np.sqrt(2 * plain.cost / (3 * 45 - len(own)))
+    assert ([e.correction for e in found.estimates] - in_unit * plain.x) / (deviation * errors) == pytest.approx(
+        0, abs=0.01
+    )
+    np.testing.assert_allclose([e.standard_error for e in stated.estimates], 0.02 * errors, rtol=1e-3)
+    assert found.deviation_mm == pytest.approx(deviation, rel=1e-4)
+    C, middle = np.linalg.inv(plain.jac.T @ plain.jac), 0
+    for J, rest in zip(plain.jac.reshape(45, 3, -1), plain.fun.reshape(45, 3)):
+        push = J.T @ np.linalg.inv(sqrtm(np.eye(3) - J @ C @ J.T)) @ rest
+        middle = middle + np.outer(push, push)
+    by_places = in_unit * np.sqrt(np.diag(C @ middle @ C))
+    np.testing.assert_allclose([e.standard_error for e in found.estimates], by_places, rtol=0.01)
+    assert found.left_out.mean_mm == pytest.approx(2 * np.sqrt(2 / np.pi) * deviation, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("kind", "count", "least"), [("place", 1, 3), ("plane", 2, 7), ("bar", 4, 8), ("pair", 2, 5), ("plane", 60, None)]
+)
+def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
+    """A thing that is touched too seldom beside others is named, and changes nothing."""
+    rows = [
+        Measurement(
+            k, tuple(pose), "tool", (None,) * 3, **{kind: "own"}, length_mm=300.0 if kind in ("pair", "bar") else None
+        )
+        for k, pose in enumerate(random.uniform(-30, 30, (count, 6)).tolist())
+    ]
+    robot = load_robot("er3_600")
+    if least:
+        with pytest.raises(CalibrationError) as told:
+            er3a.calibrate(robot, rows)
+        assert told.value.finding.each == ((kind, 1, least),)
+        assert str(least) in say(told.value.finding)
+        return
+    lone = replace(rows[0], plane="lone"), replace(rows[9], plane="lone")
+    found = er3a.calibrate(robot, [*rows, *lone])
+    assert idle_texts(found) == ["plane lone: 2 poses, 4 or more are needed"]
+    alone = [each.correction for each in er3a.calibrate(robot, rows).estimates]
+    assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
+
+
+def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(random, tmp_path):
+    """J4 turns a little with J2; the arm's coupling holds it, beside that which it has."""
+    bench = Bench("six", random, {JointTerm("coupling", 4, by=2): [1e-3]})
+    seen = observed(bench.measured(130, 0.02), bench.robot)
+    kept = choose_level(bench.robot, seen).kept
+    here = corrected(bench.robot, kept, fit(bench.robot, kept, seen).amounts)
+    (term,) = choose_terms(bench.robot, here, kept, seen, IN_ROBOT_FILE).terms
+    assert (term.kind, term.joint, term.by) == ("coupling", 4, 2)
+    robot = bench.robot.replace(coupling=np.eye(6) - np.eye(6, k=-1) * [0, 1, 0, 0, 0, 0])  # J3 - J2
+    file, q = coupled(robot, {(4, 2): 1e-3}).replace(name="coupled"), bench.joints(20)
+    write_robot(file, tmp_path / "coupled.yaml")
+    assert row_values(file, q)[:, 3] == pytest.approx(row_values(robot, q) @ [0, 1e-3, 0, 1, 0, 0])
+    assert er3a.forward(load_robot(tmp_path / "coupled.yaml"), q) == pytest.approx(er3a.forward(file, q), abs=1e-12)

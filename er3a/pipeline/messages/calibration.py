@@ -23,7 +23,9 @@ TERMS = {
     "sag": N_("sag under a load"),
     "weight": N_("sag under its own weight"),
     "ripple": N_("{turns} times a turn"),
+    "coupling": N_("coupled to J{by}"),
 }
+KINDS = {"place": N_("place"), "plane": N_("plane"), "pair": N_("pair"), "bar": N_("bar")}
 VERDICTS = {
     "taken": N_("taken"),
     "not_lower": N_("left: poses left out are not met better"),
@@ -56,6 +58,7 @@ def lines_of(found: Calibration) -> str:
         ),
     ]
     lines += [f"{term_name(each)}: {_coefficients(each)}, in the robot file as its coupling" for each in found.ratios]
+    lines += [f"says nothing: {text}" for text in idle_texts(found)]
     lines += bar_texts(found)
     if found.scatter > MUCH_SCATTER:
         lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
@@ -78,6 +81,10 @@ def plan_lines(found: Plan, robot: Robot) -> str:
     lines = [f"these measurements settle {len(found.settled)} of {able} numbers that such measurements can settle"]
     lines += [f"settled by more poses: {', '.join(found.lacking)}"] if found.lacking else []
     lines += [f"settled by no poses: {say(reason)}" for reason in found.held]
+    lines += [
+        f"bar_{name}: the table is too far off for its points to tell; calibrate first, and plan from the robot file"
+        for name in found.untold
+    ]
     if found.beyond:
         beyond = (
             f"J{each.joint} {'beyond' if each.above else 'below'} {as_text(each.value, '.4g')} {units[each.joint - 1]}"
@@ -104,6 +111,7 @@ def plan_record(found: Plan) -> dict[str, object]:
         "settled": list(found.settled),
         "lacking": list(found.lacking),
         "held": [say(reason) for reason in found.held],
+        "untold": list(found.untold),
         "proposals": [vars(each) for each in found.proposals],
         "beyond": [vars(each) for each in found.beyond],
         "half_widths": [vars(each) for each in found.widths],
@@ -150,13 +158,27 @@ def bar_texts(found: Calibration) -> list[str]:
     ]
 
 
+def idle_texts(found: Calibration) -> list[str]:
+    """What was touched at too few poses."""
+    return [
+        tr(
+            "{kind} {name}: {poses} poses, {least} or more are needed",
+            kind=tr(KINDS[each.kind]),
+            name=each.name,
+            poses=each.poses,
+            least=each.unknown + 1,
+        )
+        for each in found.idle
+    ]
+
+
 def file_text(found: Calibration) -> str | None:
     """What a robot file lacks, and the errors at poses left out without and with it; None if there are no terms."""
     if found.beyond is None or found.left_out is None or found.beyond.left_out is None:
         return None
     return tr(
-        "A robot file can hold ratios of joints, as its coupling, and no other terms beyond the table: at poses left "
-        "out it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm.",
+        "A robot file can hold ratios and couplings of joints, as its coupling, and no other terms beyond the table: "
+        "at poses left out it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm.",
         table=found.left_out.mean_mm,
         model=found.beyond.left_out.mean_mm,
     )
@@ -169,7 +191,7 @@ def term_name(term: TriedTerm | TermEstimate) -> str:
 
 def term_kind(term: TriedTerm | TermEstimate) -> str:
     """Such as once a turn."""
-    return tr(TERMS[term.kind], turns=term.turns) if term.turns else tr(TERMS[term.kind])
+    return tr(TERMS[term.kind], turns=term.turns, by=term.by) if term.turns or term.by else tr(TERMS[term.kind])
 
 
 def _entry_lines(estimates: Sequence[Estimate]) -> list[str]:
@@ -236,7 +258,9 @@ def _beyond_lines(found: Beyond) -> list[str]:
         lines.append(f"with terms, {_left_out_line(found.left_out)}")
     if found.residuals:
         lines.append(f"with terms, {_residual_line(found.residuals)}")
-    lines.append("all terms are in --json and in found.forward(q) in Python; a robot file holds ratios alone")
+    lines.append(
+        "all terms are in --json and in found.forward(q) in Python; a robot file holds ratios and couplings alone"
+    )
     return lines
 
 
@@ -266,6 +290,7 @@ def calibration_record(found: Calibration, others: Sequence[Measurement] = ()) -
         "more": say(found.more) if found.more else None,
         "ratios": [vars(each) for each in found.ratios],
         "bars": [vars(each) for each in found.bars],
+        "idle": [vars(each) for each in found.idle],
         "set_aside": [{"row": each.row, "distance_mm": each.distance_mm} for each in found.outliers],
         "left_out": vars(found.left_out) if found.left_out else None,
         "residuals": _residuals(found.residuals),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from er3a.calibration.outcomes import (
     Misfit,
     MorePositions,
+    MoreTouches,
     NotToldApart,
 )
 from er3a.diagnosis.conclusions import (
@@ -189,6 +190,17 @@ TEXTS = texts(
         ),
         "more_positions#request": "{known}; {needed}. Spread them over all joints, for example {examples}.",
         "more_positions#for_entries": "{needed} for {entries:, }",
+        "more_touches": Plural(
+            "poses",
+            "{count} pose, or {numbers} independent coordinates, determines {determined} of the {determinable} entries "
+            "that such poses can determine; needed are {each}. More of these with fewer poses each do as well",
+            "{count} poses, or {numbers} independent coordinates, determine {determined} of the {determinable} entries "
+            "that such poses can determine; needed are {each}. More of these with fewer poses each do as well",
+        ),
+        "more_touches#place": "{poses} poses or more at each place",
+        "more_touches#plane": "{poses} poses or more in each plane",
+        "more_touches#bar": "{poses} poses or more with each bar",
+        "more_touches#pair": "{pairs} pairs or more",
         "misfit": (
             "Correcting {level} does not make this table fit the positions: {rms_after_mm:.3g} mm of "
             "{rms_before_mm:.3g} mm (root mean square) remain. Calibration can't repair it."
@@ -402,6 +414,12 @@ def _(found: MorePositions) -> str:
         needed = say_as(found, "for_entries", needed=needed)
     poses = [with_unit(f"({', '.join(as_text(angle, 'g') for angle in pose)})", "deg") for pose in found.examples_deg]
     return say_as(found, "request", known=known, needed=needed, examples=_with_and(poses))
+
+
+@say.register
+def _(found: MoreTouches) -> str:
+    each = [say_as(found, kind, poses=poses, pairs=poses * things) for kind, things, poses in found.each]
+    return say_as(found, each=joined(each, ", "))
 
 
 @say.register

@@ -22,7 +22,7 @@ from er3a.files.robot_writer import robot_file, yaml_text
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
-from er3a.pipeline.messages.calibration import VERDICTS, bar_texts, file_text, residual_texts, term_kind
+from er3a.pipeline.messages.calibration import VERDICTS, bar_texts, file_text, idle_texts, residual_texts, term_kind
 from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import bracketed, say
@@ -154,6 +154,7 @@ def _texts(found: Calibration) -> list[str]:
             coordinates=found.coordinates,
             poses=found.poses,
         ),
+        *idle_texts(found),
         *bar_texts(found),
     ]
     if found.more:
