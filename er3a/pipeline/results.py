@@ -150,6 +150,7 @@ LeftOutSubject = Literal[
     "tool",
     "plans",
     "references",
+    "loose_references",
     "table_entries",
     "diagnosis",
     "more_faults",

@@ -74,6 +74,9 @@ TEXTS = texts(
         "left_out.tool": "a tool: none is given, and the flange's centre stands for its tip",
         "left_out.plans": "motions for which the planner found none within its tries; there may be one",
         "left_out.references": "quantities that no reference states, or for which the robot's file gives no value",
+        "left_out.loose_references": (
+            "references whose source leaves so much open that a value taken at random would pass as often as not"
+        ),
         "left_out.table_entries": "entries of the table that independent references don't settle",
         "left_out.diagnosis": "which entry is wrong: diagnosis is for arms whose joints all turn",
         "left_out.more_faults": "tables with more wrong entries than one or two",
