@@ -434,4 +434,6 @@ def programs_of(
             continue
         files, findings = written(robot, each.motion, verdict, language)
         name = program_name(each.name, LONGEST_NAME)
-        yield PathProgram(each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, each.left_out)
+        yield PathProgram(
+            each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, each.left_out
+        )

@@ -283,7 +283,9 @@ def compute(study: Study, name: str) -> model.ValidationResults:
             if turning
             else undeclared_bases(references.checkable)
         )
-        judged, contradictions = checks_of_set(references, read(asked, state), bases, robot.slides, 1000 * size_of(robot))
+        judged, contradictions = checks_of_set(
+            references, read(asked, state), bases, robot.slides, 1000 * size_of(robot)
+        )
         checks += judged
         conflicts += contradictions
     checks += _without_reference(robot, values, checks)
