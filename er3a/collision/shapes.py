@@ -78,7 +78,7 @@ def _uncovered(robot: Robot, link: int) -> bool:
 
 
 def has_bare_tool(robot: Robot) -> bool:
-    """Whether a tool's point lies outside the shapes that the arm's file gives the last link, so that the tool has none.
+    """Whether a tool's point lies outside the shapes that the arm's file gives the last link: the tool has none.
 
     What is inside another link's shape at some joint values is not inside it at others.
     """

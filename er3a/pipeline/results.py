@@ -147,6 +147,7 @@ LeftOutSubject = Literal[
     "targets",
     "turns",
     "carried",
+    "carried_shapes",
     "tool",
     "plans",
     "references",

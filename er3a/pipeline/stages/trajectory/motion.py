@@ -307,8 +307,8 @@ class ListedMotion:
     """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
 
     ``motion`` is None for a path of the tool that an arm of its class can't be made to follow, or not to its end;
-    ``ends`` then says when and why it is not. ``left_out``: lines of its program that no motion is of, and what its file
-    gives beside points and times.
+    ``ends`` then says when and why it is not. ``left_out``: lines of its program that no motion is of, and
+    what its file gives beside points and times.
     """
 
     listed: str

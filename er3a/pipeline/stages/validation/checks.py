@@ -63,7 +63,7 @@ def checks_of_set(
     """Judge a model's values (n,) of the set's checkable references, and list what was set aside and what the set says
     nothing about.
 
-    ``bases`` (n,): what each of these checks rests on; ``slides`` : of each joint of the arm; ``size`` : of the arm, mm.
+    ``bases`` (n,): what each of these checks rests on; ``slides`` : of each joint; ``size`` : of the arm, mm.
     """
     stated = _Stated(references.name, references.checkable, values, bases, size)
     checks = [stated.check(i) for i in range(len(values))]
