@@ -212,6 +212,10 @@ MENDED = {
         krl("$APO.CDIS=80", "LIN_REL {Z 40} C_DIS", "LIN_REL {Y 40}"),
         krl("$APO.CDIS=20", "LIN_REL {Z 40} C_DIS", "LIN_REL {Y 40}"),
     ),
+    "spline_as_line": (
+        krl(AT_HOME, "SPLINE", "SPL {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
+        krl(AT_HOME, "SPLINE", "SLIN {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
+    ),
     "zone_without_size": (RPL.format(**WORDS | {"zone": "wide"}), RPL.format(**WORDS | {"zone": "z1"})),
     "arc_has_no_circle": (
         krl(f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", f"CIRC {{X 420,Y 0,Z 400,{DOWN}}},{{X 440,Y 0,Z 400,{DOWN}}}"),

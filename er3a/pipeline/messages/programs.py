@@ -103,6 +103,7 @@ REMEDIES: dict[str, str] = {
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed before the motion."),
     "zone_without_size": N_("Give the zone's size in mm."),
+    "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
     "load_not_examined": N_(
         "List the program as a path of a study: its stage dynamics then computes torques with this load."
@@ -193,7 +194,9 @@ TEXTS = texts(
         "zone_too_large": "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm",
         "zone_without_size": "the size of the zone {zone} is not known; half of each motion was taken",
         "arc_has_no_circle": "the arc's points do not define a circle",
-        "spline_as_line": "the spline was checked as a straight line from point to point",
+        "spline_as_line": (
+            "the spline was checked as a straight line from point to point; how it bends was not examined"
+        ),
         "external_axes_left_out": "external axes are assumed at rest: {axes:, }",
         "line_not_checked": (
             "the arm has no closed-form inverse: the line was not followed, only its target was checked"
