@@ -59,6 +59,26 @@ def test_a_file_that_is_none_of_ours_is_one_clear_error(tmp_path, name, text, to
     assert name in str(caught.value)
 
 
+PATH = "kind: paths\npaths:\n- {{name: a, title: A, samples: 11, kind: {}}}\n"
+CAMERA = "kind: hand_eye\ntitle: A\nsource: A\nsetup: eye_to_hand\nsamples: away.csv\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PATH.format("table, file: away.csv"),
+        PATH.format("program, program: away.src"),
+        "kind: programs\nprograms:\n- {name: a, title: A, file: away.src}\n",
+        CAMERA,
+    ],
+)
+def test_a_file_that_leads_to_a_missing_one_is_not_in_order(tmp_path, monkeypatch, text):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.yaml").write_text(text)
+    with pytest.raises(InputError, match=r"away\.\w+"):
+        check_file(Path("a.yaml"))
+
+
 def test_a_study_that_names_a_missing_file_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     content = yaml.safe_load((ROOT / "config/small.yaml").read_text())

@@ -78,12 +78,15 @@ def _uncovered(robot: Robot, link: int) -> bool:
 
 
 def has_bare_tool(robot: Robot) -> bool:
-    """Whether a tool's point lies outside the shapes that the arm's file gives, so that the tool itself has none."""
+    """Whether a tool's point lies outside the shapes that the arm's file gives the last link: the tool has none.
+
+    What is inside another link's shape at some joint values is not inside it at others.
+    """
     if not arm_shapes(robot).given or not robot.tool[:3, 3].any():
         return False
     T, last = frames(robot, np.zeros(robot.joints)), robot.rows
     point = (np.linalg.inv(T[last - 1]) @ T[last])[None, :3, 3]
-    return _outside(robot, point, last, {last - 1, last})
+    return _outside(robot, point, last, {last})
 
 
 def _outside(robot: Robot, points: Reals, link: int, beside: set[int]) -> bool:

@@ -47,6 +47,7 @@ LONGEST_S = 3600.0
 MOST_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
 MOST_RAD = 10 * 2 * math.pi
+UNREAD = ("velocities", "accelerations", "effort")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,7 @@ class PathTable:
     joints : (n, joints), rad or m; None for a table of the tool
     sliding : of a table of joints, which of them it gives in mm; None where units don't say, as in ROS
     repeated : (n,) bool, whether a row repeats the point before
+    unread : what else a trajectory of ROS gives at its points, which is not taken
     """
 
     file: Path
@@ -70,6 +72,7 @@ class PathTable:
     joints: Reals | None
     repeated: Flags
     sliding: tuple[bool, ...] | None = ()
+    unread: tuple[str, ...] = ()
 
 
 def read_path_table(path: str | Path) -> PathTable:
@@ -83,9 +86,9 @@ def read_path_table(path: str | Path) -> PathTable:
     """
     path = given_file(Path(path))
     if path.suffix in (".yaml", ".yml", ".json"):
-        at, values = _ros_trajectory(path)
+        at, values, unread = _ros_trajectory(path)
         repeated = _repeated(path, np.abs(np.diff(values, axis=0)).max(axis=1))
-        return PathTable(path, np.arange(1, len(values) + 1), at, None, values, repeated, None)
+        return PathTable(path, np.arange(1, len(values) + 1), at, None, values, repeated, None, unread)
     header = set(read_header(path))
     forms = [form for form, columns in FORMS.items() if header & set(columns)]
     own = _joint_columns(path, header)
@@ -129,8 +132,8 @@ def _repeated(path: Path, size: Reals) -> Flags:
     return repeated
 
 
-def _ros_trajectory(path: Path) -> tuple[Reals, Reals]:
-    """Times (n,) in s and joint values (n, joints) in rad or m of a joint trajectory of ROS."""
+def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
+    """Times (n,) in s, joint values (n, joints) in rad or m, and what is not taken, of a joint trajectory of ROS."""
     content = read_yaml(path)
     body = content.get("joint_trajectory", content)
     names, points = (body.get("joint_names"), body.get("points")) if isinstance(body, dict) else (None, None)
@@ -151,7 +154,7 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals]:
         k = int(np.abs(joints).max(axis=1).argmax())
         problem = f"{np.abs(joints[k]).max():g} rad are more than ten turns"
         raise InputError(path, f"points[{k}].positions", problem, "Write radians, and metres where a joint slides")
-    return times, joints[:, order]
+    return times, joints[:, order], tuple(name for name in UNREAD if any(point.get(name) for point in points))
 
 
 def _joint_order(path: Path, names: list[str]) -> list[int]:
@@ -543,7 +546,7 @@ class TablePath(NamedPath):
             if self.blend_mm is not None:
                 raise source.error("blend_mm", "the table holds joint angles", "Write blend_deg")
             blend = None if self.blend_deg is None else float(self.blend_deg * np.radians(1.0))
-            return commands.JointTableCommand(table.joints[kept], timing, blend, repeated, source=source)
+            return commands.JointTableCommand(table.joints[kept], timing, blend, repeated, table.unread, source=source)
         assert table.poses is not None
         if self.blend_deg is not None:
             raise source.error("blend_deg", "the table holds poses", "Write blend_mm")

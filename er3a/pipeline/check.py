@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import chdir
-from functools import partial
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -51,15 +50,39 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "vision": VisionFile,
 }
 
-_CHECKS: dict[str, Callable[..., object]] = {
+
+def _check_paths(path: Path) -> None:
+    for planned in load_paths(path).paths:
+        if isinstance(planned, TablePath):
+            read_path_table(planned.file)
+        elif isinstance(planned, ProgramPath):
+            read_program(planned.program)
+
+
+def _check_programs(path: Path) -> None:
+    for program in load_programs(path).programs:
+        read_program(program.file)
+
+
+def _check_hand_eye(path: Path) -> None:
+    file = load(HandEyeFile, path)
+    for table in filter(None, (file.samples, file.touched)):
+        check_samples(path.parent / table)
+
+
+def _check_vision(path: Path) -> None:
+    _check_hand_eye(path.parent / load_vision(path).calibration)
+
+
+_CHECKS: dict[str, Callable[[Path], object]] = {
     "study": load_study,
     "robot": load_robot,
     "targets": read_targets,
-    "paths": load_paths,
+    "paths": _check_paths,
     "scene": load_scene,
-    "programs": load_programs,
-    "hand_eye": partial(load, HandEyeFile),
-    "vision": load_vision,
+    "programs": _check_programs,
+    "hand_eye": _check_hand_eye,
+    "vision": _check_vision,
 }
 _WORDS = {
     "robot": "a robot",
@@ -158,13 +181,9 @@ def check_study(path: Path) -> Study:
         sets = [load_references(reference, robot) for reference in robot.references]
         check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
         read_targets(entry.targets)
-        for planned in load_paths(entry.paths).paths:
-            if isinstance(planned, TablePath):
-                read_path_table(planned.file)
-            elif isinstance(planned, ProgramPath):
-                read_program(planned.program)
-        for program in load_programs(entry.programs).programs if entry.programs else ():
-            read_program(program.file)
+        _check_paths(Path(entry.paths))
+        if entry.programs:
+            _check_programs(Path(entry.programs))
         if entry.vision:
             own = load_vision(entry.vision, robot)
             load_hand_eye(Path(entry.vision).parent / own.calibration, robot)

@@ -31,7 +31,7 @@ from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
 from er3a.pipeline.stages.left_out import left_out_of_collisions
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured
-from er3a.pipeline.stages.trajectory.motion import left_out_of_programs, listed_motions
+from er3a.pipeline.stages.trajectory.motion import listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, written
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import ProofRequirements
@@ -426,7 +426,6 @@ def programs_of(
         if each.motion is None:
             yield PathProgram(each.name, each.outcome_unfollowed, None)
             continue
-        rest = left_out_of_programs({each.listed: each.rest})
         verdict = judge(robot, each.motion, USUAL_NEAR, task.limits).verdict
         if collisions(measured(surroundings, each.motion)):
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
@@ -435,4 +434,6 @@ def programs_of(
             continue
         files, findings = written(robot, each.motion, verdict, language)
         name = program_name(each.name, LONGEST_NAME)
-        yield PathProgram(each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, rest)
+        yield PathProgram(
+            each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, each.left_out
+        )

@@ -119,6 +119,7 @@ LeftOutSubject = Literal[
     "program_lines",
     "program_starts",
     "program_rest",
+    "given_rates",
     "outer_axes",
     "controller_ramps",
     "joint_vectors",
@@ -146,9 +147,11 @@ LeftOutSubject = Literal[
     "targets",
     "turns",
     "carried",
+    "carried_shapes",
     "tool",
     "plans",
     "references",
+    "loose_references",
     "table_entries",
     "diagnosis",
     "more_faults",
@@ -184,7 +187,7 @@ LeftOutSubject = Literal[
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
     (
-        *("obstacles", "uncovered_links", "bare_tool", "allowed_contacts", "program_rest"),
+        *("obstacles", "uncovered_links", "bare_tool", "allowed_contacts", "program_rest", "given_rates"),
         *("arm_errors", "objects_out_of_view", "hidden_voids"),
     )
 )

@@ -134,12 +134,14 @@ class JointTableCommand(_Command):
     timing : s in all, or when the points are passed
     blend : rad, over which corners are rounded at most; None for half of the shorter side
     repeated_rows : lines of the table that repeat the point before
+    unread : what else the file gives at the points, which the motion does not follow
     """
 
     points: Reals
     timing: float | Times
     blend: float | None = None
     repeated_rows: tuple[int, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +189,7 @@ class Built:
     q_start : (6,), rad, joints at the start, where they are given
     start_slot : closed-form branch (0..7) to begin on, where one is named
     repeated_rows : lines of the table that repeat the point before
+    unread : what else the table's file gives at its points, which the motion does not follow
     """
 
     joints: JointMove | JointSequence | PlannedMove | None = None
@@ -194,6 +197,7 @@ class Built:
     q_start: Reals | None = None
     start_slot: int | None = None
     repeated_rows: tuple[int, ...] = ()
+    unread: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -226,7 +230,7 @@ def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
         case JointTableCommand():
             sizes = np.abs(np.diff(command.points, axis=0)).max(axis=1)
             joints = joint_sequence(command.points, _blends(sizes, command.blend), command.timing)
-            return Built(joints=joints, repeated_rows=command.repeated_rows)
+            return Built(joints=joints, repeated_rows=command.repeated_rows, unread=command.unread)
         case ToolTableCommand():
             return _tool_table(robot, command)
         case PlanCommand():

@@ -499,9 +499,8 @@ FAILS = frozenset(
 )
 NOTES = frozenset(
     (
-        *("way_not_known", "frame_taken_as_flange", "zone_without_size", "speed_not_given"),
-        *("both_sides_checked", "program_form_inferred", "program_other_encoding", "spline_as_line"),
-        "load_not_examined",
+        *("way_not_known", "frame_taken_as_flange", "speed_not_given", "load_not_examined"),
+        *("both_sides_checked", "program_form_inferred", "program_other_encoding"),
     )
 )
 

@@ -376,6 +376,19 @@ class SectionExtent(Extreme):
         return section_coordinate(T, self.point, self.coordinate)
 
 
+def undecided_from(quantity: Quantity, expected: float, size: float) -> float:
+    """The uncertainty from which on a value taken at random, of those that are plausible, would pass as often as not.
+
+    Plausible are points within ``size`` (mm) of the base along each axis, any angle, and speeds up to twice the stated.
+    """
+    if isinstance(quantity, Speed):
+        return abs(expected) / 2
+    if quantity.unit != "deg":
+        return size / 2
+    half_turn = isinstance(quantity, SegmentAngle) or (isinstance(quantity, AxisAngle) and not quantity.signed)
+    return 45.0 if half_turn else 90.0
+
+
 NotOfArm = Literal["no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns"]
 
 

@@ -590,6 +590,34 @@ def test_a_missing_var_file_too(tmp_path, text, missing):
     assert ("program_data_file_missing" in codes(check(tmp_path, f"{text}\n", "a.pgm"))) == missing
 
 
+@pytest.mark.parametrize("changed", ["tool0.z := 100;", "wobj0.x := 100;"])
+def test_a_frame_that_a_program_of_rpl_changes_is_not_the_one_given(tmp_path, changed):
+    moves = "MJOINT(POINTJ(0,0,0,0,-70,0), v50perc, fine, tool0);\nMLIN({}, v50, fine, tool0, wobj0);\n"
+    moves = moves.format("POINTC(400,0,400,0,0,180)")
+    assert "frame_not_given" not in codes(check(tmp_path, moves, "a.pgm"))
+    assert codes(check(tmp_path, f"{changed}\n{moves}", "a.pgm"))["frame_not_given"][-1] == 3
+
+
+def test_functions_of_rpl_whose_unit_no_source_tells_have_no_value(tmp_path):
+    for angle, known in (("SIN(30)", False), ("ABS(-30)", True), ("SQRT(-30)", False)):
+        (motion,) = motions(tmp_path, f"MJOINT(POINTJ({angle},0,0,0,-70,0), v50perc, fine, tool0);\n", "a.pgm")
+        assert isinstance(motion.target, JointTarget) == known
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "code"),
+    [
+        ("DEF a( )\nSPLINE\nSPL {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}\nENDSPLINE\nEND\n", "a.src", "spline_as_line"),
+        (2 * "MJOINT(POINTJ(5,-10,-10,0,-70,0), v10perc, wide, tool0);\n", "a.pgm", "zone_without_size"),
+    ],
+)
+def test_a_way_whose_course_is_not_known_is_no_pass(tmp_path, text, name, code):
+    """A spline bends, and a corner is cut as far as its zone says, wherever that leads."""
+    found = check(tmp_path, text, name)
+    assert code in codes(found)
+    assert found.level == "caution"
+
+
 def test_motions_with_more_targets_than_they_have_are_not_understood(tmp_path):
     for body in (f"PTP {axes(NEAR)}, {axes(FAR)}", f"{FRAMES}CIRC {pose_text(NEAR)}"):
         assert motions(tmp_path, krl(body), "a.src")[-1].target.reason == "not_understood"

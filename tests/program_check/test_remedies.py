@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
 import pytest
 
+from er3a.collision.pairs import LinkPair
+from er3a.collision.scene import Scene, Sphere
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.programs import PACED, REMEDIES, remedies, remedy, remedy_at
+from er3a.pipeline.messages.programs import PACED, REMEDIES, STAYS_MM, remedies, remedy, remedy_at
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.program_check.program_check_findings import (
     NOTES,
     AcceleratesMoreThanAssumed,
     CheckFinding,
     FasterThanAssumed,
+    JointJumps,
+    MotionCollides,
     ZoneTooLarge,
 )
 from er3a.programs.execution import RunLimits
 from er3a.programs.languages import read_program
+from er3a.robots.robot import CombinedLimit, Envelope
+from testing.arms import scara
 
 ROBOT = load_robot("er3a_c60")
 
@@ -151,6 +159,20 @@ THIRDS = [f"LIN {{A {turn},B 0,C 180}}" for turn in (120, -120, 0)]
 LOOP = ("$ACC.CP=0.2", f"LIN {{X 400,Y 0,Z 400,{DOWN}}}", "LOOP", *THIRDS)
 MOVEJ = "  movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"
 THREAD = "def p():\n  {head} T():\n  " + MOVEJ + "  end\n" + MOVEJ.replace("-0.2", "-0.3") + "  {run}T()\nend\n"
+TURNED = {
+    "robot": load_robot("ur5e").replace(envelopes=[Envelope(k, (0.0,) * 3, (0.0,) * 3, 0.005) for k in range(1, 7)]),
+    "start": np.radians([-160, -26, 42, 139, 169, -55]),
+}
+TIED = {"robot": ROBOT.replace(combined=[CombinedLimit((0, 1, 1, 0, 0, 0), *np.radians([-60, 60]))])}
+CSV = "t_s,q1_deg,q2_deg,q3_mm,q4_deg\n0,0,30,50,0\n4,10,30,{},0\n"
+CORNER = """def a():
+  movej([-0.349, -0.1745, -0.1745, 0, -1.2217, 0], a=1, v=1)
+  movej([0, -0.1745, -0.1745, 0, -1.2217, 0], a=1, v=1, r={})
+  movej([0, -0.698, 0.1745, 0, -1.2217, 0], a=1, v=1)
+end
+"""
+BALL = Scene("ball", (Sphere("ball", transform(np.array([0.46921, -0.09252, 0.41923]), np.zeros(3)), 0.043),))
+DRAWN = ROBOT.replace(sources={**ROBOT.sources, "envelopes": replace(ROBOT.sources["envelopes"], grade="official")})
 MENDED = {
     "target_out_of_reach": (krl(f"PTP {{X 3000,Y 0,Z 400,{DOWN}}}"), krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}")),
     "way_out_of_reach": (krl("LIN {X 3000}"), krl("LIN {X 420}")),
@@ -189,6 +211,10 @@ MENDED = {
     "zone_too_large": (
         krl("$APO.CDIS=80", "LIN_REL {Z 40} C_DIS", "LIN_REL {Y 40}"),
         krl("$APO.CDIS=20", "LIN_REL {Z 40} C_DIS", "LIN_REL {Y 40}"),
+    ),
+    "spline_as_line": (
+        krl(AT_HOME, "SPLINE", "SPL {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
+        krl(AT_HOME, "SPLINE", "SLIN {A1 5,A2 -10,A3 -10,A4 0,A5 -70,A6 0}", "ENDSPLINE"),
     ),
     "zone_without_size": (RPL.format(**WORDS | {"zone": "wide"}), RPL.format(**WORDS | {"zone": "z1"})),
     "arc_has_no_circle": (
@@ -262,10 +288,57 @@ MENDED = {
         (krl(SOFT, f"PTP {axes(BESIDE)}", "LIN_REL {Y -60,Z -60}"), {"start": BESIDE}),
         (krl(SOFT, "PTP {A5 30}", "LIN_REL {Y -60,Z -60}"), {"start": BESIDE + np.radians([0, 0, 0, 0, 30, 0])}),
     ),
-    "passes_singularity": (krl("PTP {A5 -20}", "LIN {A1 2,A5 20}"), krl(SOFT, "PTP {A5 -20}", "LIN {A1 2,A5 -30}")),
+    "passes_singularity.elbow": (
+        (krl(SOFT, "LIN {A1 23,A2 -50,A3 74,A4 30,A5 70,A6 90}"), {"start": np.radians([21, -45, 67, 36, 79, 80])}),
+        (krl(SOFT, "LIN {A1 23,A2 -50,A3 44,A4 30,A5 70,A6 90}"), {"start": np.radians([21, -45, 37, 36, 79, 80])}),
+    ),
+    "passes_singularity.shoulder": (
+        (krl(SOFT, "LIN {A1 30}"), {"start": np.radians([4, 79, -49, 0, -41, 0])}),
+        (krl(SOFT, "LIN {A1 30}"), {"start": np.radians([4, 60, -49, 0, -41, 0])}),
+    ),
+    "configuration_ends": (
+        (krl(SOFT, "LIN_REL {X 194,Y -206,Z -57}"), TURNED),
+        (krl(SOFT, "LIN_REL {X 1.2,Y -1.2,Z -0.3}"), TURNED),  # where it ends 4.3 mm behind the start
+    ),
+    "combination_exceeded": (
+        (krl("PTP {A2 -50,A3 -20}"), TIED),
+        (krl("PTP {A2 -50,A3 -5}"), TIED),
+    ),
+    "combination_exceeded.": (
+        (krl("PTP {X 364.74,Y 0,Z 260,A 0,B 0,C 180}"), TIED),
+        (krl("PTP {X 364.74,Y 0,Z 300,A 0,B 0,C 180}"), TIED),
+        (krl("PTP {X 364.74,Y 0,Z 260,A 0,B 30,C 180}"), TIED),
+    ),
+    "slide_exceeded": (
+        (CSV.format(200), {"robot": scara(), "start": np.array([0, 0.5, 0.05, 0])}),
+        (CSV.format(150), {"robot": scara(), "start": np.array([0, 0.5, 0.05, 0])}),
+    ),
+    "zone_not_settled": tuple(
+        (CORNER.format(zone), {"robot": DRAWN, "scene": BALL, "start": np.radians([-20, -10, -10, 0, -70, 0])})
+        for zone in (0.15, 0.05, 0)
+    ),
+    "motion_collides.links": (
+        (krl("LIN {A1 64,A2 13,A3 -75,A4 27,A5 -60,A6 -166}"), {"start": np.radians([63, -20, -61, -4, -63, -126])}),
+        (krl(SOFT, "LIN {A1 64,A2 -10}"), {"start": np.radians([63, -20, -61, -4, -63, -126])}),
+    ),
+    "joint_jumps.moves": (krl("PTP {A1 5,A4 -180,A5 70,A6 180}"), krl("PTP {A1 5}")),
+    "passes_singularity.wrist": (
+        krl("PTP {A5 -20}", "LIN {A1 2,A5 20}"),
+        krl(SOFT, "PTP {A5 -20}", "LIN {A1 2,A5 -30}"),
+    ),
 }
 
 LONG = ("loop_comes_back_otherwise", "undecided", "not_followed_to_end.drifts")
+
+
+def form(finding) -> str:
+    """Which of several remedies is that of a finding."""
+    match finding:
+        case MotionCollides():
+            return "links" if isinstance(finding.touches[0].pair, LinkPair) else "solid"
+        case JointJumps():
+            return "stays" if finding.moved_mm < STAYS_MM else "moves"
+    return getattr(finding, "kind", getattr(finding, "type", ""))
 
 
 @pytest.mark.parametrize(
@@ -276,20 +349,18 @@ def test_a_program_that_is_mended_as_advised_passes(tmp_path, code):
 
     def checked(program):
         text, given = program if isinstance(program, tuple) else (program, {})
-        suffix = {"M": "mod", "D": "src", "d": "script"}.get(text[0], "pgm") if text[:2] != "MJ" else "pgm"
-        options = {"start": HOME} | {key: value for key, value in given.items() if key != "data"}
+        suffix = {"M": "mod", "D": "src", "d": "script", "t": "csv"}.get(text[0], "pgm") if text[:2] != "MJ" else "pgm"
+        options = {"start": HOME} | {key: value for key, value in given.items() if key not in ("data", "robot")}
         (tmp_path / f"a.{suffix}").write_text(text)
         (tmp_path / "a.dat").unlink(missing_ok=True)
         if "data" in given:
             (tmp_path / "a.dat").write_text(f"DEFDAT a\nDECL {given['data']}\nENDDAT\n")
-        return check_program(read_program(tmp_path / f"a.{suffix}"), ROBOT, CheckOptions(**options))
+        robot = given.get("robot", ROBOT)
+        return check_program(read_program(tmp_path / f"a.{suffix}"), robot, CheckOptions(**options))
 
     def codes(found):
         return {
-            f"{each.finding.code}.{each.finding.kind}"
-            if each.finding.code == "not_followed_to_end"
-            else each.finding.code
-            for each in found.findings
+            name for each in found.findings for name in (each.finding.code, f"{each.finding.code}.{form(each.finding)}")
         }
 
     broken, *mended = MENDED[code]

@@ -13,8 +13,9 @@ import yaml
 
 from er3a.collision.along import bodies_of
 from er3a.collision.scene import Scene, Sphere
-from er3a.collision.shapes import arm_shapes
+from er3a.collision.shapes import arm_shapes, link_frames
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import (
@@ -36,7 +37,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as trajectory
 from er3a.pipeline.stages.trajectory.model import RESULTS
 from er3a.pipeline.stages.trajectory.motion import (
-    left_out_of_programs,
+    by_subject,
     listed_motions,
     planning_of,
     proof_requirements,
@@ -49,7 +50,7 @@ from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
 from er3a.references.rows import GROUPS
-from er3a.robots.robot import PairRule
+from er3a.robots.robot import Envelope, PairRule
 
 ROBOT = "er3a_c60"
 
@@ -130,6 +131,21 @@ def test_a_path_that_collides_passes_by_no_allowed_contact_missing_shape_or_miss
             assert left_out_text(verdict.missed[0]) in say_all(verdict.findings)
 
 
+def test_rates_that_a_trajectory_of_ros_gives_are_no_pass(study, tmp_path):
+    """By its velocities, a controller would leave the way between the points, and the limits of speed with it."""
+    ends = [0, -0.2, -0.2, 0, -1.2, 0], [0.1, -0.3, -0.2, 0, -1.2, 0]
+    points = [{"positions": q, "time_from_start": 2 * k} for k, q in enumerate(ends)]
+    for rates, named in (({}, ()), ({"velocities": [50.0] * 6, "effort": []}, ("move: velocities",))):
+        body = {"joint_names": [f"joint_{k}" for k in range(1, 7)], "points": [points[0], points[1] | rates]}
+        (tmp_path / "move.json").write_text(json.dumps(body))
+        path = {"name": "move", "title": "Move", "kind": "table", "file": str(tmp_path / "move.json"), "samples": 11}
+        (tmp_path / "paths.yaml").write_text(json.dumps({"kind": "paths", "paths": [path]}))
+        results = trajectory(changed(study, {"paths": str(tmp_path / "paths.yaml")}), ROBOT)
+        verdict = results.summary.verdict
+        assert [each.names for each in verdict.missed if each.subject == "given_rates"] == ([named] if named else [])
+        assert verdict.status == ("caution" if named else "pass")
+
+
 def test_programs_name_their_lines_and_starts(study, tmp_path):
     text = "def a():\n  movej([0, -0.2, -0.2, 0, -1.2, 0])\nend\ndef b():\n  movej([0, -0.3, -0.2, 0, -1.2, 0])\nend\n"
     (tmp_path / "a.script").write_text(text)
@@ -201,7 +217,7 @@ def test_paths_of_a_program_name_its_lines_that_they_leave_out(study, tmp_path, 
     required = proof_requirements(study.robot(ROBOT), study.trajectory)
     task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
     motions = [*listed_motions(tmp_path / "paths.yaml", task, required, 5)]
-    left_out = left_out_of_programs({each.listed: each.rest for each in motions})
+    left_out = by_subject(rest for each in motions for rest in each.left_out)
     assert [each.names for each in left_out] == ([(f"job: {lines}",)] if lines else [])
 
 
@@ -211,10 +227,15 @@ def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):
     tool[2, 3] = 0.25
     part = (Sphere("part", tool, 0.01),)
     links = PairRule("link_2", "link_6", "allow", "a test")
+    aside = robot.replace(tool=np.eye(4) + np.outer([0, 0.2, 0, 0], [0, 0, 0, 1]))
+    zero = link_frames(aside, np.zeros(6))
+    point = tuple((np.linalg.inv(zero[5]) @ forward(aside, np.zeros(6)))[:3, 3].tolist())
+    ball = Envelope(5, point, point, 0.01)  # about the tool's point, until joint 6 turns
     for arm, scene, subject, names in (
         (robot, Scene("a", part, (), (links,)), "allowed_contacts", ("link_2/link_6",)),
         (robot, Scene("a", (), part), "obstacles", ()),
         (robot.replace(tool=tool), Scene("a", part), "bare_tool", ("tool",)),
+        (aside.replace(envelopes=(*robot.envelopes, ball)), Scene("a", part), "bare_tool", ("tool",)),
     ):
         found = {each.subject: each.names for each in left_out_of_collisions(bodies_of(arm, scene), scene)}
         assert found[subject] == names

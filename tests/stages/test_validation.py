@@ -60,7 +60,7 @@ from er3a.pipeline.study import RobotEntry, Study, load_study
 from er3a.pipeline.viewing.arm import TIMELINE
 from er3a.references.circle_points import circle_points, fit_circle
 from er3a.references.predict import predict
-from er3a.references.quantities import Limit
+from er3a.references.quantities import AxisAngle, AxisDistance, Limit, Speed
 from er3a.references.reference import Reference, ReferenceSet
 from er3a.references.subjects import (
     AxisPosition,
@@ -323,6 +323,30 @@ def test_conflicts_excuse_only_what_another_trustworthy_row_outweighs(stated, st
     bases = bases_of(robot, references.checkable, references.documents)
     checks, _ = checks_of_set(references, predict(robot, references.checkable), bases)
     assert [check.status for check in checks[: len(stated)]] == statuses
+
+
+REACH = AxisDistance("flange", "greatest", 1)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "value", "bound"),
+    [(Limit(1, "upper"), 170, 90), (Speed(1), 200, 100), (AxisAngle(1, (0, 0, 1), False), 0, 45), (REACH, 5000, 2500)],
+)
+def test_a_reference_that_a_value_at_random_would_meet_as_often_as_not_is_no_pass(quantity, value, bound):
+    """Whether its uncertainty is some metres or not; what it misses all the same is missed."""
+    for uncertainty, off, status in (
+        (0.99 * bound, 0, "pass"),
+        (bound, 0, "no_reference"),
+        (1e6, 0, "no_reference"),
+        (bound, 1.1 * bound, "fail"),
+    ):
+        stated = Reference(JointLimit(1, "upper"), "limits", quantity, value, uncertainty, "a source", "official")
+        references = ReferenceSet("made", (stated,), {})
+        bases = bases_of(load_robot("er3_600"), references.checkable, references.documents)
+        found = checks_of_set(references, np.array([value + off]), bases, size=1000)[0][0]
+        assert found.status == status
+        if status == "no_reference":
+            assert f"from {bound} on a value taken at random would pass as often as not" in say(found.note)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import kendalltau
 
+from er3a.collision.pairs import ShapesAssumed
 from er3a.comparison.compare import compare
 from er3a.dynamics.torques import gravity
 from er3a.geometry.transforms import rotation_angle, rpy_of, transform
@@ -68,6 +69,7 @@ class TableNumbers:
     other_voids : bounds (L) of other enclosed ones, and z (mm) of their centres
     line : of the article's straight line the verdict; None where the study has no such path
     move_clearance_mm, line_clearance_mm : smallest clearance on the article's paths
+    rests_on : assumed shapes that these are of, if they are
     """
 
     statements: int | None
@@ -94,6 +96,7 @@ class TableNumbers:
     line_speed_deg_s: float | None
     move_clearance_mm: float | None
     line_clearance_mm: float | None
+    rests_on: ShapesAssumed | None = None
 
 
 @dataclass(frozen=True)
@@ -178,8 +181,8 @@ def agreements(numbers: ArticleNumbers) -> dict[str, Agreement]:
     """
     printed, corrected = numbers.printed, numbers.corrected
 
-    def agrees(holds: bool) -> Agreement:
-        return "agrees" if holds else "differs"
+    def agrees(holds: bool, examined: object = True) -> Agreement:
+        return ("agrees" if holds else "differs") if examined else "not_examined"
 
     return {
         "payload": "not_examined",
@@ -187,7 +190,7 @@ def agreements(numbers: ArticleNumbers) -> dict[str, Agreement]:
         "definitions": agrees(numbers.literal_rise_mm < EXACT_MM),
         "zero_pose": agrees(printed.upper_arm_deg < STATED_DEG and abs(printed.forearm_deg - 90) < STATED_DEG),
         "circle": agrees(numbers.circle_error_mm < EXACT_MM),
-        "offset": agrees(printed.statements_met == printed.statements),
+        "offset": agrees(printed.statements_met == printed.statements, printed.statements),
         "plot": agrees(numbers.hidden_percent == 0),
         "wrist": agrees(numbers.wrist_turn_deg > 1 + EXACT_DEG),
         "target": "in_part" if numbers.same_pose_apart_deg < EXACT_DEG else "agrees",
@@ -196,12 +199,14 @@ def agreements(numbers: ArticleNumbers) -> dict[str, Agreement]:
         "unreachable": "in_part" if printed.within_limits < corrected.within_limits else "agrees",
         "eight": agrees(0 < printed.solutions <= 8 and numbers.residual_mm < EXACT_MM),
         "void": agrees(printed.void_mm is not None and printed.void_mm[2] < 0),
-        "line_singular": "in_part" if printed.line_crossings_s else "agrees",
+        "line_singular": "in_part" if printed.line_crossings_s else agrees(True, printed.line),
         "condition": agrees(numbers.ranked_apart_percent == 0),
-        "key_poses": agrees(printed.checks_met == printed.checks),
+        "key_poses": agrees(printed.checks_met == printed.checks, printed.checks),
         "boundary": "not_examined" if numbers.reach is None else agrees(numbers.reach.passed),
         "round_trip": agrees(numbers.round_trip_deg < EXACT_DEG),
-        "hole": "in_part" if any(change.column not in HOLE_CAUSES for change in numbers.changes_meeting) else "agrees",
+        "hole": "in_part"
+        if any(change.column not in HOLE_CAUSES for change in numbers.changes_meeting)
+        else agrees(True, numbers.changes_tried > numbers.changes_undecided),
     }
 
 
@@ -343,6 +348,7 @@ def _table(study: Study, results: Path, name: str) -> TableNumbers:
         line_speed_deg_s=max(line.max_joint_speed_deg_s) if line and line.max_joint_speed_deg_s else None,
         move_clearance_mm=move.clearance.least_mm if move and move.clearance else None,
         line_clearance_mm=line.clearance.least_mm if line and line.clearance else None,
+        rests_on=trajectory.verdict.shapes,
     )
 
 

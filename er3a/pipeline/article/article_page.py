@@ -34,7 +34,7 @@ from er3a.pipeline.messages import language
 from er3a.pipeline.messages.article import AGREEMENT, ITEMS, SECTIONS, Item
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.say import joined
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import event_word, strategy_word
 from er3a.pipeline.messages.workspace import change_text
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
@@ -405,7 +405,8 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
 def _grasps(study: Study, results: Path) -> dict[str, Any] | None:
     """What came of the real arm's simulated camera; None where its verdict is of another kind."""
     assert study.article is not None
-    found = read_stage(results / study.article.real / "vision", STAGES["vision"]).results.summary.verdict.finding
+    verdict = read_stage(results / study.article.real / "vision", STAGES["vision"]).results.summary.verdict
+    found = verdict.finding
     if not isinstance(found, GraspCounts) or found.point_mm is None or not found.simulated:
         return None
     return {
@@ -414,6 +415,7 @@ def _grasps(study: Study, results: Path) -> dict[str, Any] | None:
         "grasp_error_mm": found.point_mm,
         "misplaced": len(found.demonstrations),
         "poses_left_out": len(found.left_out),
+        "grasp_rests_on": joined(map(say, verdict.findings[1:]), " "),
     }
 
 
@@ -457,6 +459,7 @@ def _flat(table: TableNumbers) -> dict[str, Any]:
     )
     found["other_voids"] = found["other_voids"] or tr("none")
     found |= {key: np.nan for key in ("move_clearance_mm", "line_clearance_mm") if found[key] is None}
+    found["rests_on"] = say(table.rests_on) if table.rests_on else ""
     found["line"] = outcome_word(table.line) if table.line else "–"  # type: ignore[arg-type]
     return found
 

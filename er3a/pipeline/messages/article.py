@@ -494,7 +494,7 @@ ITEMS = (
         N_("Links as cylinders and boxes, checked along the path."),
         N_(
             "Along the article's joint move and line the printed table stays {p_move_clearance_mm:.0f} and "
-            "{p_line_clearance_mm:.0f} mm clear, with shapes guessed from it. The real arm, anywhere: {stage_collision}"
+            "{p_line_clearance_mm:.0f} mm clear. {p_rests_on} The real arm, anywhere: {stage_collision}"
         ),
     ),
     Item(
@@ -518,7 +518,7 @@ ITEMS = (
         N_(
             "{grasped} of {objects} objects that a camera in front of the real arm sees can be grasped; at the worst "
             "grasp 95 % of errors stay below {grasp_error_mm:.1f} mm. Objects placed where no grasp is possible, and "
-            "found so: {misplaced}. Samples left out of the camera's calibration: {poses_left_out}."
+            "found so: {misplaced}. Samples left out of the camera's calibration: {poses_left_out}. {grasp_rests_on}"
         ),
         N_("No real camera took part: what it sees is simulated."),
     ),

@@ -15,7 +15,7 @@ from er3a.pipeline.messages.language import N_, as_text, tr
 from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 
-MUCH_SCATTER = 2.0
+MUCH_SCATTER, LITTLE_SCATTER = 2.0, 0.3
 TERMS = {
     "ratio": N_("ratio"),
     "once": N_("once a turn"),
@@ -62,6 +62,11 @@ def lines_of(found: Calibration) -> str:
     lines += bar_texts(found)
     if found.scatter > MUCH_SCATTER:
         lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
+    if found.deviation_mm is None and found.scatter < LITTLE_SCATTER:
+        lines.append(
+            "warning: the residuals are far below the stated standard deviations, which can't be those of these "
+            "measurements; intervals rest on them"
+        )
     if found.left_out:
         lines.append(f"as in a robot file, {_left_out_line(found.left_out)}")
     if found.residuals:

@@ -16,7 +16,9 @@ TEXTS = texts(
         "no_pass": "Not examined, and therefore no pass: {missed}.",
         "left_out.bare_links": "what links hit to which no shape is given, and which lie within those of others",
         "left_out.uncovered_links": "what links hit to which no shape is given, and which reach out of all others'",
-        "left_out.bare_tool": "what the tool hits: its point lies outside all shapes, and the scene gives it none",
+        "left_out.bare_tool": (
+            "what the tool hits: its point lies outside the last link's shapes, and the scene gives it none"
+        ),
         "left_out.allowed_contacts": "collisions that the scene's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
@@ -35,6 +37,10 @@ TEXTS = texts(
         "left_out.strategies": "avoidance strategies that the study does not ask for",
         "left_out.program_lines": "lines of programs that were not examined, or not each time",
         "left_out.program_rest": "lines of programs that may move the arm and that none of their paths holds",
+        "left_out.given_rates": (
+            "velocities, accelerations and efforts that trajectory files give: between the points, motions are laid "
+            "by positions and times alone, and a controller that follows the given rates moves otherwise there"
+        ),
         "left_out.program_starts": "motions from where the arm is not known to stand",
         "left_out.outer_axes": "axes beside the arm's, which are taken to be at rest",
         "left_out.controller_ramps": "the controller's own ramps and blends, which decide times and corners",
@@ -67,9 +73,13 @@ TEXTS = texts(
         "left_out.targets": "targets without a solution within the limits",
         "left_out.turns": "other turns of the joints in solutions of targets, as there are many targets",
         "left_out.carried": "what the flange carries hits: no shape of a tool or workpiece is given",
+        "left_out.carried_shapes": "whether what the flange carries is shaped and held as the scene's file says",
         "left_out.tool": "a tool: none is given, and the flange's centre stands for its tip",
         "left_out.plans": "motions for which the planner found none within its tries; there may be one",
         "left_out.references": "quantities that no reference states, or for which the robot's file gives no value",
+        "left_out.loose_references": (
+            "references whose source leaves so much open that a value taken at random would pass as often as not"
+        ),
         "left_out.table_entries": "entries of the table that independent references don't settle",
         "left_out.diagnosis": "which entry is wrong: diagnosis is for arms whose joints all turn",
         "left_out.more_faults": "tables with more wrong entries than one or two",

@@ -53,7 +53,7 @@ REASONS: dict[Unresolved, str] = {
 }
 NEARER = N_("Move the target or the workpiece nearer to the arm, or tilt the tool towards the arm.")
 OTHER_SOLUTION = N_(
-    "Correct the target's joint values; if it is given as a pose, another orientation or place of the target may help."
+    "Correct the target's joint values; if it is given as a pose, give it another orientation or place."
 )
 BY_HAND = N_("Watch this line at low speed on the controller, or replace it by an instruction that is understood.")
 FURTHER = N_("Give the check more time, or in a study raise most_steps, most_branches or loop_rounds of programs.")
@@ -62,7 +62,7 @@ REMEDIES: dict[str, str] = {
     "combination_exceeded": OTHER_SOLUTION,
     "target_out_of_reach": NEARER,
     "way_out_of_reach": NEARER,
-    "configuration_ends": N_("Another configuration at the line's start may help."),
+    "configuration_ends": N_("End the line before that point: it does not lead on in this configuration."),
     "more_than_full_speed": N_("Ask for 100 % at most."),
     "configuration_changes": N_(
         "If the change is not meant, give the target's configuration or joint angles; if it is, make it where there "
@@ -79,7 +79,7 @@ REMEDIES: dict[str, str] = {
     "clear_of_assumed": N_("Give shapes from a drawing or model in the robot's file, or keep the motion farther away."),
     "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
-    "zone_not_settled": N_("A smaller zone may help, or a corner farther from what is near."),
+    "zone_not_settled": N_("Stop at the corner, or make the zone smaller until this is no longer found."),
     "arc_has_no_circle": N_("Teach the arc's via point off the straight line between its ends, or use a line."),
     "arc_goes_on": N_("Check on the controller where the arc ends, or split it into arcs that end at targets."),
     "undecided": N_("Keep the path farther from singular poses and limits, or run this line slowly under supervision."),
@@ -103,6 +103,7 @@ REMEDIES: dict[str, str] = {
     "program_nothing_moves": N_("Check that this is the program to run."),
     "speed_not_given": N_("Give a speed before the motion."),
     "zone_without_size": N_("Give the zone's size in mm."),
+    "spline_as_line": N_("Write straight lines of the spline (SLIN)."),
     "configuration_not_read": N_("Check on the controller that it takes this solution."),
     "load_not_examined": N_(
         "List the program as a path of a study: its stage dynamics then computes torques with this load."
@@ -111,9 +112,11 @@ REMEDIES: dict[str, str] = {
 }
 SINGULAR: dict[EventType, str] = {
     "wrist": N_("Tilt the tool so that J5 stays away from 0."),
-    "elbow": N_("A target nearer to the arm may help, so that it is not stretched."),
-    "shoulder": N_("A via point that leads the wrist past axis 1 at a distance may help."),
-    "dependent_axes": N_("A shifted or tilted path may help."),
+    "elbow": N_("Keep the path nearer to the arm, so that it is not stretched."),
+    "shoulder": N_("Keep the wrist at a distance from axis 1."),
+    "dependent_axes": N_(
+        "End the line before that point, and go on by a joint move, which singular poses do not disturb."
+    ),
 }
 STOPPED: dict[EndKind, str] = {
     "drifts": N_(
@@ -191,7 +194,9 @@ TEXTS = texts(
         "zone_too_large": "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm",
         "zone_without_size": "the size of the zone {zone} is not known; half of each motion was taken",
         "arc_has_no_circle": "the arc's points do not define a circle",
-        "spline_as_line": "the spline was checked as a straight line from point to point",
+        "spline_as_line": (
+            "the spline was checked as a straight line from point to point; how it bends was not examined"
+        ),
         "external_axes_left_out": "external axes are assumed at rest: {axes:, }",
         "line_not_checked": (
             "the arm has no closed-form inverse: the line was not followed, only its target was checked"
@@ -331,13 +336,14 @@ TEXTS = texts(
             "round it by a via point."
         ),
         "remedy.collision#links": (
-            "The arm hits itself: another tool orientation or configuration may help, or another place of the target."
+            "Keep these links apart: give the target another place, tool orientation or configuration, or lead the "
+            "tool there by a via point."
         ),
         "remedy.joint_jumps#stays": (
             "If the tool is to stay here, leave this line out; if the joint is meant to turn, turn it where there is "
             "room."
         ),
-        "remedy.joint_jumps#moves": "A target taught with this joint near to where it comes from may help.",
+        "remedy.joint_jumps#moves": "Teach the target with this joint near to where it comes from.",
         "remedy.slower": (
             "Lower the speed of this line to {percent:g} % of its own or less, and its acceleration to "
             "{acceleration:g} %."
@@ -518,7 +524,7 @@ def _(found: ZoneTooLarge) -> str:
 
 
 def remedy_at(finding: CheckFinding, joint_moves: Sequence[Sequence[float]]) -> str:
-    """What to do about a finding: ``joint_moves`` (deg) that pass, or else what may help and was not tried."""
+    """What to do about a finding: ``joint_moves`` (deg) that pass, or else what mends it and was not tried here."""
     if not joint_moves:
         return remedy(finding)
     *via, end = [", ".join(f"{value:g}" for value in row) for row in joint_moves]

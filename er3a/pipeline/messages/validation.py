@@ -66,6 +66,7 @@ GRADES = {
 }
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 names_in_words("references", "reference.group", GROUP_WORDS)
+names_in_words("loose_references", "reference.group", GROUP_WORDS)
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
 
 
@@ -157,6 +158,10 @@ TEXTS = texts(
             no_wrist_centre="set aside: the arm has no wrist centre",
             joint_slides="set aside: the joint slides, and the limit or speed is stated as of one that turns",
             joint_turns="set aside: the joint turns, and the limit or speed is stated as of one that slides",
+        ),
+        "too_uncertain": (
+            "decides nothing: the source leaves {uncertainty:g} either way, and from {undecided_from:.4g} on a value "
+            "taken at random would pass as often as not"
         ),
         "set_has_no_data": "{reference_set} has no data",
         "in_no_set": "no reference set gives it",

@@ -46,7 +46,7 @@ def left_out_of_collisions(
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]
     obstacles = [LeftOut("scene_shapes" if solids else "obstacles")]
-    carried = [] if carries else [LeftOut("carried")]
+    carried = [LeftOut("carried_shapes" if carries else "carried")]
     shallow = [] if tolerance_mm is None else [LeftOut("shallow_overlaps", amount=tolerance_mm)]
     return (*obstacles, *carried, *listed, *shallow)
 

@@ -56,7 +56,7 @@ export class Clearance {
   }
 
   #described({ distance, deep, pair }) {
-    const { words } = this;
+    const words = this.clearance.assumed ? this.words.assumed : this.words;
     const text = distance <= 0 ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
     return fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
   }

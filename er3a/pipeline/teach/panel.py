@@ -247,6 +247,11 @@ WORDS: dict[str, Any] = {
     "clearance_is": N_("Clearance {distance}: {pair}."),
     "overlap": N_("Collision: {pair} overlap by {distance}."),
     "overlap_deep": N_("Collision: {pair} overlap by {distance} or more."),
+    "assumed": {
+        "clearance_is": N_("Clearance {distance} of assumed shapes: {pair}."),
+        "overlap": N_("Collision of assumed shapes: {pair} overlap by {distance}."),
+        "overlap_deep": N_("Collision of assumed shapes: {pair} overlap by {distance} or more."),
+    },
     "nothing_meets": N_("No bodies here can collide."),
 }
 

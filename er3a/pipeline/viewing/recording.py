@@ -21,7 +21,7 @@ from er3a.collision.shapes import arm_bodies
 from er3a.files.kept_files import write_atomically
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
 from er3a.pipeline.results import AbsentResults, Stored
 from er3a.pipeline.study import Study
@@ -213,6 +213,12 @@ def write_reason(output: Path, name: str, stage: str, markdown: str) -> None:
 def escaped(text: str) -> str:
     """A text from an input file for a Markdown document: shown as it is, on one line, with nothing fetched for it."""
     return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
+
+
+def under_verdict(note: str, stored: Stored[Any]) -> str:
+    """A note with what the stage found, and on what that rests, below its heading."""
+    heading, rest = note.split("\n", 1)
+    return f"{heading}\n{escaped(say_all(stored.results.summary.verdict.findings))}\n{rest}"
 
 
 def _end(run: Run) -> float:

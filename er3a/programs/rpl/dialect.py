@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Callable
 
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
 from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, OUTER, POSITION
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
 ZONE = re.compile(r"z(\d+(?:\.\d+)?)$", re.IGNORECASE)
 NO_BASE = "wobj0"
+ROOTS: dict[str, Callable[[float], float]] = {"ABS": abs, "SQRT": math.sqrt}
 LIBRARIES = ("tcpip.", "io.", "fidbus.", "str.", "log.")
 
 
@@ -26,18 +30,15 @@ class RplDialect(Dialect):
         return name.startswith(("io.", "fidbus."))
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
-        """Points, OFFSET, some mathematics."""
+        """Points, OFFSET, roots; no source tells in which unit angles of the others are."""
         values = [None if each is None else memory.value(each) for each in given.arguments]
         if name in FIELDS:
             return _point(name, values)
         if name == "OFFSET" and values and isinstance(values[0], syntax.Record):
             return _offset(values[0], values[1:])
         plain = syntax.numbers(tuple(values))
-        if name.upper() in IN_DEGREES and plain is not None and len(plain) == 1:
-            try:
-                return float(IN_DEGREES[name.upper()](plain[0]))
-            except (ValueError, OverflowError):
-                pass
+        if name.upper() in ROOTS and plain is not None and len(plain) == 1 and (plain[0] >= 0 or name.upper() == "ABS"):
+            return ROOTS[name.upper()](plain[0])
         return syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
@@ -58,8 +59,8 @@ class RplDialect(Dialect):
             move.form,
             speed=_speed(_word(memory, given[1])),
             zone=_zone(_word(memory, given[2])),
-            tool=instructions.NamedFrame(tool, frames.get(tool)),
-            base=instructions.NamedFrame(base or NO_BASE, base_pose),
+            tool=_frame(memory, tool, frames.get(tool)),
+            base=_frame(memory, base or NO_BASE, base_pose),
         )
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
@@ -77,6 +78,12 @@ class RplDialect(Dialect):
 def _word(memory: ProgramMemory, expression: syntax.Expression | None) -> str:
     """The name of a speed, zone or tool, also where a variable of the program holds it."""
     return "" if expression is None else syntax.shown(memory.value(expression))
+
+
+def _frame(memory: ProgramMemory, name: str, pose: Reals | None) -> instructions.NamedFrame:
+    """A tool or base as the cell has it; of no known pose where the program writes to it."""
+    changed = any(root(each) == name for each in (*memory.shared, *memory.local))
+    return instructions.NamedFrame(f"{name}, changed", None) if changed else instructions.NamedFrame(name, pose)
 
 
 def _speed(word: str) -> instructions.Rate | None:

@@ -22,7 +22,7 @@ from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
-from er3a.pipeline.stages.trajectory.motion import ListedMotion, left_out_of_programs, study_motions
+from er3a.pipeline.stages.trajectory.motion import ListedMotion, by_subject, study_motions
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -195,7 +195,7 @@ def _left_out(study: Study, name: str, found: model.TargetClearances, motions: l
         yield LeftOut("paths", skipped)
     if unknown := tuple(each.name for each in motions if each.motion and np.isnan(each.motion.q).any()):
         yield LeftOut("path_stretches", unknown)
-    yield from left_out_of_programs({each.listed: each.rest for each in motions if each.expect in (None, "safe")})
+    yield from by_subject(rest for each in motions if each.expect in (None, "safe") for rest in each.left_out)
 
 
 def _matrix(bodies: Bodies) -> model.MatrixRows:

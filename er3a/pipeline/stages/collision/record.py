@@ -15,7 +15,7 @@ from er3a.pipeline.stages.collision.played import events, nearest
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import body_shape
 from er3a.pipeline.viewing.palette import JOINTS, MODEL, MUTED, VERDICTS, rgb
-from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, write_recording
+from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, under_verdict, write_recording
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -24,7 +24,7 @@ NOTE = """# Where it is free of collisions
 
 **Look first** at the points: places that the tool can be brought to.
 
-- green: with an arm free of collisions, joined to home by a proven motion
+- green: with an arm free of collisions, joined to home by a motion that is free of them too
 - blue: with such an arm, not joined to home
 - red points: none was found, however often tried
 - grey capsules and pieces: the bodies that are measured; grey solids: the scene
@@ -43,7 +43,7 @@ def record(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         robot=robot,
         name=name,
         stage=stored.stage,
-        note=NOTE,
+        note=under_verdict(NOTE, stored),
         runs=[_run(robot, results, path) for path in dict.fromkeys(results.paths.path.tolist())],
         curves=[Curves("clearance", "Clearance (mm)", ["clearance"], [MODEL], whole=True)],
         scene=study.scene(name, stored.stage),

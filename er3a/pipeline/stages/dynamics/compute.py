@@ -27,7 +27,7 @@ from er3a.pipeline.stages.trajectory.judgement import verdict_of as verdict_of_m
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
     PartOfProgram,
-    left_out_of_programs,
+    by_subject,
     limits_of,
     near_singular,
     study_motions,
@@ -561,15 +561,15 @@ def _paths(
     bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
     surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
     judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
-    found, skipped, rest = [], [], dict[str, tuple[int, ...]]()
+    found, skipped, rest = [], [], list[LeftOut]()
     for each in study_motions(study, name, trajectory.checks_per_sample):
-        rest |= {each.listed: each.rest} if each.expect in (None, "safe") else {}
+        rest += each.left_out if each.expect in (None, "safe") else ()
         if each.motion is None:
             skipped.append(each.name)
         else:
             loaded = with_load(arm, program_load(each.motion))
             found.append(path_torques(loaded, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
-    return found, tuple(skipped), left_out_of_programs(rest)
+    return found, tuple(skipped), by_subject(rest)
 
 
 def program_load(motion: Motion) -> MassBody | str | None:

@@ -9,7 +9,7 @@ import rerun as rr
 
 from er3a.kinematics.chain import ALONG_Z, link_parts
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import say_all
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.model import DynamicsResults, TorqueRows
@@ -45,7 +45,7 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         robot=robot,
         name=stored.robot,
         stage=stored.stage,
-        note=NOTE.format(title=escaped(robot.title), finding=say(results.summary.verdict.finding)),
+        note=NOTE.format(title=escaped(robot.title), finding=say_all(results.summary.verdict.findings)),
         runs=[_run(robot, motion, titles[motion.name], results, scale) for motion in motions(robot, results)],
         curves=[
             Curves("torque", f"Drive torque ({unit})"),

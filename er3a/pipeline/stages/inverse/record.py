@@ -16,7 +16,7 @@ from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, Tar
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES, capsules
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
-from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, write_recording
+from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, under_verdict, write_recording
 from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
 from er3a.robots.robot import Robot
 
@@ -44,7 +44,7 @@ def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         robot=robot,
         name=name,
         stage=stored.stage,
-        note=NOTE,
+        note=under_verdict(NOTE, stored),
         runs=[
             _run(robot, target, solutions.take((solutions.target == target.name) & solutions.first_of_branch))
             for target in targets

@@ -27,7 +27,7 @@ from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_ra
 from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
-    left_out_of_programs,
+    by_subject,
     limits_of,
     listed_motions,
     planning_of,
@@ -383,10 +383,10 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     paths: list[model.PathSummary] = []
     programs: list[model.ProgramFiles] = []
     skipped: list[model.PathNotFollowed] = []
-    rest: dict[str, tuple[int, ...]] = {}
+    rest: list[LeftOut] = []
     for each in listed_motions(file, planning, required, settings.checks_per_sample):
         motion = each.motion
-        rest |= {each.listed: each.rest} if each.expect in (None, "safe") else {}
+        rest += each.left_out if each.expect in (None, "safe") else ()
         if motion is None:
             stops = each.ends.t if each.ends else None
             lacking, outcome = closed_form_missing(robot), each.outcome_unfollowed
@@ -427,7 +427,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
             *left_out_of_collisions(surroundings.bodies, scene, settings.penetration_tolerance_mm),
             *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
             *_left_out(paths, skipped, only),
-            *left_out_of_programs(rest),
+            *by_subject(rest),
             *left_out_without_tool(robot),
             LeftOut("torques"),
         ),
@@ -512,10 +512,9 @@ def _verdict(
         return tuple(path.name for path in asked if path.verdict == verdict)
 
     safe, count = sum(model.is_safe(path, shapes) for path in asked), len(asked) + len(unfollowed)
-    some = bool(named("safe"))
-    finding = model.AllSafe if safe == count else model.SomeUnsafe if some else model.NoneSafe
+    finding = model.AllSafe if safe == count else model.SomeUnsafe if safe else model.NoneSafe
     failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
-    status: Status = "pass" if safe == count else "fail" if failed or not some else "caution"
+    status: Status = "pass" if safe == count else "fail" if failed or not named("safe") else "caution"
     counts = finding(
         paths=count,
         safe=safe,

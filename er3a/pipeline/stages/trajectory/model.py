@@ -73,7 +73,7 @@ class SomeUnsafe(PathCounts):
 
 @dataclass(frozen=True)
 class NoneSafe(PathCounts):
-    """No path is safe."""
+    """No path counts as safe."""
 
     code: Literal["trajectory.none_safe"] = "trajectory.none_safe"
 

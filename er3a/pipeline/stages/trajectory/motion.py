@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -19,7 +19,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.results import LeftOut
+from er3a.pipeline.results import LeftOut, LeftOutSubject
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.study import Study
 from er3a.planning.class_follow import PathEndsError, follow_by_class
@@ -307,7 +307,8 @@ class ListedMotion:
     """A motion, the entry that it belongs to, and its name (a program's stretches have names of their own).
 
     ``motion`` is None for a path of the tool that an arm of its class can't be made to follow, or not to its end;
-    ``ends`` then says when and why it is not. ``rest``: lines of its program that no motion is of.
+    ``ends`` then says when and why it is not. ``left_out``: lines of its program that no motion is of, and
+    what its file gives beside points and times.
     """
 
     listed: str
@@ -316,7 +317,7 @@ class ListedMotion:
     expect: PathVerdict | None
     motion: Motion | None
     ends: PathEndsError | None = None
-    rest: tuple[int, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
 
     @property
     def outcome_unfollowed(self) -> PathVerdict:
@@ -326,10 +327,12 @@ class ListedMotion:
         return "unreachable" if self.ends.kind == "out_of_reach" else "singular"
 
 
-def left_out_of_programs(rest: Mapping[str, tuple[int, ...]]) -> tuple[LeftOut, ...]:
-    """Lines of programs, by their names, that are of no path made of them."""
-    lines = tuple(f"{name}: {', '.join(map(str, own))}" for name, own in rest.items() if own)
-    return (LeftOut("program_rest", lines),) if lines else ()
+def by_subject(found: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
+    """What paths leave out, each subject once, with the names of all that it is left out of."""
+    names: dict[LeftOutSubject, dict[str, None]] = {}
+    for each in found:
+        names.setdefault(each.subject, {}).update(dict.fromkeys(each.names))
+    return tuple(LeftOut(subject, tuple(own)) for subject, own in names.items())
 
 
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
@@ -369,5 +372,9 @@ def listed_motions(
                 motion, ended = None, error
             end = np.full(task.robot.joints, np.nan) if motion is None else motion.q[-1]
             ends[entry.name] = ends[listed.name] = end
-            rest = entry.rest if isinstance(entry, PartOfProgram) else ()
+            parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (
+                ("program_rest", entry.rest if isinstance(entry, PartOfProgram) else ()),
+                ("given_rates", motion.built.unread if motion else ()),
+            )
+            rest = tuple(LeftOut(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own)
             yield ListedMotion(listed.name, entry.name, entry.title, entry.expect, motion, ended, rest)

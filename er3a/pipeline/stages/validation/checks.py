@@ -30,7 +30,7 @@ from er3a.kinematics.wrist_partitioned import closed_form_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation import model
-from er3a.references.quantities import Limit, Quantity, Speed
+from er3a.references.quantities import Limit, Quantity, Speed, undecided_from
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow
 from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed, ReferenceSubject
@@ -54,14 +54,18 @@ def against_itself(
 
 
 def checks_of_set(
-    references: ReferenceSet, values: Reals, bases: Sequence[CheckBasis], slides: Sequence[bool] | Flags = SIX_TURN
+    references: ReferenceSet,
+    values: Reals,
+    bases: Sequence[CheckBasis],
+    slides: Sequence[bool] | Flags = SIX_TURN,
+    size: float = 0.0,
 ) -> tuple[list[model.Check], list[model.Conflict]]:
     """Judge a model's values (n,) of the set's checkable references, and list what was set aside and what the set says
     nothing about.
 
-    ``bases`` (n,): what each of these checks rests on; ``slides`` : of each joint of the arm.
+    ``bases`` (n,): what each of these checks rests on; ``slides`` : of each joint; ``size`` : of the arm, mm.
     """
-    stated = _Stated(references.name, references.checkable, values, bases)
+    stated = _Stated(references.name, references.checkable, values, bases, size)
     checks = [stated.check(i) for i in range(len(values))]
     aside = [
         _without_value(references.name, reference, model.NotOfThisArm(why, len(slides)))
@@ -78,19 +82,27 @@ class _Stated:
     ----------
     met : (n,), which of them the model meets
     pairs : references that no model can meet both of
+    size : mm, of the arm, or of what the references say of it
     """
 
-    def __init__(self, set_name: str, references: tuple[Reference, ...], values: Reals, bases: Sequence[CheckBasis]):
+    def __init__(
+        self, set_name: str, references: tuple[Reference, ...], values: Reals, bases: Sequence[CheckBasis], size: float
+    ):
         self.set_name, self.references, self.values, self.bases = set_name, references, values, bases
         self.expected, self.tolerance = expected_of(references)
         self.met = np.abs(values - self.expected) <= self.tolerance + ROUNDING
         self.pairs = conflicts(references)
+        lengths = [abs(float(each)) for each, own in zip(self.expected, references) if own.unit == "mm"]
+        self.size = max(size, *lengths, 0.0)
 
     def check(self, i: int) -> model.Check:
         """The check of a reference; not judged where the robot's file gives no value."""
         reference, value, expected = self.references[i], float(self.values[i]), float(self.expected[i])
         if math.isnan(value):
             return _without_value(self.set_name, reference, model.NotInRobotFile())
+        bound = undecided_from(reference.quantity, expected, self.size)
+        if self.met[i] and reference.uncertainty >= bound:
+            return _without_value(self.set_name, reference, model.TooUncertain(reference.uncertainty, bound))
         return model.ReferenceCheck(
             measured=value,
             expected=expected,

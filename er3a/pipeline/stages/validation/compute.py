@@ -46,7 +46,7 @@ from er3a.references.predict import read, search, state_of
 from er3a.references.reference import Documents, ReferenceSet, expected_of, quantities_of, vectors_of
 from er3a.references.rows import GROUPS, AxisRow, EnvelopeRow, PositionRow
 from er3a.references.subjects import DrawingCorner, DrawingExtent, Reach
-from er3a.robots.joint_limits import meant
+from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Grade, Robot
 
 
@@ -283,7 +283,9 @@ def compute(study: Study, name: str) -> model.ValidationResults:
             if turning
             else undeclared_bases(references.checkable)
         )
-        judged, contradictions = checks_of_set(references, read(asked, state), bases, robot.slides)
+        judged, contradictions = checks_of_set(
+            references, read(asked, state), bases, robot.slides, 1000 * size_of(robot)
+        )
         checks += judged
         conflicts += contradictions
     checks += _without_reference(robot, values, checks)
@@ -346,6 +348,8 @@ def _left_out(
     }
     if unstated := tuple(group for group in GROUPS if group in missing or group not in groups):
         yield LeftOut("references", unstated)
+    if loose := tuple(dict.fromkeys(check.group for check in checks if isinstance(check.note, model.TooUncertain))):
+        yield LeftOut("loose_references", loose)
     entries = evidence.entries if evidence else ()
     doubtful = tuple(each.entry for each in entries if each.status not in ("settled", "gauge", "given"))
     if doubtful or evidence is None:

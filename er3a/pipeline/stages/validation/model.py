@@ -95,6 +95,16 @@ class NotOfThisArm:
 
 
 @dataclass(frozen=True)
+class TooUncertain:
+    """The model is within what the source leaves open, which is as much as ``undecided_from`` or more: a value taken at
+    random would be so as often as not."""
+
+    uncertainty: float
+    undecided_from: float
+    code: Literal["too_uncertain"] = "too_uncertain"
+
+
+@dataclass(frozen=True)
 class SetHasNoData:
     """A reference set says nothing about it."""
 
@@ -139,6 +149,7 @@ Note = (
     NotInRobotFile
     | SourceGivesNone
     | NotOfThisArm
+    | TooUncertain
     | SetHasNoData
     | InNoSet
     | NumbersMissing

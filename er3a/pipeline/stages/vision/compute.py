@@ -437,10 +437,10 @@ def _left_out(found: model.CalibrationResult, file: VisionFile) -> Iterator[Left
 
 
 def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], motions: TrajectorySettings) -> ShapesAssumed | None:
-    """What assumed shapes of the arm leave open of the grasps; None without any grasp."""
+    """What assumed shapes of the arm leave open of the grasps; None where none was tried."""
     clear = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
     near = {name: None if least is None else least / 1000 for name, least in clear.items()}
-    return shapes_assumed(robot, motions.assumed_margin_mm / 1000, near) if clear else None
+    return shapes_assumed(robot, motions.assumed_margin_mm / 1000, near) if objects else None
 
 
 def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:

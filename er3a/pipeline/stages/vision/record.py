@@ -19,7 +19,7 @@ from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, Sample
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, write_recording
+from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, under_verdict, write_recording
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
@@ -57,7 +57,7 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
         robot=robot,
         name=stored.robot,
         stage=stored.stage,
-        note=NOTE,
+        note=under_verdict(NOTE, stored),
         runs=[_sampled(results.samples, home), *(_grasped(results, each, home) for each in summary.objects)],
         scene=study.scene(stored.robot, stored.stage),
         views={"Camera and grasps": ["**"]},

@@ -10,7 +10,7 @@ import rerun as rr
 from matplotlib import colormaps
 
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.messages.say import say, word
+from er3a.pipeline.messages.say import say_all, word
 from er3a.pipeline.messages.workspace import VOID_STATUS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
@@ -146,7 +146,7 @@ def _normals(corners: Reals, faces: Integers) -> Reals:
 def _note(robot: Robot, summary: model.WorkspaceSummary) -> str:
     lines = [
         f"# Workspace of {escaped(robot.title)}",
-        say(summary.verdict.finding),
+        say_all(summary.verdict.findings),
         "",
         "**Look first** at the voids inside the hull, below left: enclosed ones in magenta, open pockets in orange.",
         "",
