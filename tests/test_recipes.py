@@ -251,23 +251,36 @@ assert strategy_word("wait") == "wait"
     carry_out("A strategy of singularity avoidance.", edits, script)
 
 
+def test_what_chinese_alone_needs_stands_where_pages_are_set():
+    files = [path for part in ("er3a", "workflow") for path in (ROOT / part).rglob("*.*") if path.suffix != ".po"]
+    texts = {path.name: path.read_text("utf-8") for path in files if path.suffix in (".py", ".j2", ".smk")}
+    named = {name for name, text in texts.items() if '"zh"' in text}
+    assert named == {"language.py", "page.py", "figures.py", "base.html.j2"}
+
+
 @pytest.mark.long
 def test_a_language_of_pages(carry_out):
-    catalogue = 'msgid ""\nmsgstr "Content-Type: text/plain; charset=utf-8\\n"\n\nmsgid "time (s)"\nmsgstr "Zeit (s)"\n'
     edits = {
         "er3a/pipeline/messages/language.py": (('Literal["en", "zh"]', 'Literal["en", "zh", "de"]'),),
-        "er3a/pipeline/messages/locale/de/LC_MESSAGES/er3a.po": catalogue,
+        "er3a/pipeline/messages/locale/de/LC_MESSAGES/er3a.po": "",
     }
     script = """
+import subprocess, sys
 from pathlib import Path
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.study import ReportSettings
+from er3a.pipeline.study import ReportSettings, load_study
 
+subprocess.run(["make", "words", f"BIN={Path(sys.executable).parent}", "-o", ".venv/dev.stamp"], check=True)
+file = language.catalogue_file("de")
+text, entry = file.read_text(), '\\nmsgid "time (s)"\\nmsgstr "'
+assert text.count(entry + '"') == 1
+file.write_text(text.replace(entry, entry + "Zeit (s)"))
+assert load_study("config/article.yaml").article_pages()["de"] == "article_de.html"
 language.use(ReportSettings(language="de").language)
 assert tr("time (s)") == "Zeit (s)"
 assert tr("distance / threshold") == "distance / threshold"
-assert "de" in language.LANGUAGES
+assert language.name_of("de", "de") == "Deutsch"
 """
     carry_out("A language of pages.", edits, script)
 
