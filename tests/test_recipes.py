@@ -488,7 +488,7 @@ assert len(er3a.inverse(robot, missed, 0 * one).q) == 0
 
 @pytest.mark.long
 def test_a_column_and_its_plot(carry_out):
-    column = """    across_mm: Reals = column("greatest distance of its centre from the last axis")
+    column = """    mass_kg: Reals = column("mass of the load")
     weight_n: Reals = column("weight of the load at rest", heading=N_("weight at rest"))
 """
     values = """        across_mm=1000 * diagram.across[:, :last].ravel(),

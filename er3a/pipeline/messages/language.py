@@ -114,7 +114,7 @@ def with_unit(value: str, unit: str, gap: str = " ") -> str:
 
 
 def own_title(text: str) -> str:
-    """A title or note out of a file in the language in use, if the file or the catalogue (of titles that er3a writes) says it."""
+    """A title or note out of a file in the language in use, if the file, or our catalogue for ours, says it."""
     return _own[text] if text in _own else _catalogue.pgettext(TITLE, text)
 
 
