@@ -15,6 +15,9 @@ import pytest
 import yaml
 
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ArmClassCode
+from er3a.pipeline.messages.kinematics import ARM_CLASSES as ARM_CLASS_WORDS
+from er3a.planning.avoidance.strategies import STRATEGIES
+from er3a.planning.names import StrategyName
 from er3a.programs.languages import LANGUAGES
 from er3a.programs.syntax import LanguageName
 from er3a.selection.rule_names import RuleName
@@ -84,7 +87,8 @@ def test_a_stage_is_made_of_files_that_its_recipe_names():
 def test_each_name_has_its_entry():
     assert list(LANGUAGES) == list(get_args(LanguageName))
     assert list(RULES) == list(get_args(RuleName))
-    assert set(ARM_CLASSES) == set(get_args(ArmClassCode))
+    assert set(ARM_CLASSES) == set(ARM_CLASS_WORDS) == set(get_args(ArmClassCode))
+    assert [*STRATEGIES, "planned"] == list(get_args(StrategyName))  # around bodies, by AvoidanceTask
 
 
 def test_the_hook_checks_the_files_of_every_language():

@@ -32,7 +32,6 @@ from er3a.robots.robot import (
 )
 
 ROBOTS = ROOT / "data" / "robots"
-REFERENCES = ROOT / "data" / "manual_refs"
 MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
