@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from er3a.by_value import MOST_ROWS, ByValue, Displayed, Sheet, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
-from er3a.kinematics.by_class import arm_solver, to_rows
+from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.class_solvers import ArmClassCode, BranchLabel, SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.families import Family
-from er3a.kinematics.self_motions import SelfMotionCurve
+from er3a.kinematics.self_motions import SelfMotionCurve, to_rows
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import (
     ClosedFormMissing,

@@ -13,6 +13,7 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
 from er3a.planning.profiles import Times
+from er3a.planning.sequences import TURN_LENGTH
 from er3a.programs import instructions
 from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
 from er3a.robots.masses import MassBody
@@ -20,7 +21,6 @@ from er3a.robots.robot import Robot
 
 TO_START = instructions.Rate(0.1, "share")
 HALF_TURN = 1e-9  # rad
-TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
 
 
 @dataclass(frozen=True, eq=False)

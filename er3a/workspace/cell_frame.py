@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import LockedJoint
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, Completed
@@ -26,7 +27,6 @@ SECTORS = 64
 masks."""
 _FEW_SECTORS = 16
 """The same of arms whose inverse takes long."""
-_TURN = 2 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class CellFrame:
     @property
     def width(self) -> float:
         """Of a sector, rad, or of a part of a bar, m."""
-        return (self.bar or _TURN) / self.sectors
+        return (self.bar or TURN) / self.sectors
 
     def place_of(self, sector: Integers) -> Reals:
         """Middles of sectors: rad, or m along the bar."""

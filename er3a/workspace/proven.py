@@ -24,6 +24,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
 from er3a.kinematics.numerical import solve
@@ -38,7 +39,7 @@ from er3a.robots.robot import Robot
 from er3a.sampling.grid import tool_bound
 from er3a.workspace.general_arm import coupled, general_arm
 from er3a.workspace.general_proof import prove_general
-from er3a.workspace.section_arm import MOST_ARCS, TURN, SectionArm, section_arm, section_frame
+from er3a.workspace.section_arm import MOST_ARCS, SectionArm, section_arm, section_frame
 from er3a.workspace.section_proof import MOST_LEVEL, Proof, in_section, in_space, judge, prove, ring_volumes, sharpen
 
 OUTSIDE = -1
