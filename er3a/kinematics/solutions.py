@@ -29,8 +29,8 @@ from er3a.kinematics.self_motions import SelfMotionCurve, to_rows
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import (
     ClosedFormMissing,
-    closed_form_missing,
     parallel_axes_arm,
+    wrist_partition_missing,
     wrist_partitioned_arm,
 )
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -71,7 +71,7 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
 @derived
 def slot_labels(robot: Robot) -> tuple[BranchLabel | SlotName, ...]:
     """The codes of the slots of the arm's class; empty where no signs separate its solutions, which are numbered."""
-    if not closed_form_missing(robot):
+    if not wrist_partition_missing(robot):
         return branch_labels(robot)
     return arm_solver(robot).chain.names(to_rows(robot, np.zeros(robot.joints)))
 

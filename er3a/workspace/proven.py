@@ -31,7 +31,7 @@ from er3a.kinematics.numerical import solve
 from er3a.kinematics.wrist_partitioned import (
     ClosedFormMissing,
     CoupledJoints,
-    closed_form_missing,
+    wrist_partition_missing,
     wrist_partitioned_arm,
 )
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -505,7 +505,7 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
 
 def lacking_for_proof(robot: Robot) -> ClosedFormMissing | None:
     """Why the method for spherical wrists does not apply, which takes each joint's range by itself; None if it does."""
-    return CoupledJoints() if coupled(robot) else closed_form_missing(robot)
+    return CoupledJoints() if coupled(robot) else wrist_partition_missing(robot)
 
 
 def _bounded_by_lengths(robot: Robot, points: int, seed: int, method: GeneralMethod) -> Proven:

@@ -26,7 +26,7 @@ from er3a.kinematics.classes.chain_solvers import LockedJoint, Unsolved
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, Completed
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import row_limits
 from er3a.robots.robot import Robot, derived
@@ -81,7 +81,7 @@ def lacking_for_maps(robot: Robot) -> MapsMissing | None:
 
 def proofs_hold(robot: Robot) -> bool:
     """Whether the proofs for spherical wrists, which take each joint's range by itself, are of this robot."""
-    return not closed_form_missing(robot) and not coupled(robot)
+    return not wrist_partition_missing(robot) and not coupled(robot)
 
 
 @derived
