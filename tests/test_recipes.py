@@ -284,7 +284,6 @@ assert load_study("config/article.yaml").article_pages()["de"] == "article_de.ht
 language.use(ReportSettings(language="de").language)
 assert tr("time (s)") == "Zeit (s)"
 assert tr("distance / threshold") == "distance / threshold"
-assert language.name_of("de", "de") == "Deutsch"
 """
     carry_out("A language of pages.", edits, script)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from babel import Locale
 from markupsafe import Markup, escape
 
 from er3a.files.kept_files import write_atomically
@@ -279,7 +280,7 @@ def write_article(study: Study, results: Path, folder: Path) -> None:
             mark = (
                 ""
                 if code == study.report.language
-                else tr("in {language}", language=language.name_of(study.report.language, code))
+                else tr("in {language}", language=Locale(study.report.language).get_display_name(code))
             )
             _write(study, results, numbers, folder / name, others, mark)
 
@@ -303,7 +304,7 @@ def _write(
             code_digest(__name__, *all_messages()),
             seed=study.seed,
         ),
-        others=[(code, language.name_of(code, code), name) for code, name in others.items()],
+        others=[(code, Locale(code).display_name, name) for code, name in others.items()],
         counts=[(status, BADGES[status], sum(row.status == status for row in rows)) for status in AGREEMENT],
         agreement_words=AGREEMENT,
         sections=[(code, title, [rows[k] for k in _of_section(code)]) for code, title in SECTIONS.items()],

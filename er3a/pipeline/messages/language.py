@@ -71,13 +71,6 @@ def current() -> str:
     return _language
 
 
-def name_of(language: str, shown_in: str) -> str:
-    """What a language is called in a language."""
-    from babel import Locale
-
-    return Locale.parse(language).get_display_name(shown_in) or language
-
-
 def catalogue_file(language: str) -> Path:
     """The catalogue of a language other than English."""
     return CATALOGUES / language / "LC_MESSAGES" / "er3a.po"

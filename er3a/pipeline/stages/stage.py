@@ -48,11 +48,6 @@ def no_files(study: StudyFiles, robot: str) -> list[Path]:
     return []
 
 
-def nothing_more(study: StudyFiles, robot: str) -> dict[str, Any]:
-    """For stages that rest on settings and files alone."""
-    return {}
-
-
 def wanted_of_all(study: StudyFiles, robot: str) -> bool:
     """For stages that every robot of a study goes through."""
     return True
@@ -84,7 +79,7 @@ class Stage:
     question: str
     settings: Mapping[str, type[StrictModel]]
     inputs: Callable[[StudyFiles, str], list[Path]] = no_files
-    given: Callable[[StudyFiles, str], dict[str, Any]] = nothing_more
+    given: Callable[[StudyFiles, str], dict[str, Any]] = lambda study, robot: {}
     wanted: Callable[[StudyFiles, str], bool] = wanted_of_all
     applies: Callable[[Robot], Finding | None] = applies_to_all
     absences: tuple[type[Finding], ...] = ()
