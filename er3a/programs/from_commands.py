@@ -20,7 +20,7 @@ from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 TO_START = instructions.Rate(0.1, "share")
-HALF_TURN = 1e-9  # rad
+HALF_TURN_WITHIN = 1e-9  # rad, and of the axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ class _Making:
         self, end: Reals, axis: Reals | None, seconds: float, zone: instructions.Zone, joints: Reals | None
     ) -> None:
         turn = _turn(self.pose, end)
-        if abs(float(np.linalg.norm(turn)) - np.pi) < HALF_TURN:
+        if abs(float(np.linalg.norm(turn)) - np.pi) < HALF_TURN_WITHIN:
             self.split += 1
             middle = self.pose.copy()
             middle[:3, 3] = (self.pose[:3, 3] + end[:3, 3]) / 2
@@ -232,5 +232,5 @@ def _sense(axis: Reals, wanted: Reals | None) -> float:
     """+1 or -1, the sense of a half turn: of :func:`er3a.planning.moves.rotation_between`."""
     if wanted is not None:
         return float(np.sign(axis @ wanted)) or 1.0
-    upward = next((part for part in axis[::-1] if abs(part) > HALF_TURN), 1.0)
+    upward = next((part for part in axis[::-1] if abs(part) > HALF_TURN_WITHIN), 1.0)
     return float(np.sign(upward))

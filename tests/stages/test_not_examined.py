@@ -16,6 +16,7 @@ from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.collision.scene import Scene, Sphere
 from er3a.collision.shapes import arm_shapes
 from er3a.files.robot_library import load_robot
+from er3a.kinematics.singularity import LEAST_SINGULAR_VALUE
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import (
@@ -374,6 +375,10 @@ def test_workspace_names_what_samples_and_budgets_leave_open(study):
     assert all(
         place.clearance_mm >= placed.margin_mm for place in placed.places
     )  # by distances in full, at all that was asked
+
+
+def test_grasps_are_refused_where_arms_without_branches_are_near_singular(study):
+    assert study.vision.least_singular_value == LEAST_SINGULAR_VALUE
 
 
 def test_names_are_words():

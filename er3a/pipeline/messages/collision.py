@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.left_out  # noqa: F401
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import BASE, TRIED, PairsUnexamined, ShapesAssumed, TwoBodies, link_label
+from er3a.collision.pairs import BASE, TRIED, Pair, PairsUnexamined, ShapesAssumed, link_label
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
@@ -93,7 +93,7 @@ TEXTS = texts(
 
 
 @say.register
-def _(found: TwoBodies) -> str:
+def _(found: Pair) -> str:
     bodies = {key: value for key, value in vars(found).items() if key != "code"}
     return say_as(found, **{key: own_title(it) if isinstance(it, str) else _link(it) for key, it in bodies.items()})
 

@@ -367,7 +367,7 @@ def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows
     return model.MapRows.stacked(tables)
 
 
-STAGE = "inverse"
+STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9
 REPRODUCED_RAD = 1e-9
 MOST_ADVISED = 100  # of many targets those for which it is looked for what would help
@@ -379,7 +379,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets, robot)
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
-    scene = study.scene(name, STAGE)
+    scene = study.scene(name, STAGE_NAME)
     assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
     clearance = (motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm) / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()

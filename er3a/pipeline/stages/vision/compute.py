@@ -310,7 +310,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
     return model.CornerRows.stacked(tables)
 
 
-STAGE = "vision"
+STAGE_NAME = "vision"
 VIEW_STREAM = 0
 CONTRADICTED = 1e-3
 LEG_ROWS = 13
@@ -331,7 +331,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     task_file = load_vision(file, robot)
     head_path = file.parent / task_file.calibration
     head = load(HandEyeFile, head_path)
-    scene = study.scene(name, STAGE)
+    scene = study.scene(name, STAGE_NAME)
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")
