@@ -55,11 +55,10 @@ schema: $(VENV)/run.stamp  ## write the JSON schemas again from the pydantic mod
 LOCALE := er3a/pipeline/messages/locale
 
 words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeline/messages/locale/
-	$(BIN)/pybabel -q extract -F $(LOCALE)/babel.cfg --no-default-keywords -k tr -k N_ -k _ -k gettext -k ngettext:1,2 \
-		-k pgettext:1c,2 -k npgettext:1c,2,3 --add-location=file --sort-by-file --omit-header --no-wrap \
-		-o $(LOCALE)/er3a.pot .
-	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) -l zh --no-wrap \
-		--ignore-obsolete --ignore-pot-creation-date
+	$(BIN)/pybabel -q extract -F $(LOCALE)/babel.cfg -k tr --add-location=file --sort-by-file --omit-header \
+		--no-wrap -o $(LOCALE)/er3a.pot .
+	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) --no-wrap --ignore-obsolete \
+		--ignore-pot-creation-date
 	rm $(LOCALE)/er3a.pot
 
 campaigns: $(VENV)/dev.stamp  ## evidence whose code has changed, again (ARGS="motion --again", ARGS="--share 0.01")

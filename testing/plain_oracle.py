@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 TRUSTED = ("official", "measured", "cad", "export")
+SHAPELESS = ("limits", "speeds")  # kinds of rows that say nothing of an arm's shape
 COLUMNS = ("a", "d", "alpha", "offset", "direction", "lower", "upper")
 IN_UNIT = {"a": 1000.0, "d": 1000.0, "alpha": 180 / np.pi, "offset": 180 / np.pi, "direction": 1.0}
 GRID, CLOSER = 31, 6
@@ -195,6 +196,8 @@ def components(rows: Rows, said: Statement, at: np.ndarray | None = None) -> lis
         if stated == 0:
             return [_apart(along, np.array([0.0, 0.0, 1.0])) / width]
         return [(np.degrees(np.arccos(np.clip(_unit(along)[:, [2]], -1, 1))) - stated) / width]
+    if said.kind not in SHAPELESS:
+        raise ValueError(f"a second opinion on rows of '{said.kind}' is missing")
     return []
 
 

@@ -12,7 +12,7 @@ from er3a.pipeline.study import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDY = "config/small.yaml"
-PARTS = ("Snakefile", "workflow", "er3a", "config", "data", "profiles")
+PARTS = ("Snakefile", "Makefile", "workflow", "er3a", "config", "data", "profiles")
 
 
 def fresh(folder: Path, project: Path = ROOT) -> Path:

@@ -92,7 +92,7 @@ def test_languages_of_programs_have_the_same_modules():
     for path in map(Path, trees()):
         if path.parent.parent.as_posix() == LANGUAGES:
             modules[path.parent.name].add(path.stem)
-    assert [name for name, found in modules.items() if not found >= IN_EVERY_LANGUAGE] == []
+    assert [name for name, found in modules.items() if not found >= IN_EVERY_LANGUAGE - {"dialect"}] == []
 
 
 def test_no_two_classes_share_a_name():

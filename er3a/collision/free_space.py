@@ -25,7 +25,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.distances import FREE, free_between
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 
 Z_95 = 1.959963984540054
@@ -140,7 +140,7 @@ def find_places(
     free = np.flatnonzero(space.free)[::-1]
     witness[where[free]] = space.q[free]  # the first one of each cell stays
     tries = tries.astype(np.int64)
-    if closed_form_missing(robot) is None:
+    if wrist_partition_missing(robot) is None:
         samples = [np.flatnonzero(where == cell) for cell in np.flatnonzero(np.isnan(witness[:, 0]))]
         for _ in range(rounds):
             samples = [rows for rows in samples if np.isnan(witness[where[rows[0]], 0])]

@@ -11,8 +11,22 @@ PENETRATION_TOLERANCE = 0.001  # m; no overlap deeper than this goes unnoticed, 
 ASSUMED_MARGIN = 0.02  # m, within which of assumed shapes nothing is settled, where nothing else is asked
 
 
+class TwoBodies:
+    """Two bodies that can meet."""
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Of both bodies."""
+        raise NotImplementedError
+
+    @property
+    def label(self) -> str:
+        """For columns of text."""
+        return "/".join(self.names)
+
+
 @dataclass(frozen=True)
-class LinkPair:
+class LinkPair(TwoBodies):
     """Two links: 0 for the base, 1..6 for the link that joint 1..6 turns."""
 
     first: int
@@ -21,17 +35,11 @@ class LinkPair:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Of both bodies."""
         return link_label(self.first), link_label(self.second)
-
-    @property
-    def label(self) -> str:
-        """For columns of text."""
-        return "/".join(self.names)
 
 
 @dataclass(frozen=True)
-class LinkAndSolid:
+class LinkAndSolid(TwoBodies):
     """A link and a solid of the scene, by its name."""
 
     link: int
@@ -40,17 +48,11 @@ class LinkAndSolid:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Of both bodies."""
         return link_label(self.link), self.solid
-
-    @property
-    def label(self) -> str:
-        """For columns of text."""
-        return "/".join(self.names)
 
 
 @dataclass(frozen=True)
-class CarriedAndLink:
+class CarriedAndLink(TwoBodies):
     """What the tool carries, by its name, and a link."""
 
     carried: str
@@ -59,17 +61,11 @@ class CarriedAndLink:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Of both bodies."""
         return link_label(self.link), self.carried
-
-    @property
-    def label(self) -> str:
-        """For columns of text."""
-        return "/".join(self.names)
 
 
 @dataclass(frozen=True)
-class CarriedAndSolid:
+class CarriedAndSolid(TwoBodies):
     """What the tool carries and a solid of the scene, by their names."""
 
     carried: str
@@ -78,13 +74,7 @@ class CarriedAndSolid:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Of both bodies."""
         return self.carried, self.solid
-
-    @property
-    def label(self) -> str:
-        """For columns of text."""
-        return "/".join(self.names)
 
 
 Pair = LinkPair | LinkAndSolid | CarriedAndLink | CarriedAndSolid

@@ -27,9 +27,9 @@ from er3a.comparison.mechanism import (
     match,
     mechanism_of,
     turn_of,
-    wrapped,
 )
 from er3a.errors import RobotError
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
 from er3a.numerics.arrays import Reals
@@ -438,7 +438,7 @@ def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances
                 yield Cause(code, side, (), amount, unit)  # type: ignore[arg-type]
                 return
     for each in found.differences:
-        negated = each.column == "alpha" and abs(wrapped(np.array(each.one + each.other))) < tolerances.angle
+        negated = each.column == "alpha" and abs(wrap_to_pi(np.array(each.one + each.other))) < tolerances.angle
         if negated and abs(each.one) > tolerances.angle:
             yield Cause("one_alpha_negated", "a", (_name(robot_a, each.column, each.link),))
     swapped = _swapped_in_a_row(robot_a, robot_b, tolerances) if len(found.differences) > 1 else ()
@@ -490,8 +490,8 @@ def _causes_of_zeros(robot: Robot, b: Mechanism, found: Match, tolerances: Toler
         slips += [("angle_unit", scale, f"offset, {unit}", offset * scale) for unit, scale in ANGLE_UNITS.items()]
         slips += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
         for code, amount, unit, meant in slips:
-            left = np.abs(wrapped(meant - offset - zeros)[inner])
-            if left.max() < tolerances.angle and np.abs(wrapped(meant)[inner]).max() > tolerances.angle:
+            left = np.abs(wrap_to_pi(meant - offset - zeros)[inner])
+            if left.max() < tolerances.angle and np.abs(wrap_to_pi(meant)[inner]).max() > tolerances.angle:
                 yield Cause(code, "a", (), amount, unit)
                 return
     if np.abs(np.sin(zeros)).max() > tolerances.angle:
@@ -612,4 +612,4 @@ def _about_z(T: Reals) -> bool:
 def _put_on_axis(columns: dict[str, Reals], row: int, T: Reals) -> None:
     turn = float(np.arctan2(T[1, 0], T[0, 0]))
     columns["d"][row] = _rounded(columns["d"][row] + T[2, 3], False)
-    columns["offset"][row] = _rounded(float(wrapped(np.array(columns["offset"][row] + turn))), True)
+    columns["offset"][row] = _rounded(float(wrap_to_pi(np.array(columns["offset"][row] + turn))), True)

@@ -35,6 +35,7 @@ from functools import cached_property
 import numpy as np
 
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
@@ -198,7 +199,7 @@ def with_senses(mechanism: Mechanism, senses: Reals, normals: Reals) -> Mechanis
     return replace(
         mechanism,
         a=normals * mechanism.a,
-        alpha=wrapped(normals * (mechanism.alpha + np.where(folded, np.pi, 0.0))),
+        alpha=wrap_to_pi(normals * (mechanism.alpha + np.where(folded, np.pi, 0.0))),
         beta=normals * senses[1:] * mechanism.beta,
         d=senses * mechanism.d,
         offset=senses * mechanism.offset + np.where(beside[:-1] * beside[1:] < 0, np.pi, 0.0),
@@ -206,11 +207,6 @@ def with_senses(mechanism: Mechanism, senses: Reals, normals: Reals) -> Mechanis
         base=mechanism.base @ over[0],
         flange=over[1] @ mechanism.flange,
     )
-
-
-def wrapped(angles: Reals) -> Reals:
-    """Angles (rad) in (-pi, pi]."""
-    return angles - 2 * np.pi * np.ceil((angles - np.pi) / (2 * np.pi))
 
 
 # Which way axes and normals point -------------------------------------------------------------------------------------
@@ -231,7 +227,7 @@ def _likely_senses(
     cost, angles_off = np.empty((2, links, 2, 2))  # by link, fold and sense of the normal
     for fold, turn in ((0, 0.0), (1, np.pi)):
         for side, normal in ((0, 1.0), (1, -1.0)):
-            off = np.abs(wrapped(normal * (other.alpha + turn) - one.alpha))
+            off = np.abs(wrap_to_pi(normal * (other.alpha + turn) - one.alpha))
             gap = np.abs(normal * other.a - one.a)
             angles_off[:, fold, side] = off > np.where(inexact, 2 * NEARLY_PARALLEL, tolerances.angle)
             counted = angles_off[:, fold, side] + ((gap > tolerances.length) & ~inexact & placed)
@@ -250,7 +246,7 @@ def _likely_senses(
         total += (gap > tolerances.length) + 1e-4 * gap
     beside = np.concatenate([np.ones((len(senses), 1)), normals, np.ones((len(senses), 1))], axis=1)
     turned = senses * other.offset + np.where(beside[:, :-1] * beside[:, 1:] < 0, np.pi, 0.0) - one.offset
-    moved = np.abs(wrapped(turned)) > tolerances.angle
+    moved = np.abs(wrap_to_pi(turned)) > tolerances.angle
     moved[:, [0, -1]] = False
     fixed = one.sliding & ~np.append(parallel, False) & ~np.append(False, parallel)  # their theta is geometry
     total += (moved & fixed).sum(axis=1)
@@ -322,14 +318,14 @@ class EntryDifference:
     def size(self) -> float:
         """By how much it differs, m or rad."""
         gap = self.other - self.one
-        return abs(gap if self.column in ("a", "d") else float(wrapped(np.array(gap))))
+        return abs(gap if self.column in ("a", "d") else float(wrap_to_pi(np.array(gap))))
 
 
 def _other_angle(column: str, link: int, one: float, gap: float) -> EntryDifference:
     """An angle that differs by ``gap``, written as a table would: within half a turn, but for tolerances around it."""
     other = one + gap
     return EntryDifference(
-        column, link, one, float(wrapped(np.array(other))) if abs(other) > HALF_TURN_AT_MOST else other
+        column, link, one, float(wrap_to_pi(np.array(other))) if abs(other) > HALF_TURN_AT_MOST else other
     )
 
 
@@ -458,7 +454,7 @@ def _settled(
     parallel = other.between < np.where(one.between < NEARLY_PARALLEL, least, EXACTLY_PARALLEL)
     ways = [_with_free_turns(one, other, parallel, tolerances)]
     beside = one.sliding & (np.append(parallel, False) | np.append(False, parallel))
-    if (np.abs(wrapped(other.offset - one.offset))[1:-1][beside[1:-1]] > tolerances.angle).any():
+    if (np.abs(wrap_to_pi(other.offset - one.offset))[1:-1][beside[1:-1]] > tolerances.angle).any():
         ways.append(_with_free_turns(one, other, parallel, tolerances, of_slides=False))
     for placed in ways:
         found = _settled_at(one, other, senses, parallel, placed, tolerances, may_differ=may_differ)
@@ -480,9 +476,9 @@ def _settled_at(
     may not."""
     m, links = len(one.d), len(one.a)
     offset, steps = placed
-    turned = wrapped(offset - one.offset)
+    turned = wrap_to_pi(offset - one.offset)
     differences = []
-    off = wrapped(other.alpha - one.alpha), wrapped(other.beta - one.beta)
+    off = wrap_to_pi(other.alpha - one.alpha), wrap_to_pi(other.beta - one.beta)
     for column, gaps, values in (("alpha", off[0], one.alpha), ("beta", off[1], one.beta)):
         for k in np.flatnonzero(np.abs(gaps) > tolerances.angle).tolist():
             differences.append(_other_angle(column, k, float(values[k]), float(gaps[k])))
@@ -569,7 +565,7 @@ def _with_free_turns(
         offset[k + 1] += angle * np.sign(np.cos(other.alpha[k]))
 
     def gap(k: int) -> float:
-        return float(wrapped(offset[k] - one.offset[k]))
+        return float(wrap_to_pi(offset[k] - one.offset[k]))
 
     for k in range(m - 2, 0, -1):
         if of_slides and one.sliding[k] and parallel[k - 1]:

@@ -24,7 +24,6 @@ from er3a.comparison.mechanism import (
     mechanism_from_axes,
     mechanism_of,
     turn_of,
-    wrapped,
 )
 from er3a.diagnosis.faults import (
     SIDES,
@@ -41,6 +40,7 @@ from er3a.diagnosis.faults import (
     limit_stated,
 )
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
 from er3a.numerics.arrays import Reals
@@ -272,7 +272,7 @@ def _from_poses(robot: Robot, stated: Sequence[Reference], meets: float) -> Conv
     at = T[..., :3, 3] + np.einsum("hpij,hj->hpi", T[..., :3, :3], shift)
     bases = [_placed_on(own, xyz) for own in at]  # distances are the same of an arm and of its mirror image
     left = [np.linalg.norm(own @ B[:3, :3].T + B[:3, 3] - xyz, axis=1).max() for own, B in zip(at, bases)]
-    moved = np.abs(wrapped(tables.offset - table.offset)) > tolerances.angle
+    moved = np.abs(wrap_to_pi(tables.offset - table.offset)) > tolerances.angle
     changed = (tables.direction != table.direction).sum(axis=1) + moved.sum(axis=1)
     found = []
     for row in np.lexsort((changed, np.array(left) > 2 * length))[:KEPT_OF_SCAN].tolist():
@@ -433,9 +433,9 @@ def _plain(given: Robot, fitted: Robot, off: Misfit, meets: float, tolerances: T
     def kept(arm: Robot, simpler: Robot) -> Robot:
         return simpler if np.abs(off(simpler)).max() <= max(meets, 1.05 * np.abs(off(arm)).max()) else arm
 
-    moved = np.degrees(wrapped(fitted.offset - given.offset))
+    moved = np.degrees(wrap_to_pi(fitted.offset - given.offset))
     snapped = np.where(np.abs(moved - np.round(moved)) < 2 * np.degrees(tolerances.angle), np.round(moved), moved)
-    arm = kept(fitted, fitted.replace(offset=wrapped(given.offset + np.radians(snapped))))
+    arm = kept(fitted, fitted.replace(offset=wrap_to_pi(given.offset + np.radians(snapped))))
     shift = np.linalg.inv(given.flange) @ arm.flange
     if np.linalg.norm(shift[:3, 3]) < 2 * tolerances.length and turn_of(shift) < 2 * tolerances.angle:
         arm = kept(arm, arm.replace(flange=given.flange))
@@ -454,12 +454,12 @@ def _wrong_entry(given: Robot, found: Robot, column: str, row: int) -> Fault:
 
 def _differences(given: Robot, found: Robot, tolerances: Tolerances) -> Faults:
     faults: list[Fault] = []
-    moved = wrapped(found.offset - given.offset)
+    moved = wrap_to_pi(found.offset - given.offset)
     for k in range(given.joints):
         if found.direction[k] != given.direction[k]:
             faults.append(ReversedDirection(k + 1))
         if abs(moved[k]) > tolerances.angle:
-            fits = float(np.round(np.degrees(wrapped(found.offset[k : k + 1]))[0], 6))
+            fits = float(np.round(np.degrees(wrap_to_pi(found.offset[k : k + 1]))[0], 6))
             faults.append(WrongOffset(k + 1, float(np.degrees(given.offset[k])), fits))
     base = found.base @ np.linalg.inv(given.base)
     if np.linalg.norm(base[:3, 3]) > tolerances.length or turn_of(base) > tolerances.angle:

@@ -27,13 +27,13 @@ from er3a.diagnosis.conclusions import (
     TooSmallToTell,
 )
 from er3a.diagnosis.defined_otherwise import Conventions, conventions_of, counted_from_ground
-from er3a.diagnosis.faults import Faults, entry_of
+from er3a.diagnosis.faults import SIDES, Faults, entry_of
 from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, minimise_max, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
 from er3a.kinematics.table_batch import Tables, frames_of, robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import predict_tables, search
-from er3a.references.quantities import MM, Extreme, Pose, Side, Unit
+from er3a.references.quantities import MM, Extreme, Pose, Unit
 from er3a.references.reference import (
     Reference,
     ReferenceSet,
@@ -49,7 +49,6 @@ STEP_DEG = 45.0
 MOST_COMPARED = 60
 APART_MM = 1.0
 APART_RAD = 1e-3
-SIDES: tuple[Side, ...] = ("lower", "upper")
 REACH_STARTS = 40
 TRIED_RAD = tuple(np.radians([1.0, 10.0, 37.0, 90.0, 150.0, 180.0]).tolist())
 TRIED_M = 0.001, 0.01, 0.1, 0.5

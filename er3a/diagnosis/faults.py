@@ -454,11 +454,11 @@ def _offsets(given: Tables, joints: range) -> list[Repair]:
         for step in (90.0, -90.0, 180.0):
             after = (before + step + 180.0) % 360.0 - 180.0 or 0.0
             after = 180.0 if after == -180.0 else after
-            found.append(Repair(WrongOffset(j + 1, before, after), _turned(j, np.radians(step))))
+            found.append(Repair(WrongOffset(j + 1, before, after), _offset_moved(j, np.radians(step))))
     return found
 
 
-def _turned(joint: int, angle: float) -> Change:
+def _offset_moved(joint: int, angle: float) -> Change:
     return lambda tables: tables.with_column("offset", [joint], tables.offset[:, [joint]] + angle)
 
 

@@ -411,9 +411,9 @@ class _Groups:
         rows = np.flatnonzero(self.explains)
         rows = rows[self.pool.count[rows] == self.pool.count[rows].min()]
         greatest = np.abs(self.pool.difference[rows] / self.uncertainty).max(axis=1)
-        return self._once(rows[np.lexsort((self._turned(rows), greatest.round(2), self.pool.cost[rows]))].tolist())
+        return self._once(rows[np.lexsort((self._turned_by(rows), greatest.round(2), self.pool.cost[rows]))].tolist())
 
-    def _turned(self, rows: Integers) -> Reals:
+    def _turned_by(self, rows: Integers) -> Reals:
         """By how much (rad) hypotheses turn the table's angles, rounded."""
         tables = self.pool.tables[rows]
         turned = [np.abs(wrapped(getattr(tables, name) - getattr(self.given, name))) for name in ("alpha", "offset")]

@@ -127,7 +127,7 @@ def carried(robot: Robot, own: list[Hanging], at: list[Reals], row: int) -> Hang
             first, moment = first + found.mass * shift, moment + np.cross(shift, force)
             force = force + 0 * shift
         else:
-            first, moment, force = (_turned(each, corner[:, :, None, :]) for each in (first, moment, force))
+            first, moment, force = (_rotated(each, corner[:, :, None, :]) for each in (first, moment, force))
         R, p = link[:3, :3], link[:3, 3]
         first, moment, force = first @ R.T, moment @ R.T, force @ R.T
         here = own[behind - 1]
@@ -147,11 +147,11 @@ def gravity_before(robot: Robot, gravity: float, at: list[Reals], row: int) -> R
         found = (found @ links[before][:3, :3])[:, :, None]
         corner = at[before][:, None]
         slides = robot.sliding[before]
-        found = _joined(found + 0 * corner[..., :1] if slides else _turned(found, corner * np.array([1.0, -1.0])))
+        found = _joined(found + 0 * corner[..., :1] if slides else _rotated(found, corner * np.array([1.0, -1.0])))
     return found
 
 
-def _turned(vectors: Reals, corner: Reals) -> Reals:
+def _rotated(vectors: Reals, corner: Reals) -> Reals:
     """Vectors (..., 3) turned about z by corners (..., 2), which need not be of length 1."""
     u, v = corner[..., 0], corner[..., 1]
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]

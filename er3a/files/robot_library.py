@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals, wrapped
+from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals
 from er3a.errors import InputError, InputWarning
 from er3a.files import robot_file
 from er3a.files.dh_table import read_dh_table
@@ -17,6 +17,7 @@ from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.yaml_file import StrictModel, load
 from er3a.geometry.transforms import rot_x, rot_y, translation
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Load, MassBody, moved, no_body, six_moments, together
 from er3a.robots.robot import (
@@ -32,7 +33,6 @@ from er3a.robots.robot import (
 )
 
 ROBOTS = ROOT / "data" / "robots"
-REFERENCES = ROOT / "data" / "manual_refs"
 MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
@@ -138,7 +138,7 @@ def with_near_rows(robot: Robot) -> Robot:
     d[0] += (np.linalg.inv(before.base) @ found.base)[2, 3]
     d[last] += (found.flange @ np.linalg.inv(behind))[2, 3]
     ends = {key: np.append(getattr(found, key), getattr(before, key)[last]) for key in ("a", "alpha", "beta")}
-    return before.replace(d=d, offset=wrapped(found.offset), **ends)
+    return before.replace(d=d, offset=wrap_to_pi(found.offset), **ends)
 
 
 def _si(degrees: float | None, millimetres: float | None) -> float:

@@ -103,7 +103,8 @@ def joint_rates(robot: Robot, values: Sequence[float], field: str) -> Reals:
     return meant(robot, given)
 
 
-def _as_millimetres(values: list[float]) -> list[float]:
+def as_millimetres(values: list[float]) -> list[float]:
+    """Values that :func:`check_millimetres` finds nothing wrong with."""
     check_millimetres(values)
     return values
 
@@ -111,6 +112,6 @@ def _as_millimetres(values: list[float]) -> list[float]:
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 Joints = Annotated[list[float], Field(min_length=1, max_length=MOST_JOINTS)]
 """One value for each joint: degrees, or mm of those that slide."""
-PositionMm = Annotated[Triple, AfterValidator(_as_millimetres)]
+PositionMm = Annotated[Triple, AfterValidator(as_millimetres)]
 RpyDeg = Annotated[Triple, as_degrees(WHOLE_DEGREES)]
 JointsDeg = Annotated[Joints, as_degrees(WHOLE_DEGREES, slides=True)]

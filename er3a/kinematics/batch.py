@@ -17,7 +17,7 @@ from er3a.kinematics.inverse import SAME_MEMBER, SOLVES, is_complete, missed_row
 from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions, slot_labels
-from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks, solve_slots
+from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots, wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
@@ -63,7 +63,7 @@ def inverse_batch(
     if T.ndim != 3 or T.shape[1:] != (4, 4):
         raise ShapeError("T", T.shape, "(N, 4, 4)")
     reference = _checked_reference(robot, q_ref, len(T))
-    if closed_form_missing(robot) or robot.coupling is not None:
+    if wrist_partition_missing(robot) or robot.coupling is not None:
         return _by_class(robot, T, reference, turns, threads, redundancy)
     arm, count = constants_for_blocks(robot), len(T)
     q = np.empty((count, SLOTS, 6))

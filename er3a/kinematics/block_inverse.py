@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from er3a.geometry.transforms import FARTHEST_M, ORTHONORMAL_TOLERANCE
 from er3a.geometry.vectors import TURN, Vector
+from er3a.kinematics.classes.arm_angle import about_x, about_z
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import inner_kernel, kernel
@@ -94,9 +95,9 @@ def block_constants(
     b, c = (np.arctan2(np.linalg.norm(np.cross(p, q)), p @ q) for p, q in ((w4, w5), (w5, w6)))
     v = g @ w5
     phi_4 = np.arctan2(v[0], -v[1])
-    v = _rx(-b) @ _rz(-phi_4) @ g @ w6
+    v = about_x(-b) @ about_z(-phi_4) @ g @ w6
     phi_5 = np.arctan2(-v[0], v[1])
-    end = g.T @ _rz(phi_4) @ _rx(b) @ _rz(phi_5) @ _rx(-c)
+    end = g.T @ about_z(phi_4) @ about_x(b) @ about_z(phi_5) @ about_x(-c)
     in_tool = tool_rotation.T @ end
     half_sum, half_difference = (b + c) / 2, (b - c) / 2
     return BlockConstants(
@@ -144,16 +145,6 @@ def _point(values: Reals) -> tuple[float, float]:
 def _clean(value: float) -> float:
     """Without the rounding noise of a right angle."""
     return 0.0 if abs(value) < 1e-15 else float(value)
-
-
-def _rx(angle: float) -> Reals:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-
-
-def _rz(angle: float) -> Reals:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
 BLOCK = 64

@@ -17,7 +17,7 @@ import numpy as np
 
 from er3a.errors import ShapeError
 from er3a.geometry.vectors import TURN
-from er3a.kinematics.chain import constant_links, joint_starts, row_values, size_of
+from er3a.kinematics.chain import constant_links, joint_starts, size_of
 from er3a.kinematics.classes.arm_angle import is_out_of_reach
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
 from er3a.kinematics.classes.class_solvers import (
@@ -32,7 +32,7 @@ from er3a.kinematics.classes.class_solvers import (
 from er3a.kinematics.classes.self_motion import OPEN_ROLL, POSE, POSITION, PoseChain, TracedCurve
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, UNCERTAIN
 from er3a.kinematics.forward import forward
-from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of
+from er3a.kinematics.self_motions import SelfMotionCurve, self_motion_of, to_rows
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import kernel, parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within
@@ -109,11 +109,6 @@ def _linked(robot: Robot, chain: ChainSolver, uncouple: Reals) -> ChainSolver:
         return Unsolved(robot.joints)
     apart = np.eye(robot.rows) - np.asarray(robot.coupling) @ uncouple
     return LinkedRows(chain, apart * robot.direction, joint_starts(robot), robot.sliding, chain.code, chain.slots)
-
-
-def to_rows(robot: Robot, q: Reals) -> Reals:
-    """What the table's rows turn or shift by, offsets included, for joints (..., n)."""
-    return np.asarray(robot.direction * row_values(robot, q) + joint_starts(robot))
 
 
 def to_joints(robot: Robot, x: Reals) -> Reals:

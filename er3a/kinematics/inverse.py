@@ -20,7 +20,12 @@ from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import ClosedFormMissing, closed_form_missing, solve_slots, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import (
+    ClosedFormMissing,
+    solve_slots,
+    wrist_partition_missing,
+    wrist_partitioned_arm,
+)
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import equivalents_within, within
 from er3a.robots.robot import Robot
@@ -68,7 +73,7 @@ def inverse(
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
     q_ref = checked_reference(robot, q_ref)
-    if closed_form_missing(robot) or robot.coupling is not None:
+    if wrist_partition_missing(robot) or robot.coupling is not None:
         return _by_class(robot, T, q_ref, redundancy, self_motion_rows)
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
@@ -220,7 +225,7 @@ def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints
     return (
         solutions.DependentJoints()
         if by_class.arm_solver(robot).chain.code == "dependent"
-        else closed_form_missing(robot)
+        else wrist_partition_missing(robot)
     )
 
 

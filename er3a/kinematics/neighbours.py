@@ -93,7 +93,7 @@ def _turn(T: Reals, turned_to: Reals) -> Reals:
     return np.asarray(scipy.spatial.transform.Rotation.from_matrix(R).as_rotvec(), float)
 
 
-def _turned(T: Reals, turns: Reals) -> Reals:
+def _rotated(T: Reals, turns: Reals) -> Reals:
     """Poses (N, 4, 4) turned by rotation vectors (N, 3)."""
     poses = np.tile(T, (len(turns), 1, 1))
     poses[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(turns).as_matrix() @ T[:3, :3]
@@ -111,7 +111,7 @@ def _turned_on(robot: Robot, T: Reals, turned_to: Reals, usable: Usable) -> Real
     """The pose turned a little further and rounded; None where that is not usable."""
     turn = _turn(T, turned_to)
     angle = float(np.linalg.norm(turn))
-    poses = _turned(T, turn / angle * (angle + SPARE_TURNS)[:, None])
+    poses = _rotated(T, turn / angle * (angle + SPARE_TURNS)[:, None])
     poses = transform(poses[:, :3, 3], np.round(rpy_of(poses) / SHOWN_ANGLE) * SHOWN_ANGLE)
     kept = np.flatnonzero(solvable(robot, poses, usable))
     return np.asarray(poses[kept[0]]) if len(kept) else None
@@ -130,11 +130,11 @@ def _least_turn(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
     """The pose (4, 4) turned by as little as has a usable solution."""
     axes, angles = fibonacci_sphere(DIRECTIONS, turned_back=True), np.linspace(0, np.pi, TURN_STEPS + 1)[1:]
     turns = angles[:, None, None] * axes
-    within = solvable(robot, _turned(T, turns.reshape(-1, 3))).reshape(TURN_STEPS, DIRECTIONS)
+    within = solvable(robot, _rotated(T, turns.reshape(-1, 3))).reshape(TURN_STEPS, DIRECTIONS)
     for step in np.flatnonzero(within.any(axis=1)):
         about = axes[within[step]]
         if usable is not None:
-            about = about[solvable(robot, _turned(T, angles[step] * about), usable)]
+            about = about[solvable(robot, _rotated(T, angles[step] * about), usable)]
         if len(about):
             break
     else:
@@ -143,10 +143,10 @@ def _least_turn(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
     low = high - angles[0]
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        ok = solvable(robot, _turned(T, about * middle[:, None]), usable)
+        ok = solvable(robot, _rotated(T, about * middle[:, None]), usable)
         low, high = np.where(ok, low, middle), np.where(ok, middle, high)
     least = int(high.argmin())
-    return np.asarray(_turned(T, (about[least] * high[least])[None])[0])
+    return np.asarray(_rotated(T, (about[least] * high[least])[None])[0])
 
 
 def _nearest_position(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:

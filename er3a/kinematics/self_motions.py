@@ -166,7 +166,7 @@ def _part(
     start = _least(distance, lengths, best[0], curve.closed)
     q0 = (at(np.array([start])) + best[1])[0]
     own = q_ref
-    if np.abs(own - q0).max() < 1e-5 and chain.error(_rows(robot, own)) < 1e-11:
+    if np.abs(own - q0).max() < 1e-5 and chain.error(to_rows(robot, own)) < 1e-11:
         q0 = np.array(own)
     shift = q0 - at(np.array([start]))[0]
     step = 1e-4
@@ -184,7 +184,8 @@ def _part(
     return motion
 
 
-def _rows(robot: Robot, q: Reals) -> Reals:
+def to_rows(robot: Robot, q: Reals) -> Reals:
+    """What the table's rows turn or shift by, offsets included, for joints (..., n)."""
     return np.asarray(robot.direction * row_values(robot, q) + joint_starts(robot))
 
 

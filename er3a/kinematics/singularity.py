@@ -34,9 +34,9 @@ from er3a.geometry.vectors import Vector, cross, dot, subtract
 from er3a.kinematics.chain import arm_length, axes_at_zero_theta, constant_links, row_values
 from er3a.kinematics.forward import checked_joints, jacobian, rows_of, step_row, turn_row
 from er3a.kinematics.wrist_partitioned import (
-    closed_form_missing,
     has_branches,
     parallel_axes_arm,
+    wrist_partition_missing,
     wrist_partitioned_arm,
 )
 from er3a.numerics.arrays import Flags, Reals, runs
@@ -93,7 +93,7 @@ def characteristic_length(robot: Robot) -> float:
 
     For arms without a wrist centre it is half the length along all links.
     """
-    return arm_length(robot) if closed_form_missing(robot) else wrist_partitioned_arm(robot).wrist_reach
+    return arm_length(robot) if wrist_partition_missing(robot) else wrist_partitioned_arm(robot).wrist_reach
 
 
 def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditioning:

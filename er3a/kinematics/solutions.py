@@ -21,16 +21,16 @@ from numpy.typing import NDArray
 from er3a.by_value import MOST_ROWS, ByValue, Displayed, Sheet, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
-from er3a.kinematics.by_class import arm_solver, to_rows
+from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.class_solvers import ArmClassCode, BranchLabel, SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.families import Family
-from er3a.kinematics.self_motions import SelfMotionCurve
+from er3a.kinematics.self_motions import SelfMotionCurve, to_rows
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import (
     ClosedFormMissing,
-    closed_form_missing,
     parallel_axes_arm,
+    wrist_partition_missing,
     wrist_partitioned_arm,
 )
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -71,7 +71,7 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
 @derived
 def slot_labels(robot: Robot) -> tuple[BranchLabel | SlotName, ...]:
     """The codes of the slots of the arm's class; empty where no signs separate its solutions, which are numbered."""
-    if not closed_form_missing(robot):
+    if not wrist_partition_missing(robot):
         return branch_labels(robot)
     return arm_solver(robot).chain.names(to_rows(robot, np.zeros(robot.joints)))
 

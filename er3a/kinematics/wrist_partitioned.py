@@ -143,8 +143,8 @@ def wrist_partitioned_arm(robot: Robot) -> WristPartitionedArm:
     raise NotWristPartitionedError(robot.name, found)
 
 
-def closed_form_missing(robot: Robot) -> ClosedFormMissing | None:
-    """Which property the arm lacks for the closed form; None if it has them all."""
+def wrist_partition_missing(robot: Robot) -> ClosedFormMissing | None:
+    """Which property the arm lacks for the closed form of a spherical wrist; None if it has them all."""
     found = _recognised(robot)
     return None if isinstance(found, WristPartitionedArm) else found
 
@@ -272,14 +272,14 @@ def constants_for_blocks(robot: Robot) -> BlockConstants:
 def parallel_axes_arm(robot: Robot) -> ThreeParallel | None:
     """The solver of an arm with axes 2, 3 and 4 parallel and 5 and 6 meeting (UR and its like); None for others."""
     six = robot.rows == robot.joints == 6 and robot.coupling is None and not robot.sliding.any()
-    if not six or closed_form_missing(robot) is None:
+    if not six or wrist_partition_missing(robot) is None:
         return None
     return three_parallel(constant_links(robot))
 
 
 def has_branches(robot: Robot) -> bool:
     """Whether the arm has the eight branches of :mod:`er3a.kinematics.solutions`, which three signs name."""
-    return closed_form_missing(robot) is None or parallel_axes_arm(robot) is not None
+    return wrist_partition_missing(robot) is None or parallel_axes_arm(robot) is not None
 
 
 def _slots_of_parallel_axes(

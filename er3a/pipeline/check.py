@@ -32,7 +32,7 @@ from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
 from er3a.formats.mesh_file import read_text
 from er3a.kinematics.by_class import arm_solver
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.class_follow import follows_tool_paths
@@ -99,7 +99,7 @@ SIX = 6
 
 def stage_forms(robot: Robot) -> dict[str, str]:
     """Which stages a robot will have, and in what form, in words."""
-    spherical = closed_form_missing(robot) is None
+    spherical = wrist_partition_missing(robot) is None
     plain = robot.coupling is None and not robot.combined
     solver = arm_solver(robot).chain.code.replace("_", " ")
     turning = not robot.sliding.any() and robot.coupling is None

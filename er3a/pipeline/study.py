@@ -251,8 +251,8 @@ class StudyBase(StrictModel):
         if "scene" in settings:
             scene = self.scene_file(name, key)
             settings["scene"] = str(scene) if scene else None
-        if key == "dynamics":
-            settings["loads"] = [load.model_dump() for load in self.loads(name)]
+        if key in REGISTRY:
+            settings |= REGISTRY[key].given(self, name)
         return {"seed": self.seed, "robot": entry, key: settings}
 
     def article_pages(self) -> dict[str, str]:

@@ -35,7 +35,7 @@ from er3a.errors import Er3aError, NotWristPartitionedError
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver, checked_parameters, class_rows
 from er3a.kinematics.classes.chain_solvers import Unsolved
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.planning.motion_faults import limit_intervals
@@ -290,7 +290,7 @@ def follows_tool_paths(robot: Robot) -> bool:
     """Whether paths of the tool are followed: by arms with all solutions at a pose, or with an arm angle to choose."""
     solver = arm_solver(robot).chain
     by_class = not (isinstance(solver, Unsolved) or solver.parameters)
-    return by_class or solver.code == "arm_angle" or closed_form_missing(robot) is None
+    return by_class or solver.code == "arm_angle" or wrist_partition_missing(robot) is None
 
 
 def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) -> PiecewiseMotion:
@@ -308,7 +308,7 @@ def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) 
     PathEndsError
         where no arm follows to the end
     """
-    missing = closed_form_missing(robot)
+    missing = wrist_partition_missing(robot)
     if arm_solver(robot).chain.code == "arm_angle":
         return _at_arm_angles(robot, path, q_start)
     if missing is not None and not follows_tool_paths(robot):

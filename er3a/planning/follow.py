@@ -483,11 +483,11 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: Integers, before: R
     for start in starts:
         slot = _walk(onward, start)
         jumps = leaps[np.arange(len(t) - 1), slot[:-1]]
-        sequences.append(_turned(robot, q[np.arange(len(t)), slot], slot, jumps, share, before))
+        sequences.append(_with_turns(robot, q[np.arange(len(t)), slot], slot, jumps, share, before))
     return min(sequences, key=lambda sequence: sequence.cost)
 
 
-def _turned(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None) -> _Sequence:
+def _with_turns(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None) -> _Sequence:
     """Make angles continuous and choose each joint's whole turns: those that leave its limits, and those of sums of
     joints, for the least part of the time, then the nearest."""
     steps = turned_difference(q[:-1], q[1:])

@@ -227,7 +227,7 @@ def _coefficients(x: Reals) -> tuple[Reals, Reals, Reals, Reals]:
     )
 
 
-TURN_LENGTH = 0.1  # m per rad
+TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
 NO_WAY = 1e-12  # m; shorter segments are left out
 SIX_POINTS = 2.0  # Lebesgue constant of the six points of extreme value, 1.99: polynomials up to degree 5 exceed
 # their largest size at these points by no more

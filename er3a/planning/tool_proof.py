@@ -32,7 +32,7 @@ from er3a.by_value import ByValue
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.singularity import TYPES, NearSingular, SingularityType, characteristic_length, determinant_factors
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed, follow
 from er3a.planning.motion_faults import (
@@ -508,7 +508,7 @@ def _factors_change(robot: Robot, change: Reals) -> dict[SingularityType, Reals]
     An angle between axes or links by no more than all joints together; a distance of the wrist centre by no more than
     that times the arm's length. Where the factors' forms are known, less.
     """
-    if closed_form_missing(robot) is not None:
+    if wrist_partition_missing(robot) is not None:
         both = change.sum(axis=1)
         return {"wrist": both, "elbow": both, "shoulder": 2 * arm_length(robot) * both}
     if robot.coupling is not None:

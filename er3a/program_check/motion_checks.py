@@ -20,7 +20,7 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular, determinant_factors
 from er3a.kinematics.solutions import branch_labels
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning import motion_faults
 from er3a.planning.follow import Followed
@@ -467,7 +467,7 @@ def _configuration_moment(
     arm: Robot, law: MotionLaw, joints_at: Callable[[Reals], Reals]
 ) -> dict[found_in.CheckFinding, float]:
     """Whether a joint move ends in another configuration, and when (s) it leaves that of its start."""
-    if closed_form_missing(arm) is not None:
+    if wrist_partition_missing(arm) is not None:
         return {}
 
     def slot(share: float) -> int | None:

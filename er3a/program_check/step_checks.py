@@ -50,7 +50,7 @@ from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import characteristic_length
-from er3a.kinematics.wrist_partitioned import closed_form_missing, solve_slots
+from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import turned_difference
 from er3a.planning.tool_proof import inverse_and_reach
@@ -234,7 +234,7 @@ def target_findings(
             findings[number] = limit_findings(placed.arm, known)
         elif not isinstance(target, instructions.PoseTarget) or placed.base is None or placed.missing:
             findings[number] = goal_of(placed, target, None).findings
-        elif closed_form_missing(placed.arm) is None and placed.arm.coupling is None:  # others take too long
+        elif wrist_partition_missing(placed.arm) is None and placed.arm.coupling is None:  # others take too long
             poses[id(placed.arm)].append((number, placed))
     for group in poses.values():
         findings |= _of_poses(group)

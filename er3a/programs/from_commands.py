@@ -13,14 +13,14 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
 from er3a.planning.profiles import Times
+from er3a.planning.sequences import TURN_LENGTH
 from er3a.programs import instructions
 from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
 from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
 
 TO_START = instructions.Rate(0.1, "share")
-HALF_TURN = 1e-9  # rad
-TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
+HALF_TURN_WITHIN = 1e-9  # rad, and of the axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ class _Making:
         self, end: Reals, axis: Reals | None, seconds: float, zone: instructions.Zone, joints: Reals | None
     ) -> None:
         turn = _turn(self.pose, end)
-        if abs(float(np.linalg.norm(turn)) - np.pi) < HALF_TURN:
+        if abs(float(np.linalg.norm(turn)) - np.pi) < HALF_TURN_WITHIN:
             self.split += 1
             middle = self.pose.copy()
             middle[:3, 3] = (self.pose[:3, 3] + end[:3, 3]) / 2
@@ -232,5 +232,5 @@ def _sense(axis: Reals, wanted: Reals | None) -> float:
     """+1 or -1, the sense of a half turn: of :func:`er3a.planning.moves.rotation_between`."""
     if wanted is not None:
         return float(np.sign(axis @ wanted)) or 1.0
-    upward = next((part for part in axis[::-1] if abs(part) > HALF_TURN), 1.0)
+    upward = next((part for part in axis[::-1] if abs(part) > HALF_TURN_WITHIN), 1.0)
     return float(np.sign(upward))

@@ -35,7 +35,7 @@ MethodName = Literal["park", "horaud", "tsai", "andreff", "daniilidis", "shah", 
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
 
 TSAI_LEAST = 0.3  # of twice the sine of half the turn: 17 deg
-HALF_TURN = 0.1  # of the cosine of half the turn: 169 deg, beyond which errors decide the sign of a quaternion
+LEAST_COSINE = 0.1  # of the cosine of half the turn: 169 deg, beyond which errors decide the sign of a quaternion
 Unknowns = tuple[Reals, Reals]
 
 
@@ -89,7 +89,7 @@ def _nearest_rotation(M: Reals) -> Reals:
 
 def _below_half_turns(A: Reals, C: Reals) -> tuple[Reals, Reals]:
     """The motions whose quaternions have a sure sign, alike for hand and eye; all if those are few."""
-    sure = np.minimum(*(quaternion_of(T)[:, 0] for T in (A, C))) > HALF_TURN
+    sure = np.minimum(*(quaternion_of(T)[:, 0] for T in (A, C))) > LEAST_COSINE
     return (A[sure], C[sure]) if sure.sum() >= 2 else (A, C)
 
 

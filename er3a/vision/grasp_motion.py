@@ -20,7 +20,7 @@ from er3a.collision.along import RateBounds, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.kinematics.singularity import NearSingular
-from er3a.kinematics.wrist_partitioned import closed_form_missing, parallel_axes_arm
+from er3a.kinematics.wrist_partitioned import parallel_axes_arm, wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import follow
 from er3a.planning.motion_faults import OVER, jerk_exceeded
@@ -110,7 +110,7 @@ def tool_leg(
     waypoints : (k, n), rad, joints along it, from a search
     speed : m/s, the tool's largest
     """
-    if parallel_axes_arm(robot) is None and closed_form_missing(robot) is not None:
+    if parallel_axes_arm(robot) is None and wrist_partition_missing(robot) is not None:
         return joint_legs(part, waypoints, limits)
     length = float(np.linalg.norm(ends[1][:3, 3] - ends[0][:3, 3]))
     duration = max(LEAST_DURATION, PEAKS[0] * length / speed)

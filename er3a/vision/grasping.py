@@ -24,7 +24,7 @@ from er3a.collision.scene import Scene
 from er3a.geometry.transforms import rot_z, skew, translation
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
-from er3a.kinematics.singularity import characteristic_length, conditioning
+from er3a.kinematics.singularity import conditioning
 from er3a.numerics.arrays import Reals
 from er3a.planning.moves import line
 from er3a.planning.timing import JointLimits
@@ -314,7 +314,7 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
     if not inside.size:
         most = float(np.degrees(limit.max()))
         return [], GraspNearLimits(len(q), most, float(np.degrees(needs.limit_margin)))
-    value = conditioning(robot, q[inside], characteristic_length(robot)).smallest_singular_value
+    value = conditioning(robot, q[inside]).smallest_singular_value
     regular = inside[value >= needs.singular_value]
     if not regular.size:
         return [], GraspSingular(len(inside), float(value.max()), needs.singular_value)
@@ -368,7 +368,7 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
         return NoTransfer(moves)
     every = np.concatenate([leg.sampled(LEG_POINTS)[1] for leg in lines])
     limit = float(limit_margin(robot, every).min())
-    value = float(conditioning(robot, every, characteristic_length(robot)).smallest_singular_value.min())
+    value = float(conditioning(robot, every).smallest_singular_value.min())
     least = least_clearance(task.bodies, (*moves, *lines)) if task.bodies is not None else None
     asked = (
         (limit, needs.limit_margin),
@@ -410,7 +410,7 @@ def _along(task: GraspTask, T_from: Reals, T_to: Reals, q: Reals) -> Reals:
         step = np.abs(found.q - rows[-1]).max()
         if not found.solved or step > WIDEST_STEP or limit_margin(robot, found.q) < 0:
             break
-        value = conditioning(robot, found.q, characteristic_length(robot)).smallest_singular_value
+        value = conditioning(robot, found.q).smallest_singular_value
         if value < task.needs.singular_value:
             break
         rows.append(found.q)

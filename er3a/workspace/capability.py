@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.block_inverse import BlockConstants
-from er3a.kinematics.wrist_partitioned import closed_form_missing, constants_for_blocks
+from er3a.kinematics.wrist_partitioned import constants_for_blocks, wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
@@ -127,7 +127,7 @@ def _from_place_0(frame: CellFrame, asked: AskedOrientations) -> Reals:
 
 def manipulability_of(robot: Robot, q: Reals, within: Flags) -> Reals:
     """Manipulability (m^3) of joint values (..., n), rad; where these are not ``within`` the limits it may be 0."""
-    if closed_form_missing(robot) or robot.coupling is not None:
+    if wrist_partition_missing(robot) or robot.coupling is not None:
         return generic_manipulability(robot, q, within)
     return manipulability(constants_for_blocks(robot), robot.direction * q + robot.offset)
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import LockedJoint
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, Completed
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
@@ -26,7 +27,6 @@ SECTORS = 64
 masks."""
 _FEW_SECTORS = 16
 """The same of arms whose inverse takes long."""
-_TURN = 2 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class CellFrame:
     @property
     def width(self) -> float:
         """Of a sector, rad, or of a part of a bar, m."""
-        return (self.bar or _TURN) / self.sectors
+        return (self.bar or TURN) / self.sectors
 
     def place_of(self, sector: Integers) -> Reals:
         """Middles of sectors: rad, or m along the bar."""
@@ -86,7 +86,7 @@ def cell_frame(robot: Robot) -> CellFrame:
     """The frame of a robot's cells."""
     turns = not robot.slides[0] and (robot.continuous[0] or robot.upper[0] - robot.lower[0] >= FULL_TURN)
     sectors = 1 if turns else SECTORS if is_quick(robot) else _FEW_SECTORS
-    if not closed_form_missing(robot):
+    if not wrist_partition_missing(robot):
         arm, (R, origin) = section_arm(robot), section_frame(robot)
         middle = origin + float(arm.centre[2]) * R[2]
         return CellFrame(R, origin, arm.reach, arm.heights, 0.0, sectors, middle, arm.reach)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.geometry.vectors import fibonacci_sphere
+from er3a.geometry.vectors import TURN, fibonacci_sphere
 from er3a.kinematics.block_inverse import BlockConstants
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.wrist_partitioned import constants_for_blocks
@@ -27,7 +27,6 @@ from er3a.workspace.section_proof import ring_volumes
 _MOST_LEVEL = 6
 _STACK = 256
 _LARGEST, _SMALLEST = 0.7, 2e-3  # rad, radii of patches worth a try
-_TURN = 2 * np.pi
 _STRIDE = 0.381966
 _ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 _ONE, _NONE = np.uint64(1), np.uint64(0)
@@ -120,7 +119,7 @@ def _arc(first: int, many: int) -> np.uint64:
 def _sectors(ranges: Reals, branch: _Found) -> tuple[np.uint64, np.uint64]:
     """Masks of the sectors where some branch is good, and where none is."""
     good, maybe, (state, theta_1) = _NONE, _NONE, branch
-    least, most, width = ranges[0, 0], ranges[0, 1], _TURN / SECTORS
+    least, most, width = ranges[0, 0], ranges[0, 1], TURN / SECTORS
     for slot in range(SLOTS):
         if state[slot] == NEVER:
             continue
@@ -162,7 +161,7 @@ def _judge(
         middle, more = _not_out(asked, T, against, 0.0, numbers, rest, branch)
         used += spent + more
         rest, smallest = middle, max(radius / length, _SMALLEST)
-        stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0.0, np.pi, 0.0, _TURN
+        stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0.0, np.pi, 0.0, TURN
         top = 1
         while top > 0 and rest != _NONE:
             top -= 1

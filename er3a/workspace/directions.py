@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.kinematics.chain import constant_links
-from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import inner_kernel
 from er3a.robots.robot import Robot
@@ -47,7 +47,7 @@ class Roll:
 
 def roll_of(robot: Robot, rolls: int) -> Roll:
     """Whether the robot's roll is free, else ``rolls`` even ones."""
-    if closed_form_missing(robot):
+    if wrist_partition_missing(robot):
         last = constant_links(robot)[-1]
         axis_6, wrist = last[2, :3], -last[:3, :3].T @ last[:3, 3]
     else:

@@ -48,6 +48,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links, moving_tip
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
@@ -55,7 +56,7 @@ from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 from er3a.workspace.general_arm import GeneralArm, curvature, general_arm, own_range, place, point_of
-from er3a.workspace.section_arm import FULL_TURN, MOST_ARCS, ROUND_OFF, TURN, Cell, measure, meets, remove
+from er3a.workspace.section_arm import FULL_TURN, MOST_ARCS, ROUND_OFF, Cell, measure, meets, remove
 from er3a.workspace.section_proof import Proof, refined
 
 _ROOM, _STEPS, _PER_EDGE, _CORNERS = 0.2, 8, 5, 4

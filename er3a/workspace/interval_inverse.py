@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.geometry.vectors import Vector, cross, in_frame_of
+from er3a.geometry.vectors import TURN, Vector, cross, in_frame_of
 from er3a.kinematics.block_inverse import BlockConstants, in_frame_1, seen_by_wrist
 from er3a.numerics.arrays import Reals
 from er3a.numerics.jit import inner_kernel, kernel
@@ -29,7 +29,6 @@ States = NDArray[np.int8]
 GOOD, OPEN, NEVER = 1, 0, -1
 PAD = 1e-9
 """Added to every range (m and rad), far above the rounding of a length or an angle here."""
-_TURN = 2 * np.pi
 
 
 def theta_ranges(robot: Robot) -> Reals:
@@ -46,7 +45,7 @@ def holds(ranges: Reals, joint: int, low: float, high: float) -> bool:
     most: float = ranges[joint, 1]
     if most == np.inf:
         return True
-    shift: float = np.ceil((least - low) / _TURN) * _TURN
+    shift: float = np.ceil((least - low) / TURN) * TURN
     return low + shift >= least and high + shift <= most
 
 
@@ -55,10 +54,10 @@ def misses(ranges: Reals, joint: int, low: float, high: float) -> bool:
     """Whether no angle from ``low`` to ``high`` is within the joint's range, by any turn."""
     least: float = ranges[joint, 0]
     most: float = ranges[joint, 1]
-    if most == np.inf or high - low >= _TURN:
+    if most == np.inf or high - low >= TURN:
         return False
-    shift: float = np.ceil((least - low) / _TURN) * _TURN
-    return low + shift > most and high + shift - _TURN < least
+    shift: float = np.ceil((least - low) / TURN) * TURN
+    return low + shift > most and high + shift - TURN < least
 
 
 @inner_kernel
@@ -157,7 +156,7 @@ def branches(
     longest, shortest = arm.upper_arm + arm.forearm, abs(arm.upper_arm - arm.forearm)
     orthogonal = arm.cos_45 == 0.0 and arm.cos_56 == 0.0
     angle_45, angle_56 = np.arctan2(arm.sin_45, arm.cos_45), np.arctan2(arm.sin_56, arm.cos_56)
-    tilt_least, tilt_most = abs(angle_45 - angle_56), min(angle_45 + angle_56, _TURN - angle_45 - angle_56)
+    tilt_least, tilt_most = abs(angle_45 - angle_56), min(angle_45 + angle_56, TURN - angle_45 - angle_56)
 
     for side in range(2):
         front = 1.0 - 2.0 * side
@@ -212,7 +211,7 @@ def branches(
             flat = np.hypot(fx, fy)
             tilt = np.arctan2(flat, fz)
             tilt_low = max(0.0, tilt - turned, abs(polar_4 - polar_6) - about - 1e-7)
-            tilt_high = min(np.pi, tilt + turned, min(polar_4 + polar_6, _TURN - polar_4 - polar_6) + about + 1e-7)
+            tilt_high = min(np.pi, tilt + turned, min(polar_4 + polar_6, TURN - polar_4 - polar_6) + about + 1e-7)
             if tilt_low > tilt_most + PAD or tilt_high < tilt_least - PAD:
                 continue
             if not orthogonal:

@@ -109,7 +109,7 @@ class AskedOrientations:
         if self.kind == "points":
             return np.eye(3)[None, None, None]
         if self.kind == "turns":
-            return self._turned(2 * np.pi * np.linspace(0, 1, count, endpoint=False))[None, :, None]
+            return self._about_axis(2 * np.pi * np.linspace(0, 1, count, endpoint=False))[None, :, None]
         if self.plane is not None:
             tilts = np.arange(count) * (2 * np.pi / count)
             return self.plane.tilted(points, np.stack([tilts, -tilts], axis=1)[None])
@@ -124,7 +124,7 @@ class AskedOrientations:
         if self.kind == "points":
             return np.eye(3)[None, None, None]
         if self.kind == "turns":
-            turned = self._turned(2 * np.pi * np.linspace(0, 1, _TASK_TURNS, endpoint=False))
+            turned = self._about_axis(2 * np.pi * np.linspace(0, 1, _TASK_TURNS, endpoint=False))
             fits = turned[:, :, 2] @ axis >= np.cos(half_angle) - 1e-9
             return turned[fits][None, None] if fits.any() else np.empty((1, 0, 1, 3, 3))
         if self.plane is not None:
@@ -135,13 +135,13 @@ class AskedOrientations:
         """One of the turns or tilts, or of the plane's two, at each of the points (n, 3), m: (n, 3, 3)."""
         turns = 2 * np.pi * random.random(len(points))
         if self.kind == "turns":
-            return self._turned(turns)
+            return self._about_axis(turns)
         if self.plane is not None:
             found = self.plane.tilted(points, np.stack([turns, turns], axis=1)[:, None])[:, 0]
             return np.asarray(found[np.arange(len(points)), random.integers(2, size=len(points))])
         return np.broadcast_to(np.eye(3), (len(points), 3, 3))
 
-    def _turned(self, turns: Reals) -> Reals:
+    def _about_axis(self, turns: Reals) -> Reals:
         return np.asarray(Rotation.from_rotvec(turns[:, None] * self.axis).as_matrix() @ self.tool)
 
 

@@ -24,13 +24,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
 from er3a.kinematics.numerical import solve
 from er3a.kinematics.wrist_partitioned import (
     ClosedFormMissing,
     CoupledJoints,
-    closed_form_missing,
+    wrist_partition_missing,
     wrist_partitioned_arm,
 )
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -38,7 +39,7 @@ from er3a.robots.robot import Robot
 from er3a.sampling.grid import tool_bound
 from er3a.workspace.general_arm import coupled, general_arm
 from er3a.workspace.general_proof import prove_general
-from er3a.workspace.section_arm import MOST_ARCS, TURN, SectionArm, section_arm, section_frame
+from er3a.workspace.section_arm import MOST_ARCS, SectionArm, section_arm, section_frame
 from er3a.workspace.section_proof import MOST_LEVEL, Proof, in_section, in_space, judge, prove, ring_volumes, sharpen
 
 OUTSIDE = -1
@@ -504,7 +505,7 @@ def prove_robot(robot: Robot, most_cells: int, points: int, seed: int) -> Proven
 
 def lacking_for_proof(robot: Robot) -> ClosedFormMissing | None:
     """Why the method for spherical wrists does not apply, which takes each joint's range by itself; None if it does."""
-    return CoupledJoints() if coupled(robot) else closed_form_missing(robot)
+    return CoupledJoints() if coupled(robot) else wrist_partition_missing(robot)
 
 
 def _bounded_by_lengths(robot: Robot, points: int, seed: int, method: GeneralMethod) -> Proven:

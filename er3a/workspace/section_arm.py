@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.vectors import Vector, add, cross, dot, scaled, subtract
+from er3a.geometry.vectors import TURN, Vector, add, cross, dot, scaled, subtract
 from er3a.kinematics.wrist_partitioned import WristPartitionedArm, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
@@ -255,7 +255,6 @@ def along_change(
 
 
 MOST_ARCS = 12
-TURN = 2 * np.pi
 
 
 @kernel

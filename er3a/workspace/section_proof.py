@@ -60,13 +60,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.geometry.vectors import Vector, cross, dot, subtract
+from er3a.geometry.vectors import TURN, Vector, cross, dot, subtract
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.section_arm import (
     MOST_ARCS,
     ROUND_OFF,
-    TURN,
     Cell,
     Range,
     SectionArm,

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
-from er3a.kinematics.wrist_partitioned import closed_form_missing, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals, runs
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
@@ -218,7 +218,7 @@ def side_views(robot: Robot, tally: Tally, grid: Grid, draw: Draw) -> list[SideV
     """Side views of the tool point and, with fewer samples, of the wrist centre, if there is one."""
     front = _front(robot, plane_direction(robot))
     found = [_side_view("tool_point", grid, tally, front)]
-    if closed_form_missing(robot) or robot.coupling is not None:
+    if wrist_partition_missing(robot) or robot.coupling is not None:
         return found
     bare = at_wrist_centre(robot)
     wrist_grid = make_grid(bare, max(grid.shape))
@@ -235,7 +235,7 @@ def _side_view(point: Literal["tool_point", "wrist_centre"], grid: Grid, tally: 
 
 def border_lines(robot: Robot) -> list[BorderLine]:
     """Exact borders of tool point, flange and wrist centre; none without a spherical wrist."""
-    if closed_form_missing(robot) or robot.coupling is not None or robot.combined:
+    if wrist_partition_missing(robot) or robot.coupling is not None or robot.combined:
         return []
     front, elbow = _front(robot, section_frame(robot)[0][0]), wrist_partitioned_arm(robot).elbow_sign
     arms: dict[BorderPoint, SectionArm] = {
@@ -265,7 +265,7 @@ def _joints_2_3(robot: Robot, theta: Reals) -> Reals:
 
 def corner_side(robot: Robot, q2: float, q3: float) -> float:
     """-1 if the wrist centre lies behind axis 1 with joints 2 and 3 (rad) at these values, else +1."""
-    if closed_form_missing(robot):
+    if wrist_partition_missing(robot):
         return 1.0
     bare = at_wrist_centre(robot)
     away = forward(bare, np.array([0, q2, q3, 0, 0, 0]))[:3, 3] - constant_links(bare)[0, :3, 3]

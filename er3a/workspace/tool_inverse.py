@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import (
     arm_solver,
@@ -25,7 +26,7 @@ from er3a.kinematics.classes.chain_solvers import LockedJoint, Unsolved
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, Completed
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.forward import forward, jacobian
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import row_limits
 from er3a.robots.robot import Robot, derived
@@ -41,7 +42,6 @@ clear and where they leave doubt, besides where a joint within the arm is held, 
 gears or ball screws stand between motors and joints."""
 BESIDE = np.array([1.1e-4, -0.7e-4, 0.9e-4])  # rad, about the tool's axes
 _PROBED = 24
-_TURN = 2 * np.pi
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def lacking_for_maps(robot: Robot) -> MapsMissing | None:
 
 def proofs_hold(robot: Robot) -> bool:
     """Whether the proofs for spherical wrists, which take each joint's range by itself, are of this robot."""
-    return not closed_form_missing(robot) and not coupled(robot)
+    return not wrist_partition_missing(robot) and not coupled(robot)
 
 
 @derived
@@ -122,10 +122,10 @@ def redundancy_values(robot: Robot) -> Reals | None:
     for parameter in parameters:
         j = parameter.joint
         if j < 0:
-            each.append(_TURN * np.arange(count) / count)
+            each.append(TURN * np.arange(count) / count)
             continue
         low, high = row_limits(robot)[j].tolist()
-        if not robot.sliding[j] and (endless[j] or high - low > _TURN):
+        if not robot.sliding[j] and (endless[j] or high - low > TURN):
             low, high = (low + high) / 2 - np.pi, (low + high) / 2 + np.pi
         each.append(low + (high - low) * (np.arange(count) + 0.5) / count)
     return np.array(list(product(*each)))

@@ -29,13 +29,13 @@ import scipy
 from numpy.typing import NDArray
 
 from er3a.geometry.open3d_loader import load_open3d
+from er3a.geometry.vectors import TURN
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 from er3a.workspace.causes import OnlySampled, Relaxed, Unlimited, VoidCause, cause_of, relaxations
 from er3a.workspace.proven import Cavity, Proven, cavities
-from er3a.workspace.section_arm import TURN
 from er3a.workspace.section_proof import in_space, ring_volumes
 
 _CUBE = np.ones((3, 3, 3), dtype=bool)

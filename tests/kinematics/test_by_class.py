@@ -11,11 +11,12 @@ from er3a.files.robot_library import load_robot
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics import by_class
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.by_class import parameters_of, task_mask, to_rows
+from er3a.kinematics.by_class import parameters_of, task_mask
 from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
+from er3a.kinematics.self_motions import to_rows
 from er3a.kinematics.singularity import dependent_axes, rank_losses, scaled_jacobian
 from er3a.robots.robot import CombinedLimit, Robot
 

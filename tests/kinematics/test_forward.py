@@ -133,6 +133,7 @@ def test_published_modified_table_gives_the_poses_of_the_standard_table(random):
     between = np.linalg.inv(forward(standard, np.zeros(6))) @ forward(modified, np.zeros(6))
     np.testing.assert_allclose(between[:, 2:], np.eye(4)[:, 2:], rtol=0, atol=1e-15)
     np.testing.assert_allclose(forward(modified, q), forward(standard, q) @ between, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(forward(to_standard(modified), q), forward(modified, q), atol=1e-15)
 
 
 @pytest.mark.parametrize("shape", [(6,), (5, 6), (2, 3, 6), (0, 6), (2, 0, 6)])

@@ -20,8 +20,8 @@ from er3a.kinematics.wrist_partitioned import (
     NeighboursParallel,
     NoArmLength,
     NoWristCentre,
-    closed_form_missing,
     solve_slots,
+    wrist_partition_missing,
     wrist_partitioned_arm,
 )
 from er3a.pipeline.messages.kinematics import say
@@ -190,7 +190,7 @@ def test_other_arms_are_told_what_they_lack(change, lacks):
     arm = make_arm(**change)
     with pytest.raises(NotWristPartitionedError, match=r"^made: no closed-form inverse \(") as caught:
         wrist_partitioned_arm(arm)
-    assert caught.value.property_missing == closed_form_missing(arm) == lacks
+    assert caught.value.property_missing == wrist_partition_missing(arm) == lacks
 
 
 def test_a_collaborative_arm_without_wrist_centre_is_told_so():
@@ -200,7 +200,7 @@ def test_a_collaborative_arm_without_wrist_centre_is_told_so():
         alpha=np.array([90, 0, 0, 90, -90, 0]) * DEG,
         d=[0.089159, 0, 0, 0.10915, 0.09465, 0.0823],
     )
-    missing = closed_form_missing(arm)
+    missing = wrist_partition_missing(arm)
     assert missing.code == "no_common_point_of_axes_4_5_6"
     assert re.fullmatch(r"axes 4, 5 and 6 miss a common point by [\d.]+ mm", say(missing))
 

@@ -52,13 +52,16 @@ def in_base(pose):
     return np.linalg.inv(BASE) @ pose
 
 
+def axes(q):
+    return "{" + ",".join(f"A{i} {each:.12f}" for i, each in enumerate(np.degrees(q), 1)) + "}"
+
+
+def frame(T, more=""):
+    values = zip("XYZABC", numbers_of(T, "kuka"))
+    return "{" + ",".join(f"{key} {each:.12f}" for key, each in values) + more + "}"
+
+
 def krl():
-    def frame(pose):
-        return "{" + ",".join(f"{key} {each:.12f}" for key, each in zip("XYZABC", numbers_of(pose, "kuka"))) + "}"
-
-    def axes(q):
-        return "{" + ",".join(f"A{i} {each:.12f}" for i, each in enumerate(np.degrees(q), 1)) + "}"
-
     loop, down, away = lines()
     inside = "\n".join(f"  LIN {frame(in_base(each))}" for each in loop)
     return (
@@ -87,32 +90,34 @@ END
     )
 
 
+LIMITS = assumed_limits(ARM, CheckOptions())
+RATES = f"a={LIMITS.acceleration[0]:.12f}, v={LIMITS.speed[0]:.12f}"
+
+
+def ur_pose(T):
+    return f"p[{numbers(numbers_of(T, 'ur'))}]"
+
+
 def urscript():
-    limits = assumed_limits(ARM, CheckOptions())
-    rates = f"a={limits.acceleration[0]:.12f}, v={limits.speed[0]:.12f}"
-
-    def pose(T):
-        return f"p[{numbers(numbers_of(T, 'ur'))}]"
-
     loop, down, away = lines()
-    inside = "\n".join(f"    movel({pose(each)}, a=2.0, v={SPEED})" for each in loop)
+    inside = "\n".join(f"    movel({ur_pose(each)}, a=2.0, v={SPEED})" for each in loop)
     return (
         ".script",
         f"""def cell():
-  set_tcp({pose(TOOL)})
+  set_tcp({ur_pose(TOOL)})
   i = 0
   while (i < 2):
-    movej([{numbers(HOME)}], {rates})
-    movej([{numbers(TURNED)}], {rates})
+    movej([{numbers(HOME)}], {RATES})
+    movej([{numbers(TURNED)}], {RATES})
 {inside}
     i = i + 1
   end
   sleep({PAUSE})
-  movel({pose(down)}, a=2.0, v={SPEED})
-  movej([{numbers(TURNED)}], {rates})
-  movel({pose(away)}, a=2.0, v={SPEED})
-  movej([{numbers(TURNED)}], {rates})
-  movej([{numbers(BEYOND)}], {rates})
+  movel({ur_pose(down)}, a=2.0, v={SPEED})
+  movej([{numbers(TURNED)}], {RATES})
+  movel({ur_pose(away)}, a=2.0, v={SPEED})
+  movej([{numbers(TURNED)}], {RATES})
+  movej([{numbers(BEYOND)}], {RATES})
 end
 """,
     )
@@ -181,40 +186,43 @@ def xpl():
     )
 
 
+NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+
+
+def abb_pose(T):
+    values = numbers_of(T, "abb")
+    return f"[{numbers(values[:3])}],[{numbers(values[3:])}]"
+
+
+def abb_joint(q):
+    return f"MoveAbsJ [[{numbers(np.degrees(q))}],{NO_AXES}],vmax,fine,gun;"
+
+
 def rapid():
-    axes = "[9E9,9E9,9E9,9E9,9E9,9E9]"
-
-    def pose(T):
-        values = numbers_of(T, "abb")
-        return f"[{numbers(values[:3])}],[{numbers(values[3:])}]"
-
-    def joint(q):
-        return f"MoveAbsJ [[{numbers(np.degrees(q))}],{axes}],vmax,fine,gun;"
-
     def line(T):
-        return f"MoveL [{pose(in_base(T))},[0,0,0,0],{axes}],slow,fine,gun\\WObj:=plate;"
+        return f"MoveL [{abb_pose(in_base(T))},[0,0,0,0],{NO_AXES}],slow,fine,gun\\WObj:=plate;"
 
     loop, down, away = lines()
     inside = "\n".join(f"      {line(each)}" for each in loop)
     return (
         ".mod",
         f"""MODULE cell
-  PERS tooldata gun:=[TRUE,[{pose(TOOL)}],[1,[0,0,50],[1,0,0,0],0,0,0]];
-  PERS wobjdata plate:=[FALSE,TRUE,"",[{pose(BASE)}],[[0,0,0],[1,0,0,0]]];
+  PERS tooldata gun:=[TRUE,[{abb_pose(TOOL)}],[1,[0,0,50],[1,0,0,0],0,0,0]];
+  PERS wobjdata plate:=[FALSE,TRUE,"",[{abb_pose(BASE)}],[[0,0,0],[1,0,0,0]]];
   CONST speeddata slow:=[{SPEED * 1000},{np.degrees(TURN_SPEED)},5000,1000];
   PROC main()
     ConfL \\Off;
     FOR i FROM 1 TO 2 DO
-      {joint(HOME)}
-      {joint(TURNED)}
+      {abb_joint(HOME)}
+      {abb_joint(TURNED)}
 {inside}
     ENDFOR
     WaitTime {PAUSE};
     {line(down)}
-    {joint(TURNED)}
+    {abb_joint(TURNED)}
     {line(away)}
-    {joint(TURNED)}
-    {joint(BEYOND)}
+    {abb_joint(TURNED)}
+    {abb_joint(BEYOND)}
   ENDPROC
 ENDMODULE
 """,
@@ -237,13 +245,6 @@ def stations():
 
 
 def second_krl():
-    def frame(T, more=""):
-        values = zip("XYZABC", numbers_of(T, "kuka"))
-        return "{" + ",".join(f"{key} {each:.12f}" for key, each in values) + more + "}"
-
-    def axes(q):
-        return "{" + ",".join(f"A{i} {each:.12f}" for i, each in enumerate(np.degrees(q), 1)) + "}"
-
     corner, stop, via, end, singular, chosen = map(in_base, stations())
     kg, centre = LOAD.mass, ",".join(f"{key} {each * 1000}" for key, each in zip("XYZ", LOAD.centre))
     return (
@@ -272,27 +273,21 @@ END
 
 
 def second_urscript():
-    limits = assumed_limits(ARM, CheckOptions())
-    rates = f"a={limits.acceleration[0]:.12f}, v={limits.speed[0]:.12f}"
-
-    def pose(T):
-        return f"p[{numbers(numbers_of(T, 'ur'))}]"
-
     corner, stop, via, end, singular, chosen = stations()
     return (
         ".script",
         f"""def cell():
-  set_tcp({pose(TOOL)})
-  movej([{numbers(HOME)}], {rates})
-  movel({pose(corner)}, a=2.0, v={SPEED}, r=0.02)
-  movel({pose(stop)}, a=2.0, v={SPEED})
-  movej([{numbers(NEAR)}], {rates})
-  movel({pose(singular)}, a=2.0, v={SPEED})
-  movej([{numbers(HOME)}], {rates})
-  movel({pose(stop)}, a=2.0, v={SPEED})
-  movec({pose(via)}, {pose(end)}, a=2.0, v={SPEED})
+  set_tcp({ur_pose(TOOL)})
+  movej([{numbers(HOME)}], {RATES})
+  movel({ur_pose(corner)}, a=2.0, v={SPEED}, r=0.02)
+  movel({ur_pose(stop)}, a=2.0, v={SPEED})
+  movej([{numbers(NEAR)}], {RATES})
+  movel({ur_pose(singular)}, a=2.0, v={SPEED})
+  movej([{numbers(HOME)}], {RATES})
+  movel({ur_pose(stop)}, a=2.0, v={SPEED})
+  movec({ur_pose(via)}, {ur_pose(end)}, a=2.0, v={SPEED})
   set_payload({LOAD.mass}, [{numbers(LOAD.centre)}])
-  movej(get_inverse_kin({pose(chosen)}, qnear=[{numbers(CHOSEN + 0.1)}]), {rates})
+  movej(get_inverse_kin({ur_pose(chosen)}, qnear=[{numbers(CHOSEN + 0.1)}]), {RATES})
 end
 """,
     )
@@ -312,32 +307,23 @@ MLIN({pointc(singular)}, v200, fine, gun);
 
 
 def second_rapid():
-    axes = "[9E9,9E9,9E9,9E9,9E9,9E9]"
-
-    def pose(T):
-        values = numbers_of(T, "abb")
-        return f"[{numbers(values[:3])}],[{numbers(values[3:])}]"
-
-    def joint(q):
-        return f"MoveAbsJ [[{numbers(np.degrees(q))}],{axes}],vmax,fine,gun;"
-
-    corner, stop, via, end, singular, chosen = (f"[{pose(in_base(T))},[0,0,0,1],{axes}]" for T in stations())
+    corner, stop, via, end, singular, chosen = (f"[{abb_pose(in_base(T))},[0,0,0,1],{NO_AXES}]" for T in stations())
     centre = numbers([(LOAD.centre[0]) * 1000, LOAD.centre[1] * 1000, LOAD.centre[2] * 1000 - 100])
     return (
         ".mod",
         f"""MODULE cell
-  PERS tooldata gun:=[TRUE,[{pose(TOOL)}],[0.001,[0,0,0.001],[1,0,0,0],0,0,0]];
-  PERS wobjdata plate:=[FALSE,TRUE,"",[{pose(np.eye(4))}],[{pose(BASE)}]];
+  PERS tooldata gun:=[TRUE,[{abb_pose(TOOL)}],[0.001,[0,0,0.001],[1,0,0,0],0,0,0]];
+  PERS wobjdata plate:=[FALSE,TRUE,"",[{abb_pose(np.eye(4))}],[{abb_pose(BASE)}]];
   PERS loaddata part:=[{LOAD.mass},[{centre}],[1,0,0,0],0,0,0];
   CONST speeddata slow:=[{SPEED * 1000},{np.degrees(TURN_SPEED)},5000,1000];
   PROC main()
     ConfL \\Off;
-    {joint(HOME)}
+    {abb_joint(HOME)}
     MoveL {corner},slow,z20,gun\\WObj:=plate;
     MoveL {stop},slow,fine,gun\\WObj:=plate;
-    {joint(NEAR)}
+    {abb_joint(NEAR)}
     MoveL {singular},slow,fine,gun\\WObj:=plate;
-    {joint(HOME)}
+    {abb_joint(HOME)}
     MoveL {stop},slow,fine,gun\\WObj:=plate;
     MoveC {via},{end},slow,fine,gun\\WObj:=plate;
     GripLoad part;

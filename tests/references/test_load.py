@@ -9,7 +9,7 @@ import pytest
 
 from er3a.errors import InputError
 from er3a.files.reference_sets import FORMATS, check_reference_file, load_references
-from er3a.files.robot_library import REFERENCES, load_robot
+from er3a.files.robot_library import load_robot
 from er3a.references.predict import predict
 from er3a.references.subjects import JointLimit, PoseExcess
 from er3a.robots.robot import GRADES
@@ -51,7 +51,7 @@ def test_every_committed_reference_has_source_grade_and_uncertainty(name):
 
 
 def test_folder_and_name_give_the_same_set():
-    assert load_references(REFERENCES / "er3_600") == load_references("er3_600")
+    assert load_references(Path("data/manual_refs/er3_600").resolve()) == load_references("er3_600")
 
 
 def test_a_limit_that_is_not_given_is_kept_as_not_given():

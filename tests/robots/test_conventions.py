@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.robots.robot import Robot, to_modified, to_standard
 
@@ -49,22 +48,3 @@ def test_conversion_there_and_back_keeps_the_rows(random):
 def test_a_table_of_that_convention_is_returned_as_it_is(random):
     arm = random_arm(random, "modified")
     assert to_modified(arm) is arm
-
-
-def test_the_published_modified_table_is_the_real_arm(random):
-    """Its rows (theta, d, alpha, a) end at the wrist centre; the 78.5 mm to the flange are added as tool."""
-    real = load_robot("er3a_c60")
-    tool = np.eye(4)
-    tool[2, 3] = 0.0785
-    published = real.replace(
-        convention="modified",
-        a=np.array([0, 50, 270, 70, 0, 0]) / 1000,
-        alpha=np.radians([0, 90, 0, 90, -90, 90]),
-        d=np.array([321.5, 0, 0, 299, 0, 0]) / 1000,
-        direction=np.ones(6),
-        offset=np.radians([0, 90, 0, 0, 0, 0]),
-        tool=tool,
-    )
-    q = random.uniform(-np.pi, np.pi, (1000, 6))
-    np.testing.assert_allclose(forward(to_standard(published), q), forward(published, q), atol=1e-15)
-    np.testing.assert_allclose(forward(published, q)[..., :3, 3], forward(real, q)[..., :3, 3], atol=1e-15)

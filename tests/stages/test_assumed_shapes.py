@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.collision.scene import Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.robot_library import load_robot
@@ -58,9 +59,9 @@ def test_the_stages_say_so(small_results):
     study = load_study("config/small.yaml")
     stored = read_results(small_results("trajectory", "er3a_c60", study), RESULTS)
     shapes = stored.results.summary.verdict.shapes
-    assert (shapes.given, shapes.margin_mm) == (True, 20)
+    assert (shapes.given, shapes.margin_mm) == (True, 1000 * ASSUMED_MARGIN)
     paths = stored.results.summary.paths
-    near = [each.name for each in paths if each.expect is None and 0 <= each.clearance.least_mm < 20]
+    near = [each.name for each in paths if each.expect is None and 0 <= each.clearance.least_mm < shapes.margin_mm]
     assert list(shapes.near) == near
     summary = stored.results.summary
     count, (tile,) = summary.verdict.finding.safe, (each for each in summary.figures if each.name == "safe")

@@ -12,10 +12,12 @@ import pytest
 import yaml
 
 from er3a.collision.along import bodies_of
+from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.collision.scene import Scene, Sphere
 from er3a.collision.shapes import arm_shapes, link_frames
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
+from er3a.kinematics.singularity import LEAST_SINGULAR_VALUE
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.results import (
@@ -389,9 +391,15 @@ def test_workspace_names_what_samples_and_budgets_leave_open(study):
         assert found["sampled_places"].amount == placed.fitting - placed.fitting_proven
     assert found["between_places"].amount == pytest.approx(1000 * max(placed.spacing_m))
     assert summary.verdict.shapes is not None
-    assert placed.margin_mm == summary.verdict.shapes.margin_mm == 20
+    assert placed.margin_mm == summary.verdict.shapes.margin_mm == 1000 * ASSUMED_MARGIN
     assert placed.places
-    assert all(place.clearance_mm >= 20 for place in placed.places)  # by distances in full, at all that was asked
+    assert all(
+        place.clearance_mm >= placed.margin_mm for place in placed.places
+    )  # by distances in full, at all that was asked
+
+
+def test_grasps_are_refused_where_arms_without_branches_are_near_singular(study):
+    assert study.vision.least_singular_value == LEAST_SINGULAR_VALUE
 
 
 def test_names_are_words():
@@ -453,8 +461,8 @@ def test_every_setting_is_known_to_leave_something_out_or_nothing():
         for key, model in stage.settings.items():
             if key in ELSEWHERE:
                 continue
-            known = {*LEFT_OUT_BY_SETTINGS[key], *LEAVE_NOTHING_OUT.get(key, ())}
-            assert set(model.model_fields) == known, key
+            known = {*LEFT_OUT_BY_SETTINGS.get(key, ()), *LEAVE_NOTHING_OUT.get(key, ())}
+            assert set(model.model_fields) == known, f"the tables above say what settings of '{key}' leave out"
     for found in LEFT_OUT_BY_SETTINGS.values():
         assert set(found.values()) <= set(LeftOutSubject.__args__)
 

@@ -37,10 +37,11 @@ language.use(LANGUAGE, STUDY.own_titles())
 
 def catalogues(code):
     """The catalogues that pages in a language show: of our words, and of people's texts beside their files."""
-    return [os.path.relpath(file) for file in (catalogue_file(code), *STUDY.own_catalogues(code))]
+    own = [] if code == "en" else (catalogue_file(code), *STUDY.own_catalogues(code))
+    return [os.path.relpath(file) for file in own]
 
 
-CATALOGUES = [] if LANGUAGE == "en" else catalogues(LANGUAGE)
+CATALOGUES = catalogues(LANGUAGE)
 
 
 # Snakemake's own report: its text, and what it calls pages and robots. The text of its first page has no params.

@@ -117,7 +117,7 @@ if STUDY.article:
                 for path in results_of(stage)
             ],
             [os.path.relpath(STUDY.robot_file(robot)) for robot in STUDY.article.names],
-            catalogues("zh"),
+            [catalogues(code) for code in language.LANGUAGES],
         output:
             "results/article.json",
             report(

@@ -311,7 +311,7 @@ class PlanarFour(WithoutParameters):
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         q, second = solve_scara(self.arm, T)[0], self.arm.turning[1]
-        meet = np.abs(_turned(q[:, 0, second] - q[:, 1, second])) < DOUBLE_ROOT
+        meet = np.abs(_shortest(q[:, 0, second] - q[:, 1, second])) < DOUBLE_ROOT
         return q, np.where(meet, CONTINUUM, CERTAIN)
 
     def seeds(self, T: Reals, values: Reals) -> Reals:
@@ -336,12 +336,12 @@ class Completed(WithoutParameters):
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         x, certainty = self.rest.rows(T, values)
         if self.code == "planar_wrist":  # what these joints would have to turn, the tool can't
-            x[np.abs(_turned(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
+            x[np.abs(_shortest(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
         x = np.delete(x, self.lacking, axis=2)
         for first in range(x.shape[1]):  # rows that differ in the joints that are not there
-            same = np.abs(_turned(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
+            same = np.abs(_shortest(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
             x[:, first + 1 :][same] = np.nan
-            meet = np.abs(_turned(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
+            meet = np.abs(_shortest(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
             certainty = np.where(meet.any(axis=1), CONTINUUM, certainty)
         return x, certainty
 
@@ -373,7 +373,7 @@ class LinkedRows(WithoutParameters):
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         x, certainty = self.chain.rows(T, values)
         off = (x - self.start) @ self.apart.T
-        off = np.abs(np.where(self.sliding, off, _turned(off))).max(axis=2)
+        off = np.abs(np.where(self.sliding, off, _shortest(off))).max(axis=2)
         x[off > LEFT_OVER] = np.nan
         return x, certainty
 
@@ -406,7 +406,7 @@ def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]
     return tuple(names)
 
 
-def _turned(x: Reals) -> Reals:
+def _shortest(x: Reals) -> Reals:
     return np.asarray(x - TURN * np.round(x / TURN))
 
 
@@ -416,5 +416,5 @@ def _branches_meet(q: Reals, pairs: tuple[tuple[int, int], ...]) -> Flags:
     for step, joint in pairs:
         for slot in range(8):
             if slot // step % 2 == 0:
-                meet |= np.abs(_turned(q[:, slot, joint] - q[:, slot + step, joint])) < NEAR_SINGULAR
+                meet |= np.abs(_shortest(q[:, slot, joint] - q[:, slot + step, joint])) < NEAR_SINGULAR
     return meet

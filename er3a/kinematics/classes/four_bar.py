@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.geometry.vectors import TURN
+from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import size_of
 from er3a.kinematics.classes.arm_angle import about_z
 from er3a.kinematics.classes.parallel_axes import (
@@ -54,10 +54,10 @@ class FourBar:
         best, at = np.inf, phi
         for low, high in self.intervals:
             middle = 0.5 * (low + high)
-            turned = middle + float(wrapped(np.array(phi - middle)))
+            turned = middle + float(wrap_to_pi(np.array(phi - middle)))
             inside = min(max(turned, low), high)
             for each in (inside, low, high):
-                away = abs(float(wrapped(np.array(each - phi))))
+                away = abs(float(wrap_to_pi(np.array(each - phi))))
                 if away < best:
                     best, at = away, float(each)
         return at
@@ -80,12 +80,7 @@ class FourBar:
         q[..., 1], q[..., 2] = first - k.zero_2, k.sense_3 * (bend - k.zero_3)
         q[..., 3] = k.sense_4 * (phi - k.zero_sum - (first - k.zero_2) - (bend - k.zero_3))
         q[..., 5] = self.sense_6 * (self.total - phi)
-        return np.where(np.isfinite(bend)[..., None], wrapped(q), np.nan)
-
-
-def wrapped(q: Reals) -> Reals:
-    """Angles into (-pi, pi]."""
-    return np.asarray(q - TURN * np.ceil((q - np.pi) / TURN))
+        return np.where(np.isfinite(bend)[..., None], wrap_to_pi(q), np.nan)
 
 
 def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
@@ -166,7 +161,7 @@ def _gaps(arm: ThreeParallel, T: Reals, q: Reals) -> Reals:
 def _put_members(rows: Reals, families: tuple[FourBar, ...]) -> None:
     """Put the middle of each range of each family, with both elbows, into the rows (8, 6) of its joints 1 and 5."""
     for family in families:
-        same = np.abs(wrapped(rows[:, [0, 4]] - [family.theta_1, family.theta_5])).max(axis=1) < SAME_FAMILY
+        same = np.abs(wrap_to_pi(rows[:, [0, 4]] - [family.theta_1, family.theta_5])).max(axis=1) < SAME_FAMILY
         rows[same] = np.nan
         for low, high in family.intervals:
             for elbow in (0, 1):
@@ -206,8 +201,8 @@ def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
             found.append(
                 FourBar(
                     arm,
-                    float(wrapped(np.array(theta_1))),
-                    float(wrapped(np.array(phi_5 - k.zero_5))),
+                    float(wrap_to_pi(np.array(theta_1))),
+                    float(wrap_to_pi(np.array(phi_5 - k.zero_5))),
                     W,
                     total,
                     up,

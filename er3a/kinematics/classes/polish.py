@@ -101,6 +101,20 @@ def eliminate(J: Reals, columns: Integers) -> float:
     return abs(J[5, 5]) / first if first > 0.0 else 0.0
 
 
+@inner_kernel
+def _null_vector(J: Reals, columns: Integers, v: Reals) -> bool:
+    """Fill ``v`` (6,) with what an eliminated J makes zero, 1 in the last pivot's place; False where a pivot is 0."""
+    v[columns[5]] = 1.0
+    for k in range(4, -1, -1):
+        if J[k, k] == 0.0:
+            return False
+        total = 0.0
+        for c in range(k + 1, 6):
+            total -= J[k, c] * v[columns[c]]
+        v[columns[k]] = total / J[k, k]
+    return True
+
+
 @kernel
 def _step(J: Reals, columns: Integers, dq: Reals) -> None:
     """The step that an eliminated system asks for, none in directions without a pivot."""
@@ -162,20 +176,9 @@ def twin_start(
     """
     v = np.zeros(6)
     residual_and_jacobian(links, sliding, T, q, w, J)
-    if eliminate(J, columns) > NEAR_FOLD:
+    if eliminate(J, columns) > NEAR_FOLD or not _null_vector(J, columns, v):
         return False
-    largest = 1.0
-    v[columns[5]] = 1.0
-    for k in range(4, -1, -1):
-        if J[k, k] == 0.0:
-            return False
-        total = 0.0
-        for c in range(k + 1, 6):
-            total -= J[k, c] * v[columns[c]]
-        v[columns[k]] = total / J[k, k]
-        largest = max(largest, abs(v[columns[k]]))
-    for k in range(6):
-        v[k] /= largest
+    v /= np.abs(v).max()
     # left null vector by the transposed Jacobian
     residual_and_jacobian(links, sliding, T, q, w, J)
     for r in range(6):
@@ -185,14 +188,8 @@ def twin_start(
         J[r, 6] = 0.0
     eliminate(J, columns)
     u = np.zeros(6)
-    u[columns[5]] = 1.0
-    for k in range(4, -1, -1):
-        if J[k, k] == 0.0:
-            return False
-        total = 0.0
-        for c in range(k + 1, 6):
-            total -= J[k, c] * u[columns[c]]
-        u[columns[k]] = total / J[k, k]
+    if not _null_vector(J, columns, u):
+        return False
     values = np.zeros(2)
     for side in range(2):
         for k in range(6):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from babel import Locale
 from markupsafe import Markup, escape
 
 from er3a.files.kept_files import write_atomically
@@ -219,7 +220,6 @@ def _measures(robot: Robot, seed: int, numbers: ArticleNumbers) -> Picture:
 
 
 APART_M = 1.8  # between two arms that stand side by side
-LANGUAGE_NAMES = {"en": "English", "zh": "中文"}
 STATUS_OF_STAGES = ("collision", "programs", "vision", "dynamics")
 PAGES = {
     **dict.fromkeys(("teach", "wrist", "same_as_teach"), "teach"),
@@ -234,7 +234,6 @@ PAGES = {
 ROUNDING = 1e-6  # mm or deg
 REAL_PAGES = {"payload": "dynamics", **{stage: stage for stage in ("collision", "vision", "dynamics")}}
 PLACES = {"same_as_teach": "#q=0,45,-30,0,60,0", "programs": f"#{MOVE}"}
-PAGES_IN = {"en": N_("in English"), "zh": N_("in Chinese")}
 ERRORS = (
     "circle_error_mm",
     "missed_after_mm",
@@ -278,7 +277,11 @@ def write_article(study: Study, results: Path, folder: Path) -> None:
         language.use(code, own.own_titles())
         with house_style():
             others = {each: pages[each] for each in pages if each != code}
-            mark = "" if code == study.report.language else tr(PAGES_IN[study.report.language])
+            mark = (
+                ""
+                if code == study.report.language
+                else tr("in {language}", language=Locale(study.report.language).get_display_name(code))
+            )
             _write(study, results, numbers, folder / name, others, mark)
 
 
@@ -301,7 +304,7 @@ def _write(
             code_digest(__name__, *all_messages()),
             seed=study.seed,
         ),
-        others={LANGUAGE_NAMES.get(code, code): name for code, name in others.items()},
+        others=[(code, Locale(code).display_name, name) for code, name in others.items()],
         counts=[(status, BADGES[status], sum(row.status == status for row in rows)) for status in AGREEMENT],
         agreement_words=AGREEMENT,
         sections=[(code, title, [rows[k] for k in _of_section(code)]) for code, title in SECTIONS.items()],

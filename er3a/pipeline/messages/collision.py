@@ -6,17 +6,7 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.left_out  # noqa: F401
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import (
-    BASE,
-    TRIED,
-    CarriedAndLink,
-    CarriedAndSolid,
-    LinkAndSolid,
-    LinkPair,
-    PairsUnexamined,
-    ShapesAssumed,
-    link_label,
-)
+from er3a.collision.pairs import BASE, TRIED, Pair, PairsUnexamined, ShapesAssumed, link_label
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
@@ -103,23 +93,9 @@ TEXTS = texts(
 
 
 @say.register
-def _(found: LinkPair) -> str:
-    return say_as(found, first=_link(found.first), second=_link(found.second))
-
-
-@say.register
-def _(found: LinkAndSolid) -> str:
-    return say_as(found, link=_link(found.link), solid=own_title(found.solid))
-
-
-@say.register
-def _(found: CarriedAndLink) -> str:
-    return say_as(found, link=_link(found.link), carried=own_title(found.carried))
-
-
-@say.register
-def _(found: CarriedAndSolid) -> str:
-    return say_as(found, carried=own_title(found.carried), solid=own_title(found.solid))
+def _(found: Pair) -> str:
+    bodies = {key: value for key, value in vars(found).items() if key != "code"}
+    return say_as(found, **{key: own_title(it) if isinstance(it, str) else _link(it) for key, it in bodies.items()})
 
 
 @say.register

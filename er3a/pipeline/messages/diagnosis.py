@@ -286,13 +286,7 @@ def _(found: WrongScale) -> str:
 
 
 @say.register
-def _(found: BaseElsewhere) -> str:
-    x, y, z = found.shift_mm
-    return say_as(found, "turned" if found.turn_deg >= LEAST_SHOWN else "shifted", x=x, y=y, z=z)
-
-
-@say.register
-def _(found: FlangeElsewhere) -> str:
+def _(found: BaseElsewhere | FlangeElsewhere) -> str:
     x, y, z = found.shift_mm
     return say_as(found, "turned" if found.turn_deg >= LEAST_SHOWN else "shifted", x=x, y=y, z=z)
 
@@ -336,7 +330,7 @@ def _(found: Resolution) -> str:
 
 
 @say.register
-def _(found: MostLikelyFault) -> str:
+def _(found: MostLikelyFault | MainFault) -> str:
     return say_as(found, hypothesis=_residual_falls(found))
 
 
@@ -349,11 +343,6 @@ def _(found: TooSmallToTell) -> str:
         candidates=_candidates(found.candidates),
         distinct=shown(found.distinguishability),
     )
-
-
-@say.register
-def _(found: MainFault) -> str:
-    return say_as(found, hypothesis=_residual_falls(found))
 
 
 @say.register

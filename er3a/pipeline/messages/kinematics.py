@@ -58,7 +58,6 @@ ARM_CLASSES = {
     "three_parallel": N_("axes 2, 3 and 4 parallel: up to 8 solutions in closed form"),
     "general_six": N_("six revolute joints without special geometry: up to 16 solutions by elimination"),
     "six_one_prismatic": N_("six joints, one of them sliding: up to 16 solutions by elimination"),
-    "spherical_wrist_any": N_("spherical wrist on three joints of any kind: up to 8 solutions"),
     "six_two_prismatic": N_("six joints, two of them sliding: up to 8 solutions by elimination"),
     "gantry": N_("three sliding joints and three that turn: two solutions in closed form"),
     "arm_angle": N_("spherical shoulder and wrist: up to 8 solutions in closed form at each arm angle"),

@@ -17,8 +17,9 @@ from string import Formatter
 from typing import Any, Literal, get_args
 
 LanguageCode = Literal["en", "zh"]
-LANGUAGES = get_args(LanguageCode)
+LANGUAGES = get_args(LanguageCode)  # English and those that have a catalogue
 KEYED = "key"  # the context of texts whose key, not whose English, is their entry in a catalogue
+TITLE = "title"  # the context of titles and notes that er3a writes into files
 CATALOGUES = Path(__file__).with_name("locale")
 
 _catalogue: gettext.NullTranslations = gettext.NullTranslations()
@@ -35,6 +36,11 @@ class _AsIs(Formatter):
 
 def N_(text: str) -> str:
     """Mark a text for the catalogues without translating it yet: words in a table of constants."""
+    return text
+
+
+def written_title(text: str) -> str:
+    """Mark a title or note that er3a writes into a file, in English; pages show it by :func:`own_title`."""
     return text
 
 
@@ -101,8 +107,8 @@ def with_unit(value: str, unit: str, gap: str = " ") -> str:
 
 
 def own_title(text: str) -> str:
-    """A title or note out of a person's file in the language in use, if the file says it."""
-    return _own.get(text, text)
+    """A title or note out of a file in the language in use, if the file, or our catalogue for ours, says it."""
+    return _own[text] if text in _own else _catalogue.pgettext(TITLE, text)
 
 
 def translated(context: str, text: str) -> str:

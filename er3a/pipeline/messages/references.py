@@ -30,11 +30,8 @@ GROUP_WORDS = {
     "limits": N_("limits"),
     "speeds": N_("speeds"),
 }
-MISSING_WORDS = {
-    "zero_pose": N_("zero pose"),
+MISSING_WORDS = GROUP_WORDS | {
     "axes": N_("joint axes"),
-    "key_poses": N_("key poses"),
-    "reach": N_("reach"),
     "envelope": N_("labels of a workspace drawing"),
     "limits": N_("joint limits"),
     "speeds": N_("joint speeds"),
@@ -43,7 +40,6 @@ POINT_WORDS = {"flange": N_("flange"), "wrist_centre": N_("wrist centre")}
 SEGMENT_WORDS = {"upper_arm": N_("upper arm from the vertical"), "forearm": N_("forearm from the vertical")}
 LABELS = {"abs_x": "|x|"}
 check_complete("words for groups of references", GROUPS, GROUP_WORDS)
-check_complete("words for groups that a set lacks", GROUPS, MISSING_WORDS)
 STATUS_WORDS = {
     "settled": N_("settled"),
     "settled_up_to_signs": N_("settled up to signs"),

@@ -248,12 +248,7 @@ def entry_word(change: SingleChange) -> str:
 
 
 @say.register
-def _(found: VoidUncertain) -> str:
-    return say_as(found, **_place(found))
-
-
-@say.register
-def _(found: VoidAtShoulder) -> str:
+def _(found: VoidUncertain | VoidAtShoulder) -> str:
     return say_as(found, **_place(found))
 
 

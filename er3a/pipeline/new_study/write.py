@@ -47,6 +47,7 @@ from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.solutions import Solutions, Target
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
+from er3a.pipeline.messages.language import written_title
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
 from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, proof_requirements
@@ -107,7 +108,7 @@ def scenes(robot: Robot, reach: SampledReach) -> list[dict[str, Any]]:
     ground = _foot_of(robot) * 1000
     room = max(ROOM_BELOW_M, ROOM_BELOW * reach.radius)
     low = math.floor((float(frames(robot, reach.q)[..., 2, 3].min()) - room) * 100) * 10
-    deep = _scene("Floor below all that the arm reaches", "机械臂可达范围以下的地面", float(low))
+    deep = _scene(written_title("Floor below all that the arm reaches"), float(low))
     if not reach.stands:
         return [deep]
     top, from_axis, length, width = (
@@ -122,8 +123,8 @@ def scenes(robot: Robot, reach: SampledReach) -> list[dict[str, Any]]:
         "xyz_mm": [round(float(x), 1), round(float(y), 1), round(ground + top - TABLE_THICKNESS_MM / 2, 1)],
         "rpy_deg": [0.0, 0.0, float(reach.side_deg)],
     }
-    floor = _scene("Table on the floor", "地面上的工作台", round(ground - FLOOR_BELOW_MM, 1))
-    bare = _scene("Floor", "地面", round(ground - FLOOR_BELOW_MM, 1))
+    floor = _scene(written_title("Table on the floor"), round(ground - FLOOR_BELOW_MM, 1))
+    bare = _scene(written_title("Floor"), round(ground - FLOOR_BELOW_MM, 1))
     return [floor | {"boxes": [table]}, bare, deep]
 
 
@@ -136,9 +137,9 @@ def _foot_of(robot: Robot) -> float:
     return float(heights.min())
 
 
-def _scene(title: str, title_zh: str, height_mm: float) -> dict[str, Any]:
+def _scene(title: str, height_mm: float) -> dict[str, Any]:
     plane = {"name": "floor", "normal": [0.0, 0.0, 1.0], "offset_mm": height_mm}
-    return {"kind": "scene", "title": title, "title_zh": title_zh, "planes": [plane]}
+    return {"kind": "scene", "title": title, "planes": [plane]}
 
 
 MOST_TARGETS, LEAST_TARGETS = 5, 2
@@ -368,26 +369,25 @@ class TaskSearch:
             yield {
                 "name": "joint_move",
                 "kind": "joint",
-                "title": "All joints together, from one target to another",
-                "title_zh": "各关节同时运动，从一个目标到另一个",
+                "title": written_title("All joints together, from one target to another"),
                 "start_deg": self._written(start.q),
                 "end_deg": self._written(end.q),
             }
 
     def _lines(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
-        titles = {"title": "A straight line, the tool held as it is", "title_zh": "直线，工具姿态不变"}
+        title = written_title("A straight line, the tool held as it is")
         for length, spot, step in product(LENGTHS, spots, STEPS):
             end = _shifted(spot, length * self.reach.radius * np.array(step))
             if self._reached(spot, end):
-                yield _move("line", titles, spot, {"end": end})
+                yield _move("line", title, spot, {"end": end})
 
     def _arcs(self, spots: list[Spot]) -> Iterator[dict[str, Any]]:
-        titles = {"title": "Half a circle, the tool held as it is", "title_zh": "半圆，工具姿态不变"}
+        title = written_title("Half a circle, the tool held as it is")
         for length, spot, (step, side) in product(LENGTHS, spots, zip(STEPS, (*STEPS[2:], *STEPS[:2]))):
             way, bulge = (length * self.reach.radius * np.array(each) for each in (step, side))
             via, end = _shifted(spot, way / 2 + bulge / 2), _shifted(spot, way)
             if self._reached(spot, via) and self._reached(spot, end):
-                yield _move("arc", titles, spot, {"via_mm": via["xyz_mm"], "end": end})
+                yield _move("arc", title, spot, {"via_mm": via["xyz_mm"], "end": end})
 
     def _reached(self, spot: Spot, pose: dict[str, list[float]]) -> bool:
         """Whether the arm reaches another pose on a target's branch, with room and clear of everything."""
@@ -428,10 +428,11 @@ class TaskSearch:
         return "collides" if measured(around, motion).contacts else None
 
 
-def _move(kind: str, titles: dict[str, str], spot: Spot, rest: dict[str, Any]) -> dict[str, Any]:
+def _move(kind: str, title: str, spot: Spot, rest: dict[str, Any]) -> dict[str, Any]:
     """A path of the tool, without its duration."""
     branch = spot.label.replace("_elbow", ", elbow").replace("_no_flip", ", no flip").replace("_flip", ", flip")
-    return {"name": kind, "kind": kind, **titles, "start": spot.pose, "start_branch": branch.replace("_", " "), **rest}
+    branch = branch.replace("_", " ")
+    return {"name": kind, "kind": kind, "title": title, "start": spot.pose, "start_branch": branch, **rest}
 
 
 def _distance(spot: Spot, other: Spot) -> float:
@@ -708,15 +709,12 @@ def _without_targets(arm: Arm, search: TaskSearch, found: int) -> str:
 
 
 def _targets(found: FoundTasks) -> list[dict[str, Any]]:
-    notes = {
-        True: ("Tool straight down.", "工具竖直朝下。"),
-        False: ("As the arm holds the tool at random joint values.", "随机关节值下的工具姿态。"),
-    }
-    targets = []
-    for number, spot in enumerate(found.spots, 1):
-        note, note_zh = notes[spot.down]
-        targets.append({"name": f"target_{number}", "note": note, "note_zh": note_zh, **spot.written})
-    return targets
+    down, other = (
+        written_title("Tool straight down."),
+        written_title("As the arm holds the tool at random joint values."),
+    )
+    numbered = enumerate(found.spots, 1)
+    return [{"name": f"target_{k}", "note": down if spot.down else other, **spot.written} for k, spot in numbered]
 
 
 def _study(name: str) -> str:

@@ -66,6 +66,7 @@ class Stage:
     title, question : marked with ``N_``: the page's title, and what it answers
     settings : per key of the study file the model of what stands there; the first is the stage's own
     inputs : the files that a robot's results rest on besides its own file
+    given : what else of the study they rest on besides settings, as plain data by name
     wanted : whether a robot of a study goes through the stage at all: whether the study gives it what the stage reads
     applies : why the stage can't be computed for a robot, a finding of one of ``absences``; None if it can
     views : ``record`` (a recording, with its preview) and ``report`` (a page), as far as the stage has them
@@ -78,6 +79,7 @@ class Stage:
     question: str
     settings: Mapping[str, type[StrictModel]]
     inputs: Callable[[StudyFiles, str], list[Path]] = no_files
+    given: Callable[[StudyFiles, str], dict[str, Any]] = lambda study, robot: {}
     wanted: Callable[[StudyFiles, str], bool] = wanted_of_all
     applies: Callable[[Robot], Finding | None] = applies_to_all
     absences: tuple[type[Finding], ...] = ()

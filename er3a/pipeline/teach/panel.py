@@ -15,7 +15,7 @@ from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length, wrist_and_forearm
 from er3a.kinematics.solutions import branch_labels
-from er3a.kinematics.wrist_partitioned import CoupledJoints, closed_form_missing, has_branches
+from er3a.kinematics.wrist_partitioned import CoupledJoints, has_branches, wrist_partition_missing
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import body_word
 from er3a.pipeline.messages.kinematics import branch_word
@@ -331,7 +331,7 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
     ----------
     near : where the panel warns of a singularity
     """
-    missing = closed_form_missing(robot) or (None if robot.coupling is None else CoupledJoints())
+    missing = wrist_partition_missing(robot) or (None if robot.coupling is None else CoupledJoints())
     thresholds = {kind: near.of(kind) for kind in TYPES}
     labels = [] if missing else [branch_word(label) for label in branch_labels(robot)]
     return {
@@ -340,7 +340,7 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
         "size": drawn_size(robot),
         **drawn_shapes(robot),
         "characteristic_length": characteristic_length(robot),
-        "length_is": "links" if closed_form_missing(robot) else "wrist",
+        "length_is": "links" if wrist_partition_missing(robot) else "wrist",
         "singular_sets": singular_sets(robot),
         "no_closed_form": say(missing) if missing else None,
         "branch_labels": labels,

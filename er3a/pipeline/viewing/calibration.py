@@ -297,7 +297,7 @@ def _binned(ax, values: Reals, left: Reals) -> None:
             ax.fill_between(at, mean - error, mean + error, color=JOINTS[c], alpha=0.2, linewidth=0)
 
 
-STAGE = "calibration"
+STAGE_NAME = "calibration"
 SECONDS_A_POSE = 0.25
 MOST_SHOWN = 400
 ARROW = 0.1  # of the arm's size: the longest error's arrow
@@ -324,7 +324,7 @@ def record_calibration(found: Calibration, errors: MeasuredErrors, output: Path)
     shown = Recorded(
         robot=robot,
         name=robot.name,
-        stage=STAGE,
+        stage=STAGE_NAME,
         note=_note(found, errors),
         runs=[run],
         curves=[Curves("errors", "Error (mm)", names, colours)],

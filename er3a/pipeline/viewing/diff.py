@@ -15,13 +15,13 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.messages.workspace import POINTS
 from er3a.pipeline.results import CHECKSUMS, AbsentResults, Input, Provenance, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.numbers import number
 from er3a.pipeline.viewing.page import Head, ShownFigure, stage_head
 
-POINTS = {"tool_point": N_("tool point"), "wrist_centre": N_("wrist centre"), "flange": N_("flange")}
 VIEWS = {"section": N_("section"), "side": N_("side view")}
 SAME_BORDER_MM = 1e-6
 DEFAULT_RESULTS = "results"

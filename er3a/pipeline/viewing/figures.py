@@ -235,10 +235,11 @@ def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
     axes.set_ylabel(y_label)
 
 
-def axis_label(table: Table, attribute: str) -> str:
-    """What stands at an axis along which a column is drawn: its heading (else its meaning) and its unit."""
+def axis_label(table: Table | type[Table], attribute: str, unit: str = "") -> str:
+    """What stands at an axis along which a column is drawn: its heading (else its meaning) and its unit; ``unit``: in
+    place of the column's, where an arm's joints settle it."""
     spec = table.columns()[attribute]
-    what, unit = tr(spec.heading or spec.meaning), spec.unit.replace("^2", "²").replace("^3", "³")
+    what, unit = tr(spec.heading or spec.meaning), (unit or spec.unit).replace("^2", "²").replace("^3", "³")
     return bracketed(what, tr(unit))
 
 

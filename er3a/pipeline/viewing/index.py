@@ -32,7 +32,7 @@ from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.pages import caveat, decision, next_step, what_it_can_do
 from er3a.pipeline.messages.say import bracketed, joined, say
-from er3a.pipeline.messages.validation import how_far_off, missed_text, shortened
+from er3a.pipeline.messages.validation import CONVENTIONS, how_far_off, missed_text, shortened
 from er3a.pipeline.messages.workspace import box_text, void_text
 from er3a.pipeline.results import (
     AbsentResults,
@@ -65,7 +65,6 @@ from er3a.robots.robot import Robot
 
 BORDER_POINT = "tool_point"
 Workspaces = Mapping[str, WorkspaceResults | AbsentResults | None]
-CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
 
 
 def write_compare(study: Study, results: Path, workspaces: Workspaces, output: Path) -> None:

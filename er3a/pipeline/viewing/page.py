@@ -390,7 +390,7 @@ def breakable(name: str) -> Markup:
 def whole_sentence(finding: str) -> str:
     """A finding's text as a sentence of its own."""
     text = tr("{finding}.", finding=finding)
-    return text[:1].upper() + text[1:] if language.current() == "en" else text
+    return text[:1].upper() + text[1:] if language.current() != "zh" else text
 
 
 def run_command(study: Study, page: str) -> str | None:

@@ -113,7 +113,7 @@ def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int)
     )
 
 
-STAGE = "collision"
+STAGE_NAME = "collision"
 CHECKS = 1  # points of a path checked between its samples to begin with; clearance adds what it needs
 SAMPLES_STREAM, PLACES_STREAM = 0, 1
 
@@ -121,7 +121,7 @@ SAMPLES_STREAM, PLACES_STREAM = 0, 1
 def compute(study: Study, name: str) -> model.CollisionResults:
     """Work out where a robot of the study is free of collisions."""
     robot, settings = study.robot(name), study.section(CollisionSettings)
-    scene = study.scene(name, STAGE)
+    scene = study.scene(name, STAGE_NAME)
     bodies = Bodies(robot, scene)
     space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])

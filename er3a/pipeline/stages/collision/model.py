@@ -8,6 +8,7 @@ from typing import Literal
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 
@@ -197,9 +198,9 @@ class PathClearances(Table):
     """Clearance over time of each path, with the points of both bodies that are nearest."""
 
     path: Texts = column("name of the path")
-    t_s: Reals = column("time since the path's start")
+    t_s: Reals = column("time since the path's start", heading=N_("time"))
     q_deg: Reals = per_joint("joint angle; NaN where the path can't be reached")
-    clearance_mm: Reals = column("least distance; negative by the depth of overlap")
+    clearance_mm: Reals = column("least distance; negative by the depth of overlap", heading=N_("clearance"))
     between: Texts = column("what is nearest to what")
     from_mm: Reals = vector("from_{}_mm", "the nearest point of the first body")
     to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body")

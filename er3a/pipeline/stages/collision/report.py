@@ -20,7 +20,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.played import motions
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
@@ -141,9 +141,9 @@ def clearance_over_time(results: model.CollisionResults) -> Picture | None:
     for ax in axes.flat[len(names) :]:
         ax.set_visible(False)
     for ax in axes[:, 0]:
-        ax.set_ylabel(tr("clearance (mm)"), fontsize=8)
+        ax.set_ylabel(axis_label(rows, "clearance_mm"), fontsize=8)
     for ax in axes[-1]:
-        ax.set_xlabel(tr("time (s)"), fontsize=8)
+        ax.set_xlabel(axis_label(rows, "t_s"), fontsize=8)
     met = [found.name for found in results.summary.closest if found.kind == "path" and found.clearance_mm < 0]
     caption = (
         tr("Below zero bodies overlap: {paths}.", paths=joined(met, ", "))

@@ -275,16 +275,13 @@ def path_torques(
         q=shown(arm.robot, q),
         torque=tau,
         tolerance=tolerance,
-        **{name: getattr(parts, name) for name in PARTS},
+        **{name: getattr(parts, name) for name in model.PARTS},
         power_w=tau * qd,
     ).take(np.isin(t, evenly))
     inertia = np.stack([own.min(axis=0), own.max(axis=0)], axis=1)
     imbalance = power_imbalance(arm.model, parts, q, qd, qdd)
     own_load = arm.load if summary.program_load_kg is not None else None
     return PathTorques(summary, asked, rows, needed, inertia, imbalance, own_load)
-
-
-PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 
 
 def _joint_loads(
@@ -296,13 +293,13 @@ def _joint_loads(
         found.append(
             model.JointLoad(
                 joint=j + 1,
-                unit="N" if slides else "N m",
+                unit=model.FORCE if slides else model.TORQUE,
                 peak=float(asked.peak[j]),
                 tolerance=float(tolerance[at, j]),
                 peak_at_s=float(t[at]),
                 rms=float(asked.rms[j]),
                 rms_tolerance=float(np.sqrt(np.mean(tolerance[:, j] ** 2))),
-                **{name: float(np.abs(getattr(parts, name)[:, j]).max()) for name in PARTS},
+                **{name: float(np.abs(getattr(parts, name)[:, j]).max()) for name in model.PARTS},
                 power_w=float(asked.power[j]),
                 braking_w=float(asked.braking[j]),
                 work_j=float(asked.work[j]),
@@ -614,7 +611,7 @@ def _holding(arm: LoadedArm) -> tuple[model.HoldingTorque, ...]:
             torque=float(found.values[j]),
             bound=float(found.bound[j]),
             tolerance=float(tolerance[j]),
-            unit="N" if slides[j] else "N m",
+            unit=model.FORCE if slides[j] else model.TORQUE,
             q=tuple(q[j].tolist()),
         )
         for j in range(arm.robot.joints)
@@ -637,7 +634,7 @@ def _motors(
         found.append(
             model.MotorNeed(
                 joint=j + 1,
-                unit="N" if slides else "N m",
+                unit=model.FORCE if slides else model.TORQUE,
                 peak=peak,
                 rms=max(float(each.rms[j]) for each in asked),
                 holding=abs(holding[j].torque),
@@ -688,7 +685,7 @@ def _masses_used(
 
 def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]:
     loads = [load for path in summaries for load in path.joints if path.counts]
-    turning = [load for load in loads if load.unit == "N m"]
+    turning = [load for load in loads if load.unit == model.TORQUE]
     peak = max(turning, key=lambda load: load.peak, default=None)
     held = model.hardest_held(holding) if holding else None
     energy = [sum(load.work_j for load in path.joints) for path in summaries if path.counts]
@@ -696,7 +693,7 @@ def _figures(summaries, holding, uses, imbalances, masses) -> tuple[Figure, ...]
     figures = (
         Figure("paths", sum(path.counts for path in summaries), "", of=len(summaries)),
         Figure("mass", total, "kg"),
-        Figure("peak_torque", peak.peak if peak else None, "N m", peak.tolerance if peak else None),
+        Figure("peak_torque", peak.peak if peak else None, model.TORQUE, peak.tolerance if peak else None),
         Figure("holding_torque", abs(held.torque), held.unit, held.tolerance) if held else NO_FIGURE,
         Figure("energy", max(energy, default=None), "J"),
         Figure("utilisation", 100 * uses[0].ratio if uses else None, "%"),

@@ -6,8 +6,9 @@ Torques are those that the drives give, in the manufacturer's signs: N m for rev
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
@@ -20,6 +21,10 @@ from er3a.planning.timing import NoTimeLaw
 from er3a.robots.robot import Grade
 
 Unit = Literal["N m", "N"]
+"""Of the torque of a joint that turns, and of one that slides."""
+TORQUE, FORCE = get_args(Unit)
+EITHER = N_("N m or N")
+PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 Quantity = Literal["peak", "rms", "holding"] | WristQuantity
 Need = Literal["masses", "peak", "rated", "armature", "friction", "wrist_moment", "wrist_inertia", "payload", "load"]
 
@@ -185,13 +190,19 @@ class HoldingTorque:
     q: tuple[float, ...]
 
 
+def shared_unit(units: Iterable[Unit]) -> str:
+    """The unit of the torques of several joints, for a heading."""
+    found = set(units)
+    return found.pop() if len(found) == 1 else EITHER
+
+
 NOTHING_HELD = 1e-9
 """N m or N: less than that is rounding."""
 
 
 def hardest_held(holding: tuple[HoldingTorque, ...]) -> HoldingTorque:
     """The joint that holds most; one that turns if any has something to hold, because N and N m don't compare."""
-    return max(holding, key=lambda held: (held.unit == "N m" and held.bound > NOTHING_HELD, held.bound))
+    return max(holding, key=lambda held: (held.unit == TORQUE and held.bound > NOTHING_HELD, held.bound))
 
 
 @dataclass(frozen=True)
@@ -293,7 +304,7 @@ class PathLoad:
     @property
     def hardest(self) -> JointLoad:
         """The joint with the largest peak; one that turns if there is any, because N and N m don't compare."""
-        return max(self.joints, key=lambda load: (load.unit == "N m", load.peak))
+        return max(self.joints, key=lambda load: (load.unit == TORQUE, load.peak))
 
 
 @dataclass(frozen=True)
@@ -355,15 +366,15 @@ class TorqueRows(Table):
     """Torques along the paths that the arm can follow, N m (N for prismatic joints)."""
 
     path: Texts = column("name of the path")
-    t_s: Reals = column("time since the path's start")
+    t_s: Reals = column("time since the path's start", heading=N_("time"))
     q: Reals = per_joint("joint value", "deg or mm")
-    torque: Reals = per_joint("torque of the drive", "N m or N")
-    tolerance: Reals = per_joint("by which it may be off", "N m or N")
-    gravity: Reals = per_joint("part against gravity", "N m or N")
-    inertia: Reals = per_joint("part of accelerations, rotors included", "N m or N")
-    velocity: Reals = per_joint("centrifugal and Coriolis part", "N m or N")
-    friction: Reals = per_joint("part against friction, as far as known", "N m or N")
-    tool: Reals = per_joint("part against forces at the tool", "N m or N")
+    torque: Reals = per_joint("torque of the drive", EITHER, heading=N_("drive torque"))
+    tolerance: Reals = per_joint("by which it may be off", EITHER)
+    gravity: Reals = per_joint("part against gravity", EITHER)
+    inertia: Reals = per_joint("part of accelerations, rotors included", EITHER)
+    velocity: Reals = per_joint("centrifugal and Coriolis part", EITHER)
+    friction: Reals = per_joint("part against friction, as far as known", EITHER)
+    tool: Reals = per_joint("part against forces at the tool", EITHER)
     power_w: Reals = per_joint("power of the drive", heading=N_("drive power"))
 
 
@@ -372,8 +383,10 @@ class DiagramRows(Table):
     """The load diagram: how far from the last axis a point load's centre may be; NaN where it may nowhere."""
 
     mass_kg: Reals = column("mass of the load")
-    along_mm: Reals = column("distance of its centre from the flange along the last axis")
-    across_mm: Reals = column("greatest distance of its centre from the last axis")
+    along_mm: Reals = column(
+        "distance of its centre from the flange along the last axis", heading=N_("from the flange along the last axis")
+    )
+    across_mm: Reals = column("greatest distance of its centre from the last axis", heading=N_("from the last axis"))
 
 
 @dataclass(frozen=True, eq=False)

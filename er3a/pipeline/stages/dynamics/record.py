@@ -12,7 +12,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.say import say_all
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.dynamics.model import DynamicsResults, TorqueRows
+from er3a.pipeline.stages.dynamics.model import FORCE, TORQUE, DynamicsResults, TorqueRows, shared_unit
 from er3a.pipeline.stages.dynamics.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.palette import JOINTS, rgb
@@ -38,8 +38,7 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
     """Write the dynamics recording of a robot."""
     results, robot = stored.results, study.robot(stored.robot)
     titles = {path.name: path.title for path in results.summary.paths}
-    slides = robot.slides
-    unit = "N" if slides.all() else "N m or N" if slides.any() else "N m"
+    unit = shared_unit(FORCE if slides else TORQUE for slides in robot.slides)
     scale = _arrow_scales(robot, results.torques.torque)
     shown = Recorded(
         robot=robot,

@@ -22,7 +22,6 @@ from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
 DRAWN = 161
-PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
@@ -37,16 +36,11 @@ def bound_text(bound: float) -> str:
     return number(float(np.ceil(bound / digit - 1e-5) * digit), 4)
 
 
-def torque_unit(units: set[model.Unit]) -> str:
-    """The unit of torques and forces of several joints, for a heading."""
-    return units.pop() if len(units) == 1 else tr("N m or N")
-
-
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
     figure, (torque, parts, power) = row_of_panels(3, 13.0, 3.4, (0.75, 0.55, 0.1, 0.15, 0.85))
-    load, unit = path.hardest, torque_unit({load.unit for load in path.joints})
+    load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
         colour = joint_colour(j)
@@ -55,13 +49,14 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
         power.plot(rows.t_s, rows.power_w[:, j], color=colour, label=f"J{j + 1}")
     torque.legend(ncols=3, fontsize=8)
-    torque.set_ylabel(tr("drive torque ({unit})", unit=unit))
+    torque.set_ylabel(axis_label(rows, "torque", unit))
     names = dict(
         zip(
-            PARTS, (tr("gravity"), tr("inertia"), tr("Coriolis, centrifugal"), tr("friction"), tr("forces at the tool"))
+            model.PARTS,
+            (tr("gravity"), tr("inertia"), tr("Coriolis, centrifugal"), tr("friction"), tr("forces at the tool")),
         )
     )
-    for part, style in zip(PARTS, STYLES):
+    for part, style in zip(model.PARTS, STYLES):
         if part == "tool" and not rows.tool.any():
             continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
@@ -70,8 +65,8 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     power.axhline(0.0, color=MUTED, linewidth=0.8)
     power.set_ylabel(axis_label(rows, "power_w"))
     for ax in (torque, parts, power):
-        ax.set_xlabel(tr("time (s)"))
-    most = max(PARTS, key=lambda part: getattr(load, part))
+        ax.set_xlabel(axis_label(rows, "t_s"))
+    most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr(
         "J{joint} needs the greatest torque, {peak} ± {tolerance} {unit} at {t:.2f} s; largest contribution: "
         "{part}. Shaded: uncertainty of the torques from the tolerances of masses and centres. Power below 0 is"
@@ -96,7 +91,7 @@ def holding_figure(summary: model.DynamicsSummary) -> Picture:
     ax.bar(joints, size, color=[joint_colour(int(j)) for j in joints], width=0.6)
     ax.errorbar(joints, size, yerr=tolerance, fmt="none", ecolor=INK, capsize=4)
     ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
-    ax.set_ylabel(tr("holding torque ({unit})", unit=torque_unit({held.unit for held in summary.holding})))
+    ax.set_ylabel(tr("holding torque ({unit})", unit=_units(summary)["torque"]))
     ax.grid(visible=False, axis="x")
     worst = model.hardest_held(summary.holding)
     caption = tr(
@@ -123,8 +118,8 @@ def diagram_figure(summary: model.DynamicsSummary, rows: model.DiagramRows) -> P
         ax.plot([z], [np.hypot(x, y)], "o", color=HIGHLIGHT, label=tr("the load, {mass:.3g} kg", mass=masses.load_kg))
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
-    ax.set_xlabel(tr("from the flange along the last axis (mm)"))
-    ax.set_ylabel(tr("from the last axis (mm)"))
+    ax.set_xlabel(axis_label(rows, "along_mm"))
+    ax.set_ylabel(axis_label(rows, "across_mm"))
     ax.legend(loc="upper right")
     caption = tr(
         "A load whose centre lies below the curve of its mass is within the allowed moments and inertias of the wrist. "
@@ -201,15 +196,15 @@ def _use(use: model.Use) -> list[str]:
 
 def _units(summary: model.DynamicsSummary) -> dict[str, str]:
     """Units of torques, speeds and inertias in headings, by what the arm's joints do."""
-    torque = {held.unit for held in summary.holding}
-    turning = {"torque": "N m", "speed": tr("deg/s"), "inertia": "kg m²"}
-    sliding = {"torque": "N", "speed": "mm/s", "inertia": "kg"}
-    mixed = {"torque": tr("N m or N"), "speed": tr("deg/s or mm/s"), "inertia": tr("kg m² or kg")}
-    return mixed if len(torque) > 1 else sliding if torque == {"N"} else turning
+    torque = model.shared_unit(held.unit for held in summary.holding)
+    turning, sliding = (tr("deg/s"), "kg m²"), ("mm/s", "kg")
+    of_others = {model.TORQUE: turning, model.FORCE: sliding}
+    speed, inertia = of_others.get(torque, (tr("deg/s or mm/s"), tr("kg m² or kg")))
+    return {"torque": tr(torque), "speed": speed, "inertia": inertia}
 
 
 def _label(joint: int, unit: model.Unit) -> str:
-    return f"J{joint}" if unit == "N m" else tr("J{joint} (slides)", joint=joint)
+    return f"J{joint}" if unit == model.TORQUE else tr("J{joint} (slides)", joint=joint)
 
 
 def _motor(motor: model.MotorNeed) -> list[str]:
@@ -283,7 +278,7 @@ def _joints(path: model.PathLoad) -> list[list[str]]:
             f"{number(_no_noise(load.peak), 3)} ± {number(_no_noise(load.tolerance), 2)}",
             moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
             f"{number(_no_noise(load.rms), 3)} ± {number(_no_noise(load.rms_tolerance), 2)}",
-            *(number(_no_noise(getattr(load, part)), 3) for part in PARTS),
+            *(number(_no_noise(getattr(load, part)), 3) for part in model.PARTS),
             _both(load.power_w, load.braking_w),
             _both(load.work_j, load.recovered_j),
         ]

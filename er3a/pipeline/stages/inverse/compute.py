@@ -29,7 +29,7 @@ from er3a.kinematics.round_trips import MOST_BY_CLASS, SAME_JOINTS_RAD, BatchRou
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Iteration, Method, Solutions, Target, TargetOutcome
-from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches, solve_slots, wrist_partitioned_arm
+from er3a.kinematics.wrist_partitioned import has_branches, solve_slots, wrist_partition_missing, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.progress import shown_progress
@@ -337,7 +337,7 @@ RPY_DEG: dict[model.ToolOrientation, tuple[float, float, float]] = {
 def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows:
     """Number of branches, of those within the limits, and of those clear too, on a grid of ``cells`` by ``cells``."""
     points, T_base_tool = axes_at_zero_theta(robot)[1:]
-    if closed_form_missing(robot) is None:
+    if wrist_partition_missing(robot) is None:
         arm = wrist_partitioned_arm(robot)
         reach = arm.wrist_reach + np.linalg.norm(points[1] - points[0]) + np.linalg.norm(arm.wrist_in_tool)
     else:
@@ -367,7 +367,7 @@ def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows
     return model.MapRows.stacked(tables)
 
 
-STAGE = "inverse"
+STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9
 REPRODUCED_RAD = 1e-9
 MOST_ADVISED = 100  # of many targets those for which it is looked for what would help
@@ -379,7 +379,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets, robot)
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)
-    scene = study.scene(name, STAGE)
+    scene = study.scene(name, STAGE_NAME)
     assumed = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {})
     clearance = (motion.assumed_margin_mm if assumed else motion.penetration_tolerance_mm) / 1000
     many, advised, solved = len(targets) > MANY_TARGETS, 0, list[SolvedTarget]()

@@ -17,7 +17,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, factors_where_defined
 from er3a.kinematics.solutions import branch_labels
-from er3a.kinematics.wrist_partitioned import closed_form_missing, has_branches
+from er3a.kinematics.wrist_partitioned import has_branches, wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
@@ -389,7 +389,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         rest += each.left_out if each.expect in (None, "safe") else ()
         if motion is None:
             stops = each.ends.t if each.ends else None
-            lacking, outcome = closed_form_missing(robot), each.outcome_unfollowed
+            lacking, outcome = wrist_partition_missing(robot), each.outcome_unfollowed
             skipped.append(model.PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
             continue
         found = judgement.judge(robot, motion, near, limits)

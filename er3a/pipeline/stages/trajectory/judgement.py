@@ -13,7 +13,7 @@ from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.singularity import NearSingular
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion
@@ -119,7 +119,7 @@ def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
 
 def _joint_faults(robot: Robot, motion: Polynomials, checks: Reals, near: NearSingular, limits: JointLimits) -> Faults:
     """Faults found in one run through the motion, whose parts are made while they are wanted."""
-    singular = motion_faults.SingularCheck(robot, near) if closed_form_missing(robot) is None else None
+    singular = motion_faults.SingularCheck(robot, near) if wrist_partition_missing(robot) is None else None
     within, greatest = motion_faults.LimitCheck(robot), motion_faults.MaxRates(robot.joints)
     rates = [motion_faults.RateCheck(limit) for limit in limits.rates]
     for part in motion.parts():

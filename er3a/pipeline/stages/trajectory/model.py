@@ -380,13 +380,13 @@ class MotionRows(Table):
     """Motions of the arm; joint columns are NaN where the path can't be reached."""
 
     path: Texts = column("name of the path")
-    t_s: Reals = column("time since the motion's start")
+    t_s: Reals = column("time since the motion's start", heading=N_("time"))
     q_deg: Reals = per_joint("joint angle", heading=N_("joint angle"))
     q_deg_s: Reals = per_joint("joint velocity", heading=N_("velocity"))
     q_deg_s2: Reals = per_joint("joint acceleration", heading=N_("acceleration"))
     xyz_mm: Reals = vector("{}_mm", "tool point in the base frame")
     speed_ratio: Reals = column("greatest ratio of a joint's speed to its limit")
-    condition_number: Reals = column("condition number of the scaled Jacobian")
+    condition_number: Reals = column("condition number of the scaled Jacobian", heading=N_("condition number"))
     smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
 
 
@@ -416,8 +416,8 @@ class Clearances(Table):
     """Times at which the clearance was measured in full; NaN where the path can't be reached."""
 
     path: Texts = column("name of the path")
-    t_s: Reals = column("time since the path's start")
-    clearance_mm: Reals = column("least distance, negative by the depth of an overlap")
+    t_s: Reals = column("time since the path's start", heading=N_("time"))
+    clearance_mm: Reals = column("least distance, negative by the depth of an overlap", heading=N_("clearance"))
     between: Texts = column("the two bodies nearest to each other")
 
 

@@ -138,7 +138,7 @@ class PathFigure:
                 ax.yaxis.set_label_coords(-0.15, 0.5)
             for ax in column[:-1]:
                 ax.tick_params(labelbottom=False)
-            column[-1].set_xlabel(tr("time (s)"), fontsize=FONT)
+            column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
 
     def draw(
         self,
@@ -227,7 +227,7 @@ def _condition(ax: Axes, rows: model.PathChecks) -> None:
     values = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
     ax.plot(rows.t_s, values, color=palette.MODEL)
     _logarithmic(ax, 1.0, min(1e6, 2 * np.nanmax(np.append(values, 50.0))))
-    ax.set_ylabel(tr("condition number"), fontsize=FONT)
+    ax.set_ylabel(axis_label(rows, "condition_number"), fontsize=FONT)
 
 
 def _logarithmic(ax: Axes, low: float, high: float) -> None:
@@ -400,10 +400,10 @@ def _curves(paths: list[Measured], results: model.TrajectoryResults) -> Figure:
     for ax in axes.flat[len(paths) :]:
         ax.set_visible(False)
     for ax in axes[:, 0]:
-        ax.set_ylabel(tr("clearance (mm)"), fontsize=8)
+        ax.set_ylabel(axis_label(rows, "clearance_mm"), fontsize=8)
     for k, ax in enumerate(axes.flat[: len(paths)]):
         if k + CLEARANCE_COLUMNS >= len(paths):
-            ax.set_xlabel(tr("time (s)"), fontsize=8)
+            ax.set_xlabel(axis_label(rows, "t_s"), fontsize=8)
     low, high = np.nanmin(rows.clearance_mm), np.nanmax(rows.clearance_mm)
     axes[0, 0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
     return figure

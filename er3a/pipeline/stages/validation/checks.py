@@ -26,7 +26,7 @@ from er3a.identifiability.statements import (
     not_the_robot_described,
 )
 from er3a.kinematics import round_trips
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation import model
@@ -219,7 +219,7 @@ def table_checks(robot: Robot) -> list[model.Check]:
         "limit_unit": int(turning.shape[1] > 1 and 0 < np.degrees(np.nanmax(turning)) < WIDEST_IN_RADIANS),
     }
     checks = [against_itself(name, "table_sanity", float(count), 0.5) for name, count in faults.items()]
-    missing = model.NumbersMissing() if checks[0].status == "fail" else closed_form_missing(robot)
+    missing = model.NumbersMissing() if checks[0].status == "fail" else wrist_partition_missing(robot)
     if missing:
         return [*checks, model.Unjudged(model.SelfCheck("closed_form"), "table_sanity", "", missing)]
     return [*checks, against_itself("closed_form", "table_sanity", 0.0, 0.5)]
@@ -227,7 +227,7 @@ def table_checks(robot: Robot) -> list[model.Check]:
 
 def _class_checks(robot: Robot, poses: int, seed: int) -> list[model.Check]:
     """Round trips of an arm without the closed form of spherical wrists, by its class."""
-    missing = closed_form_missing(robot)
+    missing = wrist_partition_missing(robot)
     if missing and not round_trips.has_class(robot):
         return [model.Unjudged(model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", model.NoClosedForm(missing))]
     found = round_trips.batch_round_trips(robot, np.random.default_rng(seed), poses)
@@ -242,7 +242,7 @@ def _class_checks(robot: Robot, poses: int, seed: int) -> list[model.Check]:
 
 def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.Check], model.RoundTripErrors | None]:
     """Round trips as checks, and their errors; None if the arm has no closed form."""
-    missing = closed_form_missing(robot)
+    missing = wrist_partition_missing(robot)
     if missing or robot.coupling is not None:
         return _class_checks(robot, min(poses, round_trips.MOST_BY_CLASS), seed), None
     found = round_trips.slot_round_trips(robot, poses, seed)

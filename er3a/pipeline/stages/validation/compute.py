@@ -21,7 +21,7 @@ from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.forward import frames
 from er3a.kinematics.round_trips import MOST_BY_CLASS
 from er3a.kinematics.table_batch import robot_of
-from er3a.kinematics.wrist_partitioned import closed_form_missing
+from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import LeftOut
@@ -310,7 +310,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         diagnoses=diagnoses,
         calibrations=calibrations,
         circle_points=_rounded(circles),
-        table=model.TableFacts(robot.convention, closed_form_missing(robot)),
+        table=model.TableFacts(robot.convention, wrist_partition_missing(robot)),
         round_trips=trips,
         section_origin_mm=_section_origin_mm(robot),
         counts=counts,

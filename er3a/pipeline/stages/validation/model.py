@@ -18,6 +18,7 @@ from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobot
 from er3a.kinematics.round_trips import SlotRoundTrips
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
@@ -683,8 +684,8 @@ class Axes(Table):
     point_mm: Reals = vector("{}_mm", "stated point of the axis")
     model_direction: Reals = vector("model_direction_{}", "the model's direction of positive rotation")
     model_point_mm: Reals = vector("model_{}_mm", "point of the model's axis nearest to the stated one")
-    angle_deg: Reals = column("angle between the directions")
-    distance_mm: Reals = column("distance of the two points")
+    angle_deg: Reals = column("angle between the directions", heading=N_("angle"))
+    distance_mm: Reals = column("distance of the two points", heading=N_("distance"))
     uncertainty_deg: Reals = column("the source's uncertainty of the direction")
     uncertainty_mm: Reals = column("the source's uncertainty of the line's place")
 

@@ -18,7 +18,7 @@ from er3a.pipeline.messages.diagnosis import both, level
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.stages.validation import model
-from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE
@@ -75,7 +75,7 @@ def axis_deviation(stated: model.Axes) -> Figure:
         panels,
         (stated.distance_mm, stated.angle_deg),
         (stated.uncertainty_mm, stated.uncertainty_deg),
-        (tr("distance (mm)"), tr("angle (deg)")),
+        (axis_label(stated, "distance_mm"), axis_label(stated, "angle_deg")),
     ):
         for k, (source, _) in enumerate(sources):
             own = stated.source == source

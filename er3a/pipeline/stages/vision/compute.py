@@ -310,7 +310,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
     return model.CornerRows.stacked(tables)
 
 
-STAGE = "vision"
+STAGE_NAME = "vision"
 VIEW_STREAM = 0
 CONTRADICTED = 1e-3
 LEG_ROWS = 13
@@ -331,7 +331,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     task_file = load_vision(file, robot)
     head_path = file.parent / task_file.calibration
     head = load(HandEyeFile, head_path)
-    scene = study.scene(name, STAGE)
+    scene = study.scene(name, STAGE_NAME)
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")
@@ -428,8 +428,8 @@ def _left_out(found: model.CalibrationResult, file: VisionFile) -> Iterator[Left
         yield LeftOut("real_camera")
     if found.boardless:
         yield LeftOut("boardless_images", tuple(each.sample for each in found.boardless))
-    if samples := tuple(each.sample for each in found.suspects if each.code != "repeated_pose"):
-        yield LeftOut("left_out_samples", samples)
+    if found.left_out:
+        yield LeftOut("left_out_samples", found.left_out)
     if found.touch is None:
         yield LeftOut("touched_points")
     yield LeftOut("detections")
@@ -553,8 +553,7 @@ def _verdict(calibration: model.CalibrationResult, objects: tuple[model.ObjectRe
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
     missed = tuple(model.NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
-    suspects = tuple(each.sample for each in calibration.suspects if each.code != "repeated_pose")
-    left_out = (*suspects, *(each.sample for each in calibration.boardless))
+    left_out = (*calibration.left_out, *(each.sample for each in calibration.boardless))
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
     counts = model.GraspCounts(

@@ -17,7 +17,14 @@ from er3a.vision.calibration_set import Setup
 from er3a.vision.classic_methods import MethodName
 from er3a.vision.grasping import GraspRefusal
 from er3a.vision.table_corrections import NoCorrections
-from er3a.vision.vision_findings import CalibrationWarning, DirectionTried, GraspOutcome, NotCalibratable, Suspect
+from er3a.vision.vision_findings import (
+    CalibrationWarning,
+    DirectionTried,
+    GraspOutcome,
+    NotCalibratable,
+    RepeatedPose,
+    Suspect,
+)
 
 
 @dataclass(frozen=True)
@@ -240,6 +247,11 @@ class CalibrationResult:
     open_tilts: tuple[AmbiguousTilt, ...] = ()
     boardless: tuple[BoardlessImage, ...] = ()
     intrinsics_estimated: bool = False
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """The samples that the calibration does not use: all suspects but poses that come again."""
+        return tuple(each.sample for each in self.suspects if not isinstance(each, RepeatedPose))
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from er3a.files.reference_sets import reference_folder
 from er3a.files.robot_file import Text
-from er3a.files.units import FARTHEST_MM, Triple, check_millimetres
+from er3a.files.units import FARTHEST_MM, Triple, as_millimetres
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.settings import TrajectorySettings
@@ -60,18 +60,14 @@ class BoxTask(StrictModel):
     the limits of joints with less than a full turn and of sums of revolute joints.
     """
 
-    box_mm: Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=3, max_length=3)] = [200, 150, 50]
+    box_mm: Annotated[
+        list[Annotated[float, Field(gt=0)]], Field(min_length=3, max_length=3), AfterValidator(as_millimetres)
+    ] = [200, 150, 50]
     tool_direction: Triple = [0, 0, -1]
     cone_deg: Annotated[float, Field(ge=0, le=180)] = 30
     limit_margin_deg: Annotated[float, Field(ge=0, le=45)] = 2
     lowest_mm: Annotated[float, Field(ge=-FARTHEST_MM, le=FARTHEST_MM)] = 0
     clear_of_axis_mm: Annotated[float, Field(ge=0, le=FARTHEST_MM)] = 150
-
-    @field_validator("box_mm")
-    @classmethod
-    def _no_metres(cls, values):
-        check_millimetres(values)
-        return values
 
     @field_validator("tool_direction")
     @classmethod

@@ -24,7 +24,7 @@ from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import POINTS, SWEEPS
 from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
 from er3a.pipeline.stages.workspace import model
-from er3a.pipeline.viewing.figures import equal_scale, new_figure
+from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
 from er3a.robots.robot import Robot
@@ -108,7 +108,7 @@ def convergence(results: model.WorkspaceResults) -> Figure:
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel(tr("samples (millions)"))
-    axes.set_ylabel(tr("volume (m³)"))
+    axes.set_ylabel(axis_label(curve, "touched_m3"))
     axes.set_ylim(0, None)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
