@@ -173,6 +173,7 @@ function newMotion() {
     return tick;
   });
   part("ticks").replaceChildren(...ticks);
+  part("next").disabled = !ticks.length;
 }
 
 /** Lays a cursor over each panel of a plot; returns what moves them. */
