@@ -76,7 +76,9 @@ def pages(folder) -> dict[str, str]:
     """The page's text by language."""
     with pytest.MonkeyPatch.context() as patch, language.using("en"):
         patch.chdir(folder)
+        Path("article_en.html").write_text("of a run in Chinese", encoding="utf-8")
         write_article(load_study("article.yaml"), Path("results"), Path())
+        assert sorted(map(str, Path().glob("article*.html"))) == ["article.html", "article_zh.html"]
     files = {"en": "article.html", "zh": "article_zh.html"}
     return {code: (folder / name).read_text(encoding="utf-8") for code, name in files.items()}
 

@@ -222,7 +222,10 @@ def next_step(
     if table == "fail" and same_arm:
         return NextStep(tr("Take the corrected table from the validation page."), validation)
     if table == "fail" and instead:
-        return NextStep(tr("Take the table of {robot}, which nothing in the same evidence contradicts.", robot=instead), f"{validation}#table-to-use")
+        return NextStep(
+            tr("Take the table of {robot}, which nothing in the same evidence contradicts.", robot=instead),
+            f"{validation}#table-to-use",
+        )
     if table == "fail":
         return NextStep(tr("See which entries the evidence contradicts, and what would mend them."), validation)
     if failed:

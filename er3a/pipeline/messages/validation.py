@@ -96,7 +96,8 @@ TEXTS = texts(
             "If open or weak entries are wrong, the tool is where it should be, but turned by up to {deg:.0f} deg."
         ),
         "validation.left_open#turned_at_least": (
-            "If open or weak entries are wrong, the tool is where it should be, but turned by {deg:.0f} deg, or by more."
+            "If open or weak entries are wrong, the tool is where it should be, but turned by {deg:.0f} deg, or "
+            "by more."
         ),
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
         "validation.left_open#uncontradicted": "Nothing independent contradicts the table ({checks}), but:",

@@ -184,7 +184,8 @@ TEXTS = texts(
         "The box is not checked as an obstacle.",
         "box.put#over": (
             "Box of {box}: put it on a stand {gap} mm high ({least} to {most} mm would do) on {name}, whose top is at "
-            "z = {height} mm, its centre at ({centre}) mm; {reached}. It can't stand directly on {none}. Box and stand are not checked as obstacles."
+            "z = {height} mm, its centre at ({centre}) mm; {reached}. It can't stand directly on {none}. Box and "
+            "stand are not checked as obstacles."
         ),
         "box.put#free": (
             "Box of {box}: put its centre at ({centre}) mm; {reached}. No surface is known there. The box "
