@@ -48,9 +48,9 @@ DATA_GRADES = {"official": N_("official"), "measured": N_("measured"), "cad": N_
 FIGURES = {
     "independent_checks": N_("Independent checks passed"),
     "consistency_checks": N_("Consistency checks passed"),
-    "zero_pose_flange_error": N_("Zero pose: flange off by"),
-    "farthest_axis": N_("Joint axes: largest distance"),
-    "most_tilted_axis": N_("Joint axes: largest angle"),
+    "zero_pose_flange_error": N_("Zero pose: flange off the documents by"),
+    "farthest_axis": N_("Joint axes: largest distance from the documents"),
+    "most_tilted_axis": N_("Joint axes: largest angle to the documents"),
     "worst_drawing_label": N_("Workspace drawing: worst label off by"),
     "wrist_centre_reach": N_("Wrist centre: reach from axis 1"),
     "flange_reach": N_("Flange: reach from axis 1"),

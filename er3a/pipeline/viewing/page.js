@@ -304,6 +304,8 @@ const MANY_ROWS = 12;
 
 // A field that leaves the rows in which its words stand. The address keeps them, as "?2=words" for the page's third table.
 function filterFor(table) {
+  const box = document.createElement("label");
+  const count = document.createElement("span");
   const number = String([...document.querySelectorAll("table")].indexOf(table));
   const field = document.createElement("input");
   field.type = "search";
@@ -315,7 +317,12 @@ function filterFor(table) {
       const text = sought(textOf(row));
       row.hidden = !words.every((word) => text.includes(word));
     }
+    const { rows } = table.tBodies[0];
+    const shown = [...rows].filter((row) => !row.hidden).length;
+    count.textContent = shown < rows.length ? ` ${shown} / ${rows.length}` : "";
   };
+  count.role = "status";
+  box.append(field, count);
   field.addEventListener("input", () => {
     filter();
     const address = new URL(location.href);
@@ -324,7 +331,7 @@ function filterFor(table) {
     history.replaceState(null, "", address);
   });
   if (field.value) filter();
-  return field;
+  return box;
 }
 
 const HEADINGS = ["H2", "H3", "SUMMARY", "CAPTION"];
