@@ -28,6 +28,7 @@ from er3a.pipeline.stages.run import compute
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
+from testing import chromium
 from testing.processes import run
 from testing.small_study import STUDY, fresh
 
@@ -139,6 +140,18 @@ def _ask_nobody() -> Iterator[None]:
 def robot(request: pytest.FixtureRequest) -> Robot:
     """Each of the project's robots in turn."""
     return load_robot(request.param)
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory):
+    """Headless Chromium; skipped with its reason where there is none."""
+    if reason := chromium.lacking():
+        if os.environ.get("CI") == "true":
+            pytest.fail("CI must have Chromium and its driver")
+        pytest.skip(reason)
+    started = chromium.start(tmp_path_factory.mktemp("chromium"))
+    yield started
+    started.quit()
 
 
 @pytest.fixture

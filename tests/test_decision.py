@@ -53,7 +53,7 @@ def test_a_short_verdict_and_one_without_clauses_stay_whole():
 @pytest.mark.parametrize(
     ("table", "failed", "more", "page"),
     [
-        ("fail", {"inverse": "inverse"}, {"instead": "other"}, "#other"),
+        ("fail", {"inverse": "inverse"}, {"instead": "other"}, "arm/validation.html#table-to-use"),
         ("fail", {}, {}, "arm/validation.html"),
         ("fail", {}, {"instead": "other", "same_arm": True}, "arm/validation.html"),
         ("caution", {"inverse": "inverse"}, {"measurement": "measure a1"}, "arm/inverse.html"),

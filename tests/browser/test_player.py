@@ -193,14 +193,17 @@ def test_the_page_s_address_names_a_moment(page):
     assert told(page) == "It stands."
 
 
-def test_it_stays_in_sight_beside_a_plot_far_down_the_page(page):
-    page.execute_script("window.scrollTo(0, document.body.scrollHeight)")
-    page.execute_script("document.querySelector('[data-t]').click()")
-    until(page, lambda: "docked" in page.find_element(By.ID, "player").get_attribute("class"))
-    stand = page.execute_script(
-        "const r = document.querySelector('.player .stand').getBoundingClientRect(); return [r.top, r.bottom]"
+def test_it_stays_in_sight_and_covers_nothing_that_leads_to_it(page):
+    page.execute_script(
+        "const link = document.querySelector('a[data-t]'); document.body.append(link);"
+        "link.scrollIntoView({ block: 'end' }); link.click()"
     )
-    assert 0 <= stand[0] < stand[1] <= page.execute_script("return innerHeight")
+    until(page, lambda: "docked" in page.find_element(By.ID, "player").get_attribute("class"))
+    link, stand = page.execute_script(
+        "return ['a[data-t]', '.player .stand'].map((name) => document.querySelector(name).getBoundingClientRect())"
+    )
+    assert 0 <= link["top"] < link["bottom"] <= stand["top"] < stand["bottom"]
+    assert stand["bottom"] <= page.execute_script("return innerHeight")
 
 
 def test_a_way_without_times_counts_its_points_and_what_is_played_is_framed(page):

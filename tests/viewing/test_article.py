@@ -9,6 +9,7 @@ import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,9 +24,15 @@ from er3a.pipeline.messages import language
 from er3a.pipeline.messages.article import ITEMS, SECTIONS
 from er3a.pipeline.stages import run
 from er3a.pipeline.study import load_study
+from tests.browser.test_page_sizes import test_page_fits_phone_laptop_and_4k as fits
+from tests.browser.test_page_sizes import test_page_is_small_enough as small_enough
+from tests.browser.test_page_sizes import test_page_prints_on_a4_with_nothing_cut as prints
+from tests.browser.test_pages import test_page_is_accessible as accessible
+from tests.browser.test_pages import test_page_opens_clean as opens_clean
 from tests.conftest import ROOT
 
 pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("ignore:Glyph")]  # of a machine without Chinese letters
+FILES = {"en": "article.html", "zh": "article_zh.html"}
 STAGES = ("validation", "workspace", "trajectory")
 IN_THE_SMALL_STUDY = [*(("er3a_c60", stage) for stage in STAGES), ("er3a_c60_article", "workspace")]
 SMALL = {"round_trips": 200, "reach_starts": 4, "map_cells": 20, "samples": 100_000, "blocks": 4, "cells_across": 16}
@@ -76,9 +83,20 @@ def pages(folder) -> dict[str, str]:
     """The page's text by language."""
     with pytest.MonkeyPatch.context() as patch, language.using("en"):
         patch.chdir(folder)
-        write_article(load_study("article.yaml"), Path("results"), Path())
-    files = {"en": "article.html", "zh": "article_zh.html"}
-    return {code: (folder / name).read_text(encoding="utf-8") for code, name in files.items()}
+        reports = Path("reports")
+        reports.mkdir()
+        (reports / "article_en.html").write_text("of a run in Chinese", encoding="utf-8")
+        write_article(load_study("article.yaml"), Path("results"), reports)
+        assert {path.name for path in reports.glob("*.html")} == set(FILES.values())
+        return {code: (reports / name).read_text(encoding="utf-8") for code, name in FILES.items()}
+
+
+@pytest.mark.parametrize("name", FILES.values())
+def test_they_open_fit_and_print_as_all_pages_do(browser, pages, folder, name):
+    study = SimpleNamespace(folder=folder)
+    small_enough(study, name)
+    for check in (opens_clean, accessible, fits, prints):
+        check(browser, study, name)
 
 
 def toolbox(kind, offset_2: float) -> DHRobot:

@@ -40,7 +40,7 @@ from er3a.pipeline.messages.trajectory import event_word, strategy_word
 from er3a.pipeline.messages.workspace import change_text
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
-from er3a.pipeline.results import Provenance, input_records, read_stage, result_records
+from er3a.pipeline.results import Provenance, checksum_file, input_records, read_stage, result_records
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathChecks
@@ -272,6 +272,10 @@ def write_article(study: Study, results: Path, folder: Path) -> None:
     text = json.dumps(asdict(numbers) | {"agreements": agreements(numbers)}, indent=1) + "\n"
     write_atomically(results / "article.json", lambda file: file.write_text(text, encoding="utf-8"))
     pages = study.article_pages()
+    for code in language.LANGUAGES:  # the study may have had another language
+        if (former := f"article_{code}.html") not in pages.values():
+            for file in (folder / former, checksum_file(folder / former)):
+                file.unlink(missing_ok=True)
     for code, name in pages.items():
         own = study.model_copy(update={"report": study.report.model_copy(update={"language": code})})
         language.use(code, own.own_titles())

@@ -147,8 +147,8 @@ TEXTS = texts(
         "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
         "payload.bounded": "At most {kg:.3g} kg on the paths that may be run, by torques on {path}.",
         "payload.partly": "Not counted, because not known: {what}.",
-        "payload.unknown": "None may be assumed: unknown without {what}.",
-        "payload.not_examined": "Not examined.",
+        "payload.unknown": "None may be assumed. To know it, ask the manufacturer for: {what}.",
+        "payload.not_examined": "Whether the motors carry a load was not examined.",
         "payload.rated": "Its file gives a rated payload of {kg:.3g} kg.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why})",
     }

@@ -95,9 +95,18 @@ def filled(text: str, template: str, parts: Mapping[str, Any], written: Callable
 
 
 def as_text(part: Any, spec: str = "") -> str:
-    """A part of a text; a number's minus sign is no hyphen."""
+    """A part of a text; a number as :func:`as_number` writes it."""
     text = format(part, spec)
-    return text.replace("-", "−") if isinstance(part, Real) else text
+    return as_number(text) if isinstance(part, Real) else text
+
+
+def as_number(text: str) -> str:
+    """A number's text with thin spaces between thousands from five digits on; its minus sign is no hyphen."""
+    whole, point, rest = text.partition(".")
+    digits = whole.lstrip("+-")
+    if digits.isdecimal() and len(digits) > 4:
+        whole = whole.removesuffix(digits) + f"{int(digits):,}".replace(",", "\u202f")
+    return (whole + point + rest).replace("-", "−")
 
 
 def with_unit(value: str, unit: str, gap: str = " ") -> str:

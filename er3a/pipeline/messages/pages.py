@@ -69,7 +69,8 @@ GLOSSARY = {
         "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
     ),
     N_("up to signs"): N_(
-        "of a settled table entry: its size is, but its sign or half turn hangs on an entry that is open elsewhere"
+        "of a settled table entry: to be kept as it is; only once an open entry is another one, another sign or half "
+        "turn here does as well"
     ),
     N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
     N_("margin"): N_("how far something is from a limit, in its unit"),
@@ -221,7 +222,10 @@ def next_step(
     if table == "fail" and same_arm:
         return NextStep(tr("Take the corrected table from the validation page."), validation)
     if table == "fail" and instead:
-        return NextStep(tr("Use {robot}, which the same evidence bears out.", robot=instead), f"#{instead}")
+        return NextStep(
+            tr("Take the table of {robot}, which nothing in the same evidence contradicts.", robot=instead),
+            f"{validation}#table-to-use",
+        )
     if table == "fail":
         return NextStep(tr("See which entries the evidence contradicts, and what would mend them."), validation)
     if failed:

@@ -52,18 +52,19 @@ STATUS_WORDS = {
     "absent": N_("not given"),
 }
 STATUS_MEANINGS = {
-    "settled": N_("what independent documents leave open moves the tool by less than the tolerance"),
+    "settled": N_("keep it: what independent documents leave open moves the tool by less than the tolerance"),
     "settled_up_to_signs": N_(
-        "as settled, but its sign or half turn hangs on entries that are open: with another value there the same arm "
-        "can be written otherwise here"
+        "keep it: every arm that the documents allow can be written with this value; once an open entry is another "
+        "one, so it can with another sign or half turn here"
     ),
     "weak": N_(
-        "independent documents depend on it, but what they leave open moves the tool by more than the tolerance"
+        "measure it: independent documents depend on it, but what they leave open moves the tool by more than the "
+        "tolerance"
     ),
-    "contradicted": N_("the evidence excludes the value"),
-    "consistent": N_("no document but its own source covers it"),
-    "open": N_("no document distinguishes it from another value that moves the tool"),
-    "gauge": N_("not determined alone: changed together with other entries it describes the same robot"),
+    "contradicted": N_("don't use it: the evidence excludes the value"),
+    "consistent": N_("check it on the arm: no document but its own source covers it"),
+    "open": N_("measure it: no document distinguishes it from another value that moves the tool"),
+    "gauge": N_("keep it: not determined alone; changed together with other entries it describes the same robot"),
     "given": N_("chosen by the author of the file"),
 }
 CHECK_KINDS = {

@@ -128,7 +128,8 @@ TEXTS = texts(
         "advice.tool#turned": "the tool leaves the path by {turned} deg",
         "advice.swing": "{tool}, J{joint} turns most, by {swing:.0f} deg",
         "advice.time#less": "it takes {shorter:.2f} s less than programmed",
-        "advice.time#same": "it takes no more time than programmed",
+        "advice.time#same": "it takes as long as programmed",
+        "advice.time#slower_there": "it takes as long as programmed, slower there and faster elsewhere",
         "advice.time#more": "it takes {longer:.2f} s more than programmed",
     }
 )
@@ -390,7 +391,7 @@ def repair_text(path: PathSummary, *, in_short: bool = False) -> str:
     if tried.name in BY_JOINTS and swings and not in_short:
         joint = max(swings, key=swings.__getitem__)
         tool = sentence("advice.swing", tool=tool, joint=joint, swing=swings[joint])
-    cost = {"tool": tool, "time": _takes(motion.duration_s - path.duration_s)}
+    cost = {"tool": tool, "time": _takes(motion.duration_s - path.duration_s, tried.name)}
     way = word("advice", ADVICE, tried.name)
     if in_short:
         return sentence("finding", finding=sentence("advice.chosen", way=way, **cost))
@@ -414,9 +415,9 @@ def _shortly(value: float) -> str:
     return f"{value:.2g}" if value < WHOLE else f"{value:.0f}"
 
 
-def _takes(longer_s: float) -> str:
+def _takes(longer_s: float, strategy: StrategyName) -> str:
     if abs(longer_s) < NO_TIME:
-        return sentence("advice.time#same")
+        return sentence("advice.time#slower_there" if strategy == "slow" else "advice.time#same")
     if longer_s > 0:
         return sentence("advice.time#more", longer=longer_s)
     return sentence("advice.time#less", shorter=-longer_s)

@@ -48,9 +48,9 @@ DATA_GRADES = {"official": N_("official"), "measured": N_("measured"), "cad": N_
 FIGURES = {
     "independent_checks": N_("Independent checks passed"),
     "consistency_checks": N_("Consistency checks passed"),
-    "zero_pose_flange_error": N_("Zero pose: flange off by"),
-    "farthest_axis": N_("Joint axes: largest distance"),
-    "most_tilted_axis": N_("Joint axes: largest angle"),
+    "zero_pose_flange_error": N_("Zero pose: flange off the documents by"),
+    "farthest_axis": N_("Joint axes: largest distance from the documents"),
+    "most_tilted_axis": N_("Joint axes: largest angle to the documents"),
     "worst_drawing_label": N_("Workspace drawing: worst label off by"),
     "wrist_centre_reach": N_("Wrist centre: reach from axis 1"),
     "flange_reach": N_("Flange: reach from axis 1"),
@@ -88,16 +88,17 @@ TEXTS = texts(
             "{passed} of {total} independent and {same_passed} of {same_total} consistency checks pass"
         ),
         "validation.left_open#up_to": (
-            "Open and weak entries could put the tool off by up to {mm:.0f} mm and {deg:.0f} deg."
+            "If open or weak entries are wrong, the tool is off by up to {mm:.0f} mm and {deg:.0f} deg."
         ),
         "validation.left_open#at_least": (
-            "Open and weak entries could put the tool off by {mm:.0f} mm and {deg:.0f} deg, or by more."
+            "If open or weak entries are wrong, the tool is off by {mm:.0f} mm and {deg:.0f} deg, or by more."
         ),
         "validation.left_open#turned": (
-            "Open and weak entries could turn the tool where it stands, by up to {deg:.0f} deg."
+            "If open or weak entries are wrong, the tool is where it should be, but turned by up to {deg:.0f} deg."
         ),
         "validation.left_open#turned_at_least": (
-            "Open and weak entries could turn the tool where it stands, by {deg:.0f} deg, or by more."
+            "If open or weak entries are wrong, the tool is where it should be, but turned by {deg:.0f} deg, or "
+            "by more."
         ),
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
         "validation.left_open#uncontradicted": "Nothing independent contradicts the table ({checks}), but:",
@@ -136,7 +137,7 @@ TEXTS = texts(
         ),
         "validation.left_open#conflicting": "{count} undecided, as documents contradict each other",
         "part_found#settled": "{part}: {settled} of {entries} entries settled",
-        "part_found#up_to_signs": "{count} more up to signs",
+        "part_found#up_to_signs": "{count} more up to signs (keep them too)",
         "part_found#excluded": "excluded: {names}",
         "part_found#open": "open: {names}",
         "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",

@@ -159,15 +159,18 @@ TEXTS = texts(
             "Not on {name} itself: an arm that reaches all of the box comes within {margin} mm of the scene or of "
             "itself."
         ),
-        "stand.between": "On a stand of {gap} mm ({least} to {most} mm) on {name}: centre at ({centre}) mm.",
+        "stand.between": "On a stand {gap} mm high ({least} to {most} mm would do) on {name}: centre at ({centre}) mm.",
         "void.shoulder": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder, centre at ({centre}) mm."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder, {extent} mm, centre "
+            "at ({centre}) mm."
         ),
         "void.away": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder, centre at ({centre}) mm."
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder, {extent} mm, "
+            "centre at ({centre}) mm."
         ),
         "void.cause#it": "Its cause: it {cause}.",
         "void.cause#noun": "Its cause: {cause}.",
+        "void.expected": "It belongs to the arm: put nothing there, and leave the limits as they are.",
         "void.pocket": (
             "Larger, but open to the outside, so no enclosed void: a pocket of {lower:.3g} to {upper:.3g} L, centre at "
             "({centre}) mm."
@@ -180,8 +183,9 @@ TEXTS = texts(
         "box.put#on": "Box of {box}: put it on {name}, its centre at ({centre}) mm; {reached}. "
         "The box is not checked as an obstacle.",
         "box.put#over": (
-            "Box of {box}: put it on a stand of {gap} mm ({least} to {most} mm) on {name}, its centre at "
-            "({centre}) mm; {reached}. It can't stand directly on {none}. Box and stand are not checked as obstacles."
+            "Box of {box}: put it on a stand {gap} mm high ({least} to {most} mm would do) on {name}, whose top is at "
+            "z = {height} mm, its centre at ({centre}) mm; {reached}. It can't stand directly on {none}. Box and "
+            "stand are not checked as obstacles."
         ),
         "box.put#free": (
             "Box of {box}: put its centre at ({centre}) mm; {reached}. No surface is known there. The box "
@@ -366,7 +370,8 @@ def box_text(summary: Summary) -> str:
         return sentence("box.put#on", name=stand.name, **parts)
     if over and over.gaps_m:
         gap, least, most = (millimetres([value]) for value in over.gaps_m)
-        parts |= {"gap": gap, "least": least, "most": most, "none": ", ".join(each.name for each in placement.stands)}
+        parts |= {"gap": gap, "least": least, "most": most, "height": millimetres([over.height_m])}
+        parts |= {"none": ", ".join(each.name for each in placement.stands)}
         return sentence("box.put#over", name=over.name, **parts)
     return sentence("box.put#free", **parts)
 
@@ -384,15 +389,18 @@ def void_text(summary: Summary) -> str:
     judged = next(unexpected, voids[0])
     where = sentence("void.shoulder" if judged.holds_shoulder else "void.away", **_void_parts(judged))
     cause = sentence("void.cause#it" if is_predicate(judged.cause) else "void.cause#noun", cause=say(judged.cause))
+    expected = sentence("void.expected") if isinstance(finding, VoidAtShoulder) else ""
     more = sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else ""
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""
-    return joined([where, cause, more, open_one], " ")
+    return joined([where, cause, expected, more, open_one], " ")
 
 
 def _void_parts(void: VoidSummary) -> dict[str, float | str]:
     bounds = void.volume_m3
-    return {"lower": 1000 * bounds.lower, "upper": 1000 * bounds.upper, "centre": millimetres(void.centroid_m)}
+    extent = millimetres(void.extent_m).replace(", ", " × ")
+    litres = {"lower": 1000 * bounds.lower, "upper": 1000 * bounds.upper}
+    return {**litres, "extent": extent, "centre": millimetres(void.centroid_m)}
 
 
 def millimetres(values: Sequence[float]) -> str:

@@ -173,6 +173,7 @@ function newMotion() {
     return tick;
   });
   part("ticks").replaceChildren(...ticks);
+  part("next").disabled = !ticks.length;
 }
 
 /** Lays a cursor over each panel of a plot; returns what moves them. */
@@ -198,7 +199,7 @@ function withCursors(figure) {
     const panel = panels.find(({ left, right, bottom, top }) => u >= left && u <= right && v >= bottom && v <= top);
     if (!panel) return;
     goTo(panel.name, panel.t0 + ((u - panel.left) / (panel.right - panel.left)) * (panel.t1 - panel.t0));
-    dock();
+    dock(event.clientY + (v - panel.bottom) * height);
   });
   return (shown, time) => {
     const { x, y, width, height } = inner();
@@ -212,11 +213,12 @@ function withCursors(figure) {
   };
 }
 
-/** Keeps the player in sight beside what the reader points at. */
-function dock() {
+/** Keeps the player in sight below what the reader points at, whose lower edge is at ``edge`` in the window. */
+function dock(edge = 0) {
   const { top, bottom } = place.getBoundingClientRect();
   place.style.minHeight = `${bottom - top}px`; // the page stays as it is when the player leaves its place
   place.classList.toggle("docked", bottom < 80 || top > innerHeight - 80);
+  if (place.classList.contains("docked")) scrollBy(0, Math.max(0, edge + 40 - part("stand").getBoundingClientRect().top));
   refresh();
 }
 
@@ -246,7 +248,7 @@ for (const link of document.querySelectorAll("[data-t]")) {
     event.preventDefault();
     event.stopPropagation(); // a link to a moment within a row that leads to its end
     goTo(link.dataset.play, Number(link.dataset.t));
-    dock();
+    dock(link.getBoundingClientRect().bottom);
   });
 }
 addEventListener("resize", refresh);

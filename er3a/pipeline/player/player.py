@@ -83,7 +83,7 @@ def player(
     Parameters
     ----------
     beside : further arms, which move at the same time; their bases say where they stand
-    signs : what is written at the base of each arm, the first included; nothing if empty
+    signs : what is written below the base of each arm, the first included; nothing if empty
     """
     shown = [motion for motion in motions if len(motion.t) > 1]
     if not shown:
@@ -134,7 +134,7 @@ def _data(
         "size": size,
         **drawn_shapes(robot),
         "beside": [{"table": table_data(arm), **drawn_shapes(arm)} for arm in beside],
-        "signs": [{"text": text, "at": at.tolist()} for text, at in zip(signs, bases)],
+        "signs": [{"text": text, "at": (at - [0, 0, 0.1 * size]).tolist()} for text, at in zip(signs, bases)],
         "width": max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
         "target": (np.mean(bases, axis=0) + robot.base[:3, 2] * 0.35 * size).tolist(),
         "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, "touching": VERDICTS["fail"], **COLOURS},

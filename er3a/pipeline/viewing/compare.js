@@ -13,7 +13,7 @@ function shownValue(value) {
   const [digits, exponent] = String(Number(value.toPrecision(6))).split("e");
   const [whole, ...fraction] = digits.split(".");
   const power = exponent ? "·10" + [...exponent].map((sign) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[sign] ?? (sign === "-" ? "⁻" : "")).join("") : "";
-  return [whole.replace(/\B(?=(\d{3})+$)/g, "\u202f"), ...fraction].join(".").replace("-", "−") + power;
+  return [/\d{5}/.test(whole) ? whole.replace(/\B(?=(\d{3})+$)/g, "\u202f") : whole, ...fraction].join(".").replace("-", "−") + power;
 }
 
 function shownDifference(a, b) {

@@ -52,6 +52,7 @@ def main(words: Sequence[str] | None = None) -> int:
         q[joint, :, joint] = robot.lower[joint] + shares * (robot.upper - robot.lower)[joint]
     with rr.RecordingStream(asked.application_id or robot.name, recording_id=asked.recording_id) as stream:
         stream.stdout()
+        stream.send_recording_name(robot.title)
         stream.send_blueprint(rr.blueprint.Blueprint(arm_view(robot, robot.name)))
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         log_arm(stream, robot, home)

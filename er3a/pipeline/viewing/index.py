@@ -616,12 +616,13 @@ def _proposed(finding: object) -> dict[str, str]:
     """The measurement that validation proposes, as :func:`next_step` takes it; empty where it proposes none."""
     if not isinstance(finding, LeftOpen) or finding.next_measurement is None:
         return {}
-    step, entry = page.whole_sentence(say(finding.next_measurement)), finding.next_measurement.entry
-    others = len({*finding.unbounded} - {entry})
-    if others:
-        more = N_("{step} It settles {entry}; entries that rest on one source besides: {others}.")
-        step = tr(more, step=step, entry=entry if " " in entry else shortened([entry]), others=others)
-    return {"measurement": step, "entry": entry.replace(" ", "")}
+    proposal, entry = finding.next_measurement, finding.next_measurement.entry
+    seen = N_("If so, {entry} is right; if not, its sign is wrong.")
+    settles = seen if proposal.code == "look_at_motion" else N_("It settles {entry}.")
+    step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]))]
+    if others := len({*finding.unbounded} - {entry}):
+        step.append(tr("Other entries that rest on one source, each with its own check: {others}.", others=others))
+    return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
 def _settled(finding: object) -> tuple[bool, str]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from er3a.pipeline.messages.language import as_number
+
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | int | None, digits: int = 4) -> str:
-    """A number with ``digits`` significant digits, thousands apart by thin spaces; a dash for None."""
+    """A number with ``digits`` significant digits; a dash for None."""
     if value is None:
         return "–"
     if isinstance(value, int):
-        return f"{value:,}".replace(",", "\u202f").replace("-", "−")
+        return as_number(str(value))
     if value != value or value in (float("inf"), float("-inf")):
         return {"inf": "∞", "-inf": "−∞"}.get(str(value), "–")
     if value == 0:
@@ -21,13 +23,12 @@ def number(value: float | int | None, digits: int = 4) -> str:
     text = f"{value:#.{digits}g}"
     if "e" in text:
         text = f"{float(text):.0f}"
-    text = f"{float(text):,.{max(0, len(text.partition('.')[2]))}f}".replace(",", "\u202f")
-    return text.replace("-", "−")
+    return as_number(f"{float(text):.{len(text.partition('.')[2])}f}")
 
 
 def fixed(value: float | None, decimals: int = 1) -> str:
     """A number with fixed decimals, minus signs typographic, no negative zero; a dash for None."""
     if value is None or value != value:
         return "–"
-    text = f"{value:,.{decimals}f}".replace(",", "\u202f")
-    return (text[1:] if float(f"{value:.{decimals}f}") == 0 and text.startswith("-") else text).replace("-", "−")
+    text = f"{value:.{decimals}f}"
+    return as_number(text.lstrip("-") if float(text) == 0 else text)

@@ -31,6 +31,13 @@ function valueOf(text) {
   return found ? numberIn(found[1].replaceAll("−", "-")) : exact;
 }
 
+// Where a verdict stands among all, the gravest first; -1 for a cell without one.
+const GRAVEST = ["fail", "conflict", "caution", "no_reference", "not_computed", "pass"];
+function gravity(cell) {
+  const shown = cell?.querySelector(".badge, .decision");
+  return GRAVEST.findIndex((status) => shown?.classList.contains(status));
+}
+
 // What each row of a column sorts by: if most cells begin with a number, that.
 function sortedBy(texts) {
   const filled = texts.filter((text) => text !== "" && text !== "–");
@@ -67,7 +74,8 @@ function makeSortable(table) {
       if (next !== "none") header.setAttribute("aria-sort", next);
       const sign = next === "descending" ? -1 : 1;
       const texts = written.map((row) => (row.cells[column] ? textOf(row.cells[column]) : ""));
-      const by = sortedBy(texts);
+      const ranks = written.map((row) => gravity(row.cells[column]));
+      const by = ranks.includes(-1) ? sortedBy(texts) : texts.map((text, place) => [text, ranks[place]]);
       const keys = new Map(written.map((row, place) => [row, by[place]]));
       const rows = next === "none" ? written : [...written].sort((a, b) => compare(keys.get(a), keys.get(b), sign));
       body.append(...rows);
@@ -296,18 +304,25 @@ const MANY_ROWS = 12;
 
 // A field that leaves the rows in which its words stand. The address keeps them, as "?2=words" for the page's third table.
 function filterFor(table) {
+  const box = document.createElement("label");
+  const count = document.createElement("span");
   const number = String([...document.querySelectorAll("table")].indexOf(table));
   const field = document.createElement("input");
   field.type = "search";
   field.placeholder = field.ariaLabel = WORDS.filter;
   field.value = new URLSearchParams(location.search).get(number) ?? "";
   const filter = () => {
-    const words = field.value.toLowerCase().split(/\s+/);
+    const words = sought(field.value).split(/\s+/);
     for (const row of table.tBodies[0].rows) {
-      const text = textOf(row).toLowerCase();
+      const text = sought(textOf(row));
       row.hidden = !words.every((word) => text.includes(word));
     }
+    const { rows } = table.tBodies[0];
+    const shown = [...rows].filter((row) => !row.hidden).length;
+    count.textContent = shown < rows.length ? ` ${shown} / ${rows.length}` : "";
   };
+  count.role = "status";
+  box.append(field, count);
   field.addEventListener("input", () => {
     filter();
     const address = new URL(location.href);
@@ -316,7 +331,7 @@ function filterFor(table) {
     history.replaceState(null, "", address);
   });
   if (field.value) filter();
-  return field;
+  return box;
 }
 
 const HEADINGS = ["H2", "H3", "SUMMARY", "CAPTION"];
@@ -331,20 +346,23 @@ function allText(element) {
   return `${element.alt ?? ""} ${[...element.childNodes].map(allText).join("")} `;
 }
 
+// As it is compared: in small letters, with plain minus signs and numbers.
+const sought = (text) => text.toLowerCase().replaceAll("−", "-").replaceAll("\u202f", "");
+
 // Leaves of an element what holds all words, counting those of the headings above it; how many places stay.
 function keepFound(element, words, above) {
   let count = 0;
   const heads = []; // headings above a child: rank, element, text
   if (element.matches(BESIDE)) return 0;
   if (element.matches(WHOLE) || !element.querySelector(CONTAINERS)) {
-    const text = above + allText(element).toLowerCase();
+    const text = above + sought(allText(element));
     count = Number(words.every((word) => text.includes(word)));
   } else {
     for (const child of element.children) {
       const rank = HEADINGS.indexOf(child.tagName);
       if (rank >= 0) {
         while (heads.length && heads.at(-1).rank >= rank && rank < 2) heads.pop();
-        heads.push({ rank, child, text: allText(child).toLowerCase() });
+        heads.push({ rank, child, text: sought(allText(child)) });
         child.classList.add("unfound");
         continue;
       }
@@ -377,14 +395,14 @@ function addFinder() {
   document.querySelector("header").append(box, elsewhere);
   let open = null; // what was unfolded before
   const find = () => {
-    const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const words = sought(field.value).split(/\s+/).filter(Boolean);
     main.classList.toggle("finding", words.length > 0);
     open ??= new Map([...main.querySelectorAll("details")].map((part) => [part, part.open]));
     const others = words.length ? placesElsewhere(words) : [];
     elsewhere.replaceChildren(...others.map((each) => linkTo(each, words)));
     const here = words.length ? keepFound(main, words, "") : 0;
     const count = others.reduce((sum, { texts }) => sum + texts.length, here);
-    status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : WORDS.none;
+    status.textContent = !words.length ? "" : count ? WORDS.found.replace("{count}", count) : document.getElementById("places") ? WORDS.noneAnywhere : WORDS.none;
     if (!words.length || !count) { // all of the page
       for (const part of [main, ...main.querySelectorAll(".unfound")]) part.classList.remove("unfound", "finding");
       open.forEach((was, part) => (part.open = was));
@@ -421,7 +439,7 @@ let places = null; // of all pages, by page: its address, its title, texts
 function placesElsewhere(words) {
   const listed = document.getElementById("places");
   places ??= listed ? JSON.parse(listed.textContent) : [];
-  const holds = (text) => words.every((word) => text.toLowerCase().includes(word));
+  const holds = (text) => words.every((word) => sought(text).includes(word));
   const found = places.map(([address, title, texts]) => ({
     address, title, texts: texts.filter((text) => holds(`${title} ${text}`)),
   }));
@@ -532,8 +550,12 @@ function showOneOf(group) {
   const parts = [...group.children];
   if (parts.length < 2) return;
   const idOf = (part) => part.querySelector("h2").id;
+  const nameOf = (part) => {
+    const title = part.querySelector("h2").firstChild.textContent.trim();
+    return title.includes(idOf(part)) ? title : `${idOf(part)}${WORDS.colon}${title}`;
+  };
   const chooser = document.createElement("select");
-  chooser.append(...parts.map((part) => new Option(part.querySelector("h2").firstChild.textContent.trim(), idOf(part))));
+  chooser.append(...parts.map((part) => new Option(nameOf(part), idOf(part))));
   const choose = (part, all = false) => {
     chooser.value = idOf(part);
     everything.checked = all;

@@ -65,6 +65,7 @@ SCRIPT_WORDS = {
     "findAnywhere": N_("Find on all pages"),
     "found": N_("{count} places"),
     "none": N_("Nothing has all these words: try fewer, or others"),
+    "noneAnywhere": N_("No verdict, heading or name of a row has all these words: try fewer, or look on a page"),
     "link": N_("link to this section"),
     "previous": N_("Previous"),
     "next": N_("Next"),

@@ -320,5 +320,9 @@ def _reading(reading: OtherReading) -> str:
     if not reading.off.moves:
         return tr("{changes}: the same robot", changes=changes)
     if reading.excluded_by:
-        return tr("{changes}: excluded by {documents}", changes=changes, documents=", ".join(reading.excluded_by))
+        return tr(
+            "{changes}: excluded only by {documents}, not independent",
+            changes=changes,
+            documents=", ".join(reading.excluded_by),
+        )
     return tr("{changes}: allowed", changes=changes)

@@ -185,7 +185,7 @@ def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
 
 
 def _colour_bar(figure: Figure, shown: QuadMesh, label: str) -> None:
-    """Above both panels, so that they stay level with each other; at 1, 2 and 5 of each decade."""
+    """Above both panels, so that they stay level with each other; at 1 and 3 of each decade."""
     bar = figure.colorbar(
         shown,
         ax=figure.axes,
@@ -193,7 +193,7 @@ def _colour_bar(figure: Figure, shown: QuadMesh, label: str) -> None:
         location="top",
         shrink=0.4,
         anchor=(0.0, 0.0),
-        ticks=LogLocator(subs=(1, 2, 5)),
+        ticks=LogLocator(subs=(1, 3)),
         format="%g",
     )
     bar.ax.minorticks_off()
