@@ -76,7 +76,6 @@ REMEDIES: dict[str, str] = {
     "configuration_guessed": N_("Give start_deg of the program, or begin with a move to joint angles."),
     "moves_beside": BY_HAND,
     "never_reached": N_("Remove this motion, or check what leads to it as a program of its own."),
-    "clear_of_assumed": N_("Give shapes from a drawing or model in the robot's file, or keep the motion farther away."),
     "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
     "zone_not_settled": N_("A smaller zone may help, or a corner farther from what is near."),
@@ -315,6 +314,13 @@ TEXTS = texts(
             "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
         ),
         "written_unsafe": "the path {path} is not safe: {verdict}",
+        "written_near_assumed": (
+            "the path {path} is clear by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by "
+            "{margin_mm:g} mm"
+        ),
+        "remedy.clear_of_assumed": (
+            "Keep {margin:g} mm between {pair}, or give shapes from a drawing or model in the robot's file."
+        ),
         "remedy.joint_move": "Go there by a joint move to ({end}) deg: it passes these checks.",
         "remedy.joint_moves": "Go there by joint moves to ({via}) deg, then ({end}) deg: they pass these checks.",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
@@ -476,6 +482,11 @@ def _(found: text.WrittenUnsafe) -> str:
 def remedy(finding: Any) -> str:
     """What to do about a finding, as a sentence in the language in use; empty where nothing is to be done."""
     return word("remedy", REMEDIES, finding.code) if finding.code in REMEDIES else ""
+
+
+@remedy.register
+def _(found: found_in.ClearOfAssumed) -> str:
+    return sentence("remedy.clear_of_assumed", margin=found.margin_mm, pair=found.pair)
 
 
 @remedy.register
