@@ -120,6 +120,7 @@ LeftOutSubject = Literal[
     "program_starts",
     "program_rest",
     "outer_axes",
+    "controller_language",
     "controller_ramps",
     "joint_vectors",
     "lost_cells",

@@ -128,9 +128,9 @@ PACED = (TooFast, FasterThanAssumed, AcceleratesMoreThanAssumed)
 MOST_PAIRS = 3  # that are named of a collision
 FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
-    "instructions_passed": N_("Motion instructions that pass"),
-    "instructions_caution": N_("Motion instructions with caution"),
-    "instructions_failed": N_("Motion instructions that fail"),
+    "instructions_passed": N_("Motion instructions that pass, of programs meant to pass"),
+    "instructions_caution": N_("Motion instructions with caution, of programs meant to pass"),
+    "instructions_failed": N_("Motion instructions that fail, of programs meant to pass"),
     "least_clearance": N_("Least clearance of programs meant to pass"),
 }
 

@@ -397,7 +397,8 @@ def _within_reach(path: PathSummary, with_sound: bool) -> str:
     if part is None or part.s0_m <= 0:
         return ""
     first, what = first_faults(path)[0]
-    form = "advice.within_reach#later" if with_sound and first < part.t0_s else "advice.within_reach"
+    later = first < part.t0_s and (with_sound or first <= 0)
+    form = "advice.within_reach#later" if later else "advice.within_reach"
     return sentence(form, t=part.t0_s, far=part.s0_m * 1000, first=first, what=what)
 
 

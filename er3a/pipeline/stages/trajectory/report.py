@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import remedy
@@ -116,6 +117,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results, count),
+        solids=solid_rows(scene),
         assumed=assumed,
         drawn_paths=count,
         turning=in_space(robot, results, paths[:count], scene),

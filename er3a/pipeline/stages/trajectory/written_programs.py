@@ -88,6 +88,7 @@ def program_files(
     verdict: PathVerdict,
     languages: Sequence[LanguageName],
     write_unsafe: bool,
+    *,
     near: tuple[WriteFinding, ...],
     repaired: AvoidanceRows,
 ) -> ProgramFiles:
