@@ -86,7 +86,7 @@ def test_the_pages_say_where_what_stands_around_the_arm_is():
     rows = solid_rows(load_study("config/small.yaml").scene("er3a_c60", "trajectory"))
     assert ["table", "box 500 × 800 × 40", "(500, 0, 80)"] in rows
     assert ["post", "cylinder ⌀ 80 × 900", "(200, 420, 450)"] in rows
-    assert ["floor", "plane", "(0, 0, 1) · p ≤ -5"] in rows
+    assert ["floor", "plane", "(0, 0, 1) · p ≤ −5"] in rows
 
 
 @pytest.mark.long

@@ -191,7 +191,9 @@ def solid_rows(scene: Scene | None) -> list[list[str]]:
     for each in scene.solids if scene else ():
         match each:
             case Plane():
-                rows.append([each.name, tr("plane"), f"({_millimetres(each.normal, 1)}) · p ≤ {1000 * each.offset:g}"])
+                rows.append(
+                    [each.name, tr("plane"), f"({_millimetres(each.normal, 1)}) · p ≤ {_millimetres([each.offset])}"]
+                )
                 continue
             case Box():
                 size = tr("box {size}", size=_millimetres(each.size).replace(", ", " × "))
@@ -206,7 +208,7 @@ def solid_rows(scene: Scene | None) -> list[list[str]]:
     return rows
 
 
-def _millimetres(values: Reals, scale: float = 1000) -> str:
+def _millimetres(values: Reals | list[float], scale: float = 1000) -> str:
     return ", ".join(f"{scale * value + 0.0:.6g}" for value in values).replace("-", "−")
 
 

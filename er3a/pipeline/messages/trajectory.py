@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
@@ -325,7 +327,7 @@ def first_faults(path: PathSummary) -> list[tuple[float, str]]:
     """When (s) a path is wrong first, and how, for each kind of fault, the earliest first; what is undecided only where
     it comes before all that is not."""
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
-    kinds = path.unreachable, path.out_of_limits, path.collisions, *fast
+    kinds: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions, *fast]
     firsts = [min(each, key=lambda part: part.t0_s) for each in kinds if each]
     found = [(part.t0_s, say_first(part.cause)) for part in firsts]
     edge = min((part.t0_s for part in path.unreachable), default=math.inf) - AT_EDGE
