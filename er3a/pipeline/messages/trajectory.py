@@ -348,7 +348,8 @@ def advice(
     if not path.avoidance:
         return None
     if path.chosen:
-        return joined([repair_text(path, limits), _slower_throughout(path)], ". ")
+        slower = _slower_throughout(path) if path.strategy == "slow" else ""
+        return joined([repair_text(path, limits), slower], ". ")
     if path.unreachable:
         when = joined(map(_when, path.unreachable), ", ")
         why = sentence("advice.out_of_reach", when=when)

@@ -147,7 +147,7 @@ def _section(
         kind=kind_word(path.kind),
         text=joined([path_text(path), say(near) if near else ""]),
         advice=advice(path, last_sound(path, rows), summary.joint_limits),
-        near=joined([say(near), remedy(near)], ". ") if near else "",
+        near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
         events=[_event_row(path.name, event) for event in path.singularities],
