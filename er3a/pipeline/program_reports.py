@@ -30,9 +30,9 @@ from er3a.pipeline.messages.language import as_text
 from er3a.pipeline.messages.programs import remedy_at, say
 from er3a.pipeline.results import NEVER_A_PASS, LeftOut, NoPass, plain
 from er3a.pipeline.stages.left_out import left_out_of_collisions
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured
+from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import listed_motions
-from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, written
+from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
 from er3a.planning.tool_proof import ProofRequirements
 from er3a.planning.way_around import PlanningTask
@@ -427,12 +427,14 @@ def programs_of(
             yield PathProgram(each.name, each.outcome_unfollowed, None)
             continue
         verdict = judge(robot, each.motion, USUAL_NEAR, task.limits).verdict
-        if collisions(measured(surroundings, each.motion)):
+        along = measured(surroundings, each.motion)
+        if collisions(along):
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
         if (verdict != "safe" and not unsafe) or not np.isfinite(each.motion.q[0]).all():
             yield PathProgram(each.name, verdict, None)
             continue
-        files, findings = written(robot, each.motion, verdict, language)
+        near = near_assumed_shapes(robot, each.name, min_clearance(along), 1000 * ASSUMED_MARGIN)
+        files, findings = written(robot, each.motion, verdict, language, near)
         name = program_name(each.name, LONGEST_NAME)
         yield PathProgram(
             each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, each.left_out

@@ -121,6 +121,7 @@ LeftOutSubject = Literal[
     "program_rest",
     "given_rates",
     "outer_axes",
+    "controller_language",
     "controller_ramps",
     "joint_vectors",
     "lost_cells",

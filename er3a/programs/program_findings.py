@@ -164,6 +164,16 @@ class WrittenUnsafe:
     code: Literal["written_unsafe"] = "written_unsafe"
 
 
+@dataclass(frozen=True)
+class WrittenNearAssumed:
+    """The path is clear of assumed shapes by less than what these may be wrong by."""
+
+    path: str
+    clearance_mm: float
+    margin_mm: float
+    code: Literal["written_near_assumed"] = "written_near_assumed"
+
+
 WriteFinding = (
     ArcsSplit
     | ZonesDropped
@@ -176,4 +186,5 @@ WriteFinding = (
     | ValuesRounded
     | NotTranslated
     | WrittenUnsafe
+    | WrittenNearAssumed
 )

@@ -553,6 +553,9 @@ def head_line(finding: program_findings.WriteFinding) -> str:
             return f"{count} speed(s) or zone(s) rounded down to the next that has a name"
         case program_findings.WrittenUnsafe(path=path, verdict=verdict):
             return f"NOT SAFE: the path {ascii_text(path)} {ascii_text(verdict)}; written because it was asked for"
+        case program_findings.WrittenNearAssumed(path=path, clearance_mm=clearance, margin_mm=margin):
+            near = f"clear by {clearance:.1f} mm of assumed shapes only, which may be wrong by {margin:g} mm"
+            return f"NOT SETTLED: the path {ascii_text(path)} is {near}"
         case program_findings.NotTranslated(instructions=count):
             return f"{count} instruction(s) of the other language as comments"
 

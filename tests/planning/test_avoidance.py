@@ -224,6 +224,21 @@ def test_best_way_keeps_away_from_a_pose_that_the_path_meets(results):
     assert best(list(results["wrist_met"].values()), meets=True).name == "detour"
 
 
+def test_of_ways_that_leave_the_path_alike_the_one_that_keeps_clear_is_best(results):
+    """As long as it takes no more time than programmed; to be quicker than that counts for nothing."""
+    slow = results["wrist_near"]["slow"]
+    clear = replace(slow, name="branch", cost=replace(slow.cost, keeps_clear=True))
+    gentle = replace(
+        slow, name="damped", cost=replace(slow.cost, max_joint_speed_ratio=0, max_joint_acceleration_ratio=0)
+    )
+    assert best([slow, gentle], False).name == "damped"
+    assert best([slow, gentle, clear], False).name == "branch"
+    hasty = replace(slow, cost=replace(slow.cost, motion=results["wrist_near"]["stop"].cost.motion))
+    assert hasty.cost.motion.duration < slow.cost.motion.duration
+    assert best([hasty, clear], False, slow.cost.motion.duration).name == "branch"
+    assert best([hasty, clear], False).name == "slow"
+
+
 def test_start_inside_the_region_is_left_by_a_joint_move():
     robot = load_robot("er3a_c60")
     q = np.radians([0, 10, -20, 0, 0, 0])

@@ -7,19 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from er3a.collision.pairs import ASSUMED_MARGIN
+from er3a.collision.pairs import ASSUMED_MARGIN, LinkPair
 from er3a.collision.scene import Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.robot_library import load_robot
-from er3a.pipeline.messages.collision import say
+from er3a.pipeline.messages.collision import say, solid_rows
 from er3a.pipeline.results import Verdict, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
-from er3a.pipeline.stages.trajectory.model import RESULTS, is_safe
+from er3a.pipeline.stages.trajectory.model import RESULTS, MinClearance, is_safe
 from er3a.pipeline.stages.trajectory.played import faults
+from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes
 from er3a.pipeline.study import load_study
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.languages import read_program
+from er3a.programs.writing import head_line
 
 HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
 
@@ -71,6 +73,20 @@ def test_the_stages_say_so(small_results):
     assert (is_safe(sound, shapes), is_safe(sound, nearer)) == (True, False)
     closer = replace(summary, verdict=replace(summary.verdict, shapes=nearer))
     assert len(faults(replace(stored.results, summary=closer))) == len(faults(stored.results)) + 1
+
+
+def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():
+    robot, least = load_robot("er3a_c60"), MinClearance(11.2, 0.4, LinkPair(1, 3), 5)
+    (near,) = near_assumed_shapes(robot, "a", least, 20)
+    assert head_line(near).startswith("NOT SETTLED: the path a is clear by 11.2 mm of assumed shapes only")
+    assert near_assumed_shapes(robot, "a", least, 10) == near_assumed_shapes(documented(), "a", least, 20) == ()
+
+
+def test_the_pages_say_where_what_stands_around_the_arm_is():
+    rows = solid_rows(load_study("config/small.yaml").scene("er3a_c60", "trajectory"))
+    assert ["table", "box 500 × 800 × 40", "(500, 0, 80)"] in rows
+    assert ["post", "cylinder ⌀ 80 × 900", "(200, 420, 450)"] in rows
+    assert ["floor", "plane", "(0, 0, 1) · p ≤ −5"] in rows
 
 
 @pytest.mark.long

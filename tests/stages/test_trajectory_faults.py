@@ -13,7 +13,7 @@ from lxml import etree
 
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
-from er3a.pipeline.messages.trajectory import advice
+from er3a.pipeline.messages.trajectory import advice, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
@@ -22,6 +22,7 @@ from er3a.pipeline.stages.trajectory.played import faults, last_sound
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
+from er3a.planning.motion_faults import PathOutOfReach, TooFastIfAssumed
 
 ROBOT = "er3a_c60"
 
@@ -147,6 +148,13 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     early = replace(path, singularities=(crossed,))
     assert 0.4 < last_sound(early, rows)[0] < 0.5
     assert "keeps" not in advice(early, last_sound(early, rows))
+    fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
+    several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
+    assert [t for t, _ in first_faults(several)] == [0.5, 0.7, path.collisions[0].t0_s]
+    (fault,) = faults(replace(results, summary=replace(results.summary, paths=(several,))))
+    assert (fault.when, fault.what[:18]) == ("0.500 s", "wrist singularity;")
+    beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=PathOutOfReach(())),))
+    assert "wrong before: from t = 0.5 s, wrist singularity" in advice(beyond, last_sound(beyond, rows))
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import er3a.pipeline.messages.left_out  # noqa: F401
+import numpy as np
+
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import BASE, TRIED, Pair, PairsUnexamined, ShapesAssumed, link_label
+from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.messages import left_out  # noqa: F401
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.say import joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
@@ -19,7 +23,7 @@ FIGURES = {
     "clear_places": N_("Cells reached without collision"),
     "joined_places": N_("Of these, connected to home"),
     "lost_volume": N_("Volume lost to collisions, estimate"),
-    "watched_pairs": N_("Pairs of links that are checked"),
+    "watched_pairs": N_("Pairs of links that can collide, and are checked"),
     "undecided_pairs": N_("Pairs undecided"),
 }
 STATES: dict[PairState, str] = {
@@ -155,6 +159,33 @@ def _(found: FreeSpace) -> str:
         return free
     doubt = say_as(found, "doubt")
     return joined([free, doubt], " ")
+
+
+def solid_rows(scene: Scene | None) -> list[list[str]]:
+    """What stands around an arm: name, centre and size of each solid, mm; of a plane its normal and where it ends."""
+    rows = []
+    for each in scene.solids if scene else ():
+        match each:
+            case Plane():
+                rows.append(
+                    [each.name, tr("plane"), f"({_millimetres(each.normal, 1)}) · p ≤ {_millimetres([each.offset])}"]
+                )
+                continue
+            case Box():
+                size = tr("box {size}", size=_millimetres(each.size).replace(", ", " × "))
+            case Cylinder():
+                size = tr("cylinder ⌀ {wide:g} × {long:g}", wide=2000 * each.radius, long=1000 * each.length)
+            case Sphere():
+                size = tr("ball ⌀ {wide:g}", wide=2000 * each.radius)
+            case Mesh():
+                extent = np.ptp(np.concatenate(each.pieces), axis=0)
+                size = tr("mesh {size}", size=_millimetres(extent).replace(", ", " × "))
+        rows.append([each.name, size, f"({_millimetres(each.T[:3, 3])})"])
+    return rows
+
+
+def _millimetres(values: Reals | list[float], scale: float = 1000) -> str:
+    return ", ".join(f"{scale * value + 0.0:.6g}" for value in values).replace("-", "−")
 
 
 def state_word(state: PairState) -> str:

@@ -141,7 +141,8 @@ TEXTS = texts(
         "met": Plural(
             "references",
             "Nothing to explain: the one reference about poses, axes and limits is met.",
-            "Nothing to explain: all {count} references about poses, axes and limits are met.",
+            "Nothing to explain: all {count} references about poses, axes and limits are met. (Not among them: reach, "
+            "speeds, and references that contradict each other.)",
         ),
         "resolution#length": "A single wrong length is detected from {length_mm:.2g} mm on.",
         "resolution#angle": "A single wrong angle is detected from {angle_deg:.2g} deg on.",

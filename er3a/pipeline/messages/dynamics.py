@@ -50,7 +50,7 @@ NEEDS: dict[Need, str] = {
 FIGURES = {
     "paths": N_("Paths that count"),
     "mass": N_("Mass of the links"),
-    "peak_torque": N_("Greatest torque on a path"),
+    "peak_torque": N_("Greatest torque on a path that may be run"),
     "holding_torque": N_("Greatest holding torque found"),
     "energy": N_("Greatest energy of a path"),
     "utilisation": N_("Highest utilisation of a limit"),
@@ -79,12 +79,16 @@ TEXTS = texts(
         "dynamics.use#joint": "{what} at J{joint}: {asked:.3g} {unit} of {allowed:.3g} {unit} ({percent:.0f} %)",
         "dynamics.no_data": "No data: torques need masses. Needed: {needs}.",
         "dynamics.no_limits#path": (
-            "No drive's limits are known, so the motors can't be judged. The greatest torque is {torque:.3g} ± "
-            "{tolerance:.2g} {unit}, at J{joint} on path {path}."
+            "No drive's limits are known, so the motors can't be judged. On the paths that may be run the greatest "
+            "torque is {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint} on path {path}."
         ),
         "dynamics.no_limits#holding": (
             "No drive's limits are known, so the motors can't be judged. The greatest holding torque is {torque:.3g} "
             "± {tolerance:.2g} {unit}, at J{joint}."
+        ),
+        "dynamics.no_limits#at_rest": (
+            "At rest it takes up to {torque:.3g} ± {tolerance:.2g} {unit} elsewhere within the limits, at J{joint}: "
+            "choose motors by the greater."
         ),
         "dynamics.fits": "Fits: every quantity with a known limit is within it; highest utilisation: {use}.",
         "dynamics.unlimited": "Unknown, wholly or in part: {what}.",
@@ -217,7 +221,8 @@ def _(found: NoData) -> str:
 def _(found: NoLimits) -> str:
     parts = {"joint": found.joint, "torque": found.torque, "tolerance": found.tolerance, "unit": found.unit}
     greatest = say_as(found, "path" if found.path else "holding", **parts)
-    return joined([greatest, *_reservations(found)], " ")
+    held = say_as(found, "at_rest", **vars(found.held) | {"torque": abs(found.held.torque)}) if found.held else ""
+    return joined([greatest, held, *_reservations(found)], " ")
 
 
 @say.register

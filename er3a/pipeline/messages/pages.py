@@ -13,7 +13,10 @@ PAGE, INDEX, ALL_ROBOTS = N_("page"), N_("index"), N_("All robots")
 TEACH_PANEL, COMPARISON = N_("teach panel"), N_("two robots side by side")
 ARTICLE = N_("the article, item by item")
 FOUNDATIONS: Mapping[str, str] = {
-    "fail": N_("Never use this table: evidence contradicts it. These results hold for the table, not for the robot."),
+    "fail": N_(
+        "Never use this table: evidence contradicts it. These results hold for the table, not for the robot: run no "
+        "path, repair or program that was made by it."
+    ),
     "caution": N_("Validation leaves part of this D-H table open: these results are only as good as the table."),
     "no_reference": N_("This D-H table was compared with no data: these results are only as good as the table."),
     "not_computed": N_("This D-H table was not validated: these results are only as good as the table."),

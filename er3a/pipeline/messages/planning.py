@@ -24,7 +24,7 @@ STRATEGIES: dict[StrategyName, str] = {
     "damped": N_("Use damped least squares, which leaves the path"),
     "detour": N_("Cross the region by a joint move"),
     "stop": N_("Stop before the region with an alarm"),
-    "planned": N_("Use a planned joint motion instead"),
+    "planned": N_("Use another motion instead, planned in joint space"),
 }
 
 MOST_SHOWN = 1e6  # of an acceleration; towards a singular pose or the edge of the reach it has no bound
@@ -32,8 +32,8 @@ MOST_SHOWN = 1e6  # of an acceleration; towards a singular pose or the edge of t
 
 TEXTS = texts(
     {
-        "above_limit": "J{joint} goes to {reached_deg:.1f} deg; its upper limit is {limit_deg:g} deg",
-        "below_limit": "J{joint} goes to {reached_deg:.1f} deg; its lower limit is {limit_deg:g} deg",
+        "above_limit": "J{joint} goes above its upper limit of {limit_deg:g} deg, up to {reached_deg:.1f} deg",
+        "below_limit": "J{joint} goes below its lower limit of {limit_deg:g} deg, down to {reached_deg:.1f} deg",
         "must_stand_still": "the arm would have to stop along the path",
         "no_time_law_found": "the time-optimal parametrisation found no time law under the joints' limits",
         "toppra_missing": "the library toppra is not installed; it has wheels for Linux on x86-64 only",

@@ -76,7 +76,6 @@ REMEDIES: dict[str, str] = {
     "configuration_guessed": N_("Give start_deg of the program, or begin with a move to joint angles."),
     "moves_beside": BY_HAND,
     "never_reached": N_("Remove this motion, or check what leads to it as a program of its own."),
-    "clear_of_assumed": N_("Give shapes from a drawing or model in the robot's file, or keep the motion farther away."),
     "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
     "zone_collides": N_("Make the zone smaller, or stop at the corner."),
     "zone_not_settled": N_("Stop at the corner, or make the zone smaller until this is no longer found."),
@@ -132,9 +131,9 @@ PACED = (TooFast, FasterThanAssumed, AcceleratesMoreThanAssumed)
 MOST_PAIRS = 3  # that are named of a collision
 FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
-    "instructions_passed": N_("Motion instructions that pass"),
-    "instructions_caution": N_("Motion instructions with caution"),
-    "instructions_failed": N_("Motion instructions that fail"),
+    "instructions_passed": N_("Motion instructions that pass, of programs meant to pass"),
+    "instructions_caution": N_("Motion instructions with caution, of programs meant to pass"),
+    "instructions_failed": N_("Motion instructions that fail, of programs meant to pass"),
     "least_clearance": N_("Least clearance of programs meant to pass"),
 }
 
@@ -320,6 +319,13 @@ TEXTS = texts(
             "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
         ),
         "written_unsafe": "the path {path} is not safe: {verdict}",
+        "written_near_assumed": (
+            "the path {path} is clear by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by "
+            "{margin_mm:g} mm"
+        ),
+        "remedy.clear_of_assumed": (
+            "Keep {margin:g} mm between {pair}, or give shapes from a drawing or model in the robot's file."
+        ),
         "remedy.joint_move": "Go there by a joint move to ({end}) deg: it passes these checks.",
         "remedy.joint_moves": "Go there by joint moves to ({via}) deg, then ({end}) deg: they pass these checks.",
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
@@ -482,6 +488,11 @@ def _(found: text.WrittenUnsafe) -> str:
 def remedy(finding: Any) -> str:
     """What to do about a finding, as a sentence in the language in use; empty where nothing is to be done."""
     return word("remedy", REMEDIES, finding.code) if finding.code in REMEDIES else ""
+
+
+@remedy.register
+def _(found: found_in.ClearOfAssumed) -> str:
+    return sentence("remedy.clear_of_assumed", margin=found.margin_mm, pair=found.pair)
 
 
 @remedy.register

@@ -64,7 +64,10 @@ STATUS_MEANINGS = {
     "contradicted": N_("don't use it: the evidence excludes the value"),
     "consistent": N_("check it on the arm: no document but its own source covers it"),
     "open": N_("measure it: no document distinguishes it from another value that moves the tool"),
-    "gauge": N_("keep it: not determined alone; changed together with other entries it describes the same robot"),
+    "gauge": N_(
+        "keep it: not determined alone; changed together with other entries it describes the same robot; counted once, "
+        "by the sum that documents speak of"
+    ),
     "given": N_("chosen by the author of the file"),
 }
 CHECK_KINDS = {

@@ -153,10 +153,12 @@ def bracketed(text: str, more: str) -> str:
 
 
 def say_first(finding: Any) -> str:
-    """A finding with the first of the bodies that touch, or of the reasons, that it names."""
-    for name in ("touches", "reasons"):
-        if several := getattr(finding, name, ()):
-            finding = replace(finding, **{name: several[:1]})
+    """A finding with the first of the reasons that it names, and of the bodies that touch the first and the deepest."""
+    if reasons := getattr(finding, "reasons", ()):
+        return say(replace(finding, reasons=reasons[:1]))
+    if touches := getattr(finding, "touches", ()):
+        deepest = max(touches, key=lambda each: each.depth_mm)
+        return say(replace(finding, touches=tuple(dict.fromkeys((touches[0], deepest)))))
     return say(finding)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
@@ -11,14 +13,16 @@ from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.messages.language import N_, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
-from er3a.pipeline.messages.say import Plural, joined, listed, say, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
     Jump,
+    LimitsUsed,
     PathCounts,
     PathKind,
     PathSummary,
     Singularity,
+    StrategyMotion,
     Stretch,
     TriedStrategy,
 )
@@ -27,8 +31,8 @@ from er3a.planning.names import PathVerdict, StrategyName
 
 FIGURES = {
     "safe": N_("Safe paths, of those meant to be safe"),
-    "singular_poses": N_("Singular poses met"),
-    "near_passes": N_("Near-singular passes"),
+    "singular_poses": N_("Singular poses met, on paths meant to be safe"),
+    "near_passes": N_("Near-singular passes, on paths meant to be safe"),
     "colliding": N_("Paths with a collision, of those meant to be safe"),
     "max_joint_speed": N_("Joint speed nearest its limit, on paths meant to be safe"),
     "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
@@ -59,7 +63,9 @@ BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways th
 MOST_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
+AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
 WHOLE = 10.0  # from which on numbers are rounded to whole ones
+IF_ASSUMED = "_if_assumed"  # ends the codes of faults against assumed limits
 PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
 
@@ -93,6 +99,7 @@ TEXTS = texts(
         "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
         "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
+        "path.singular": "{type} singularity",
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
@@ -115,19 +122,36 @@ TEXTS = texts(
             "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path): end it before, while joint speeds "
             "still have a bound, or move its end or the workpiece nearer to the arm"
         ),
+        "advice.within_reach#later": (
+            "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path), but something is wrong before: from "
+            "t = {first:.4g} s, {what}"
+        ),
         "advice.sound": (
-            "The last point computed before anything is wrong is at t = {t:.4g} s, the tool at x, y, z = {xyz} mm"
+            "The last point computed before anything is wrong is at t = {t:.4g} s, the tool at x, y, z = {xyz} mm: end "
+            "it there, or move the path"
         ),
         "advice.end": "End it there, with the tool at x, y, z = {xyz} mm.",
         "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
+        "advice.end#assumed": (
+            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear, as the shapes are assumed."
+        ),
         "advice.chosen": "{way}: {tool}, and {time}",
         "advice.chosen#clear": "{way}: {tool}, {time}, and the arm keeps {clearance:.1f} mm of clearance",
+        "advice.region": "It still passes near the singular pose",
+        "advice.limits#both": (
+            "It takes up to {speed:.0f} % of the joints' speeds and {acceleration:.0f} % of their accelerations, which "
+            "are both assumed"
+        ),
+        "advice.limits#speed": "It takes up to {speed:.0f} % of the joints' speeds, which are assumed",
+        "advice.limits#acceleration": (
+            "It takes up to {acceleration:.0f} % of the joints' accelerations, which are assumed"
+        ),
         "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
         "advice.tool#none": "the tool stays on the path",
         "advice.tool#far": "the tool leaves the path by {far} mm",
         "advice.tool#turned": "the tool leaves the path by {turned} deg",
         "advice.swing": "{tool}, J{joint} turns most, by {swing:.0f} deg",
-        "advice.time#less": "it takes {shorter:.2f} s less than programmed",
+        "advice.time#less": "it takes {takes:.2f} s instead of the {programmed:.2f} s programmed",
         "advice.time#same": "it takes as long as programmed",
         "advice.time#slower_there": "it takes as long as programmed, slower there and faster elsewhere",
         "advice.time#more": "it takes {longer:.2f} s more than programmed",
@@ -300,13 +324,33 @@ def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-ar
     return cause
 
 
-def advice(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None = None) -> str | None:
+def first_faults(path: PathSummary) -> list[tuple[float, str]]:
+    """When (s) a path is wrong first, and how, for each kind of fault, the earliest first; what is undecided only where
+    it comes before all that is not."""
+    fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
+    kinds: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions, *fast]
+    firsts = [min(each, key=lambda part: part.t0_s) for each in kinds if each]
+    found = [(part.t0_s, say_first(part.cause)) for part in firsts]
+    edge = min((part.t0_s for part in path.unreachable), default=math.inf) - AT_EDGE
+    events = [] if path.in_joint_space else [each for each in path.singularities if each.crossing and each.t_s < edge]
+    found += [(event.t_s, sentence("path.singular", type=event_word(event))) for event in events[:1]]
+    found += [(jump.t_s, say(jump)) for jump in path.jumps[:1]]
+    open_ = min(path.undecided, key=lambda part: part.t0_s, default=None)
+    if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
+        found.append((open_.t0_s, cause_text(path, open_)))
+    return sorted(found)
+
+
+def advice(
+    path: PathSummary, sound: tuple[float, tuple[float, ...]] | None = None, limits: LimitsUsed | None = None
+) -> str | None:
     """What to do about a path; None where nothing is to be done. ``sound``: time (s) and place (mm) of the last point
-    before anything is wrong."""
+    before anything is wrong; ``limits``: of the joints, whose assumed ones are named."""
     if not path.avoidance:
         return None
     if path.chosen:
-        return joined([repair_text(path), _slower_throughout(path)], ". ")
+        slower = _slower_throughout(path) if path.strategy == "slow" else ""
+        return joined([repair_text(path, limits), slower], ". ")
     if path.unreachable:
         when = joined(map(_when, path.unreachable), ", ")
         why = sentence("advice.out_of_reach", when=when)
@@ -320,7 +364,7 @@ def advice(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None = No
             return joined([no_way, _until(path, sound)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
-    return joined([sentence("advice.none", why=why), _within_reach(path), _until(path, sound)], ". ")
+    return joined([sentence("advice.none", why=why), _within_reach(path, sound is not None), _until(path, sound)], ". ")
 
 
 def _until(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> str:
@@ -330,10 +374,14 @@ def _until(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> 
     return _clear(path)
 
 
-def end_text(path: PathSummary, xyz_mm: tuple[float, ...]) -> str:
-    """That a path may be run to a point of it (mm), and by how much it is clear up to there, if that was measured."""
+def end_text(path: PathSummary, xyz_mm: tuple[float, ...], *, assumed: bool) -> str:
+    """That a path may be run to a point of it (mm), and by how much it is clear up to there, if that was measured.
+
+    ``assumed``: whether the arm's shapes are, for which the margin is kept.
+    """
     if path.clear_until:
-        return sentence("advice.end#clear", xyz=_numbers(xyz_mm, 1), margin=path.clear_until.margin_mm)
+        form = "advice.end#assumed" if assumed else "advice.end#clear"
+        return sentence(form, xyz=_numbers(xyz_mm, 1), margin=path.clear_until.margin_mm)
     return sentence("advice.end", xyz=_numbers(xyz_mm, 1))
 
 
@@ -346,12 +394,16 @@ def _slower_throughout(path: PathSummary) -> str:
     return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
 
 
-def _within_reach(path: PathSummary) -> str:
-    """How far a path that leaves the reach could be used; empty for others."""
-    first = min(path.unreachable, key=lambda part: part.t0_s, default=None)
-    if first is None or first.s0_m <= 0:
+def _within_reach(path: PathSummary, with_sound: bool) -> str:
+    """How far a path that leaves the reach could be used; empty for others. ``with_sound``: whether it is said beside
+    this up to where nothing is wrong."""
+    part = min(path.unreachable, key=lambda part: part.t0_s, default=None)
+    if part is None or part.s0_m <= 0:
         return ""
-    return sentence("advice.within_reach", t=first.t0_s, far=first.s0_m * 1000)
+    first, what = first_faults(path)[0]
+    later = first < part.t0_s and (with_sound or first <= 0)
+    form = "advice.within_reach#later" if later else "advice.within_reach"
+    return sentence(form, t=part.t0_s, far=part.s0_m * 1000, first=first, what=what)
 
 
 def _clear(path: PathSummary) -> str:
@@ -380,24 +432,41 @@ def reasons(tried: TriedStrategy) -> str:
     return joined(listed(tried.reasons))
 
 
-def repair_text(path: PathSummary, *, in_short: bool = False) -> str:
-    """What the strategy that was chosen does, and what it costs."""
+def repair_text(path: PathSummary, limits: LimitsUsed | None = None) -> str:
+    """What the strategy that was chosen does, what it costs, and what of ``limits`` that are assumed it takes."""
     tried = path.chosen
     if tried is None or tried.motion is None:
         raise ValueError(f"{path.name} has no motion that repairs it")
     motion = tried.motion
     tool = _leaves(motion.max_deviation_mm, motion.max_deviation_deg)
     swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in path.sliding}
-    if tried.name in BY_JOINTS and swings and not in_short:
+    if tried.name in BY_JOINTS and swings:
         joint = max(swings, key=swings.__getitem__)
         tool = sentence("advice.swing", tool=tool, joint=joint, swing=swings[joint])
-    cost = {"tool": tool, "time": _takes(motion.duration_s - path.duration_s, tried.name)}
-    way = word("advice", ADVICE, tried.name)
-    if in_short:
-        return sentence("finding", finding=sentence("advice.chosen", way=way, **cost))
-    if motion.clearance_mm is None:
-        return sentence("advice.chosen", way=way, **cost)
-    return sentence("advice.chosen#clear", way=way, clearance=math.floor(10 * motion.clearance_mm) / 10, **cost)
+    clearance = None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
+    chosen = sentence(
+        "advice.chosen" if clearance is None else "advice.chosen#clear",
+        way=word("advice", ADVICE, tried.name),
+        tool=tool,
+        time=_takes(motion.duration_s, path.duration_s, tried.name),
+        clearance=clearance,
+    )
+    near = "" if motion.keeps_clear or not path.singularities else sentence("advice.region")
+    return joined([chosen, near, _of_limits(motion, limits) if limits else ""], ". ")
+
+
+def _of_limits(motion: StrategyMotion, limits: LimitsUsed) -> str:
+    """What of assumed limits a motion takes; empty where none is assumed."""
+    speeds, speed, acceleration = any(limits.speed_assumed), limits.speed_deg_s, limits.acceleration_assumed
+    if not speeds and not acceleration:
+        return ""
+    form = "both" if speeds and acceleration else "speed" if speeds else "acceleration"
+    pairs = zip(motion.max_joint_speed_deg_s, speed, limits.speed_assumed)
+    return sentence(
+        f"advice.limits#{form}",
+        speed=100 * max((most / limit for most, limit, assumed in pairs if assumed), default=0.0),
+        acceleration=100 * motion.max_joint_acceleration_ratio,
+    )
 
 
 def _leaves(far_mm: float, turned_deg: float) -> str:
@@ -415,9 +484,9 @@ def _shortly(value: float) -> str:
     return f"{value:.2g}" if value < WHOLE else f"{value:.0f}"
 
 
-def _takes(longer_s: float, strategy: StrategyName) -> str:
-    if abs(longer_s) < NO_TIME:
+def _takes(takes_s: float, programmed_s: float, strategy: StrategyName) -> str:
+    if abs(takes_s - programmed_s) < NO_TIME:
         return sentence("advice.time#slower_there" if strategy == "slow" else "advice.time#same")
-    if longer_s > 0:
-        return sentence("advice.time#more", longer=longer_s)
-    return sentence("advice.time#less", shorter=-longer_s)
+    if takes_s > programmed_s:
+        return sentence("advice.time#more", longer=takes_s - programmed_s)
+    return sentence("advice.time#less", takes=takes_s, programmed=programmed_s)

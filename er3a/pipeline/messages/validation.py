@@ -145,11 +145,11 @@ TEXTS = texts(
         "validation.another_arm": "They exclude {names}.",
         "contradiction#more": (
             "The references contradict each other about the {subject} ({stated}) and {more} more, which is not "
-            "counted against the model."
+            "counted against the model: measure that on the arm before you rely on either."
         ),
         "contradiction#one": (
             "The references contradict each other about the {subject} ({stated}), which is not counted against the "
-            "model."
+            "model: measure it on the arm before you rely on either."
         ),
         "not_in_robot_file": "the robot's file gives no value",
         "source_gives_none": "the source gives none",

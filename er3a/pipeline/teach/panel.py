@@ -154,7 +154,8 @@ WORDS: dict[str, Any] = {
     "matrix_caption": N_("Transform from the tool to the base; its last column is the position in mm"),
     "measures": N_("How near to a singularity?"),
     "measures_help": N_(
-        "At a singularity the tool loses a direction, and near it slow tool motions need fast joints. The measures are "
+        "At a singularity the tool loses a direction, and near it slow tool motions need fast joints; moving the "
+        "joints one by one is unaffected. The measures are "
         "of the Jacobian with its linear rows divided by {length} mm, {length_is}. At a singularity the first two are "
         "0 and the condition number is infinite."
     ),
@@ -177,7 +178,8 @@ WORDS: dict[str, Any] = {
     },
     "at": {
         "wrist": N_(
-            "At the wrist singularity: axes 4 and 6 are parallel, so J6 adds nothing to what the other joints do."
+            "At the wrist singularity: axes 4 and 6 are parallel, so J6 adds nothing to what the other joints do. "
+            "Joint moves are unaffected."
         ),
         "elbow": N_(
             "At the elbow singularity: the arm is straight or folded, so the forearm's end can't move along the arm."

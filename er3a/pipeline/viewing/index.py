@@ -30,6 +30,7 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import near_shapes
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import N_, own_title, tr
+from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.messages.pages import caveat, decision, next_step, what_it_can_do
 from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.validation import CONVENTIONS, how_far_off, missed_text, shortened
@@ -150,7 +151,7 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
             if figure.part and value is not None:  # the whole differs from robot to robot
                 found[title, figure.label, ""] = f"{number(value)} {unit}"
             else:
-                found[title, figure.label, unit] = value
+                found[title, figure.label, unit] = float(f"{value:.4g}") if isinstance(value, float) else value
     return found
 
 
@@ -466,6 +467,7 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 
 SHOWN_FIGURES = 3
 RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
+OF_ALL_RUNS = ("controller_language", "tool", "bare_tool", "carried", "torques")  # what may turn any of them unsafe
 MOST_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
 PLACE_LETTERS = 160
 VOID_TAGS = ("br", "img", "input", "wbr", "hr")
@@ -576,7 +578,9 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     by_status: dict[str, list[str]] = {}
     for stage, head in heads.items():
         if stage != "validation":
-            by_status.setdefault(head.status, []).append(tr(STAGES[stage].title))
+            simulated = any(each.subject == "real_camera" for each in head.summary.not_examined)
+            title = tr(STAGES[stage].title)
+            by_status.setdefault(head.status, []).append(bracketed(title, tr("simulated") if simulated else ""))
     by_status.setdefault("not_computed", []).extend(tr(STAGES[stage].title) for stage in stages if stage not in heads)
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
@@ -609,6 +613,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "cells": [_cell(head) for head in sorted(heads.values(), key=lambda head: FIRST.index(head.status))],
         "expected": expected,
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
+        "not_asked": [tr(stage.title) for name, stage in STAGES.items() if name not in stages],
     }
 
 
@@ -633,7 +638,8 @@ def _settled(finding: object) -> tuple[bool, str]:
     if not isinstance(finding, LeftOpen):
         return False, ""
     part = next((part for part in finding.parts if part.part == "geometry"), None)
-    settled = page.whole_sentence(say(part)) if part else ""
+    unsettled = joined([say(each) for each in finding.parts if each is part or each.status != "settled"])
+    settled = page.whole_sentence(unsettled) if unsettled else ""
     return part is not None and not (part.settled or part.up_to_signs), joined([settled, *how_far_off(finding)], " ")
 
 
@@ -661,7 +667,15 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
         followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
     faulty = {fault.name for fault in faults}
     sound = [each.name for each in followed if each.name not in faulty]
-    return {"stage": stage, "count": len(followed) + lost, "lost": lost, "sound": sound, "faults": faults}
+    open_ = joined([left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS])
+    return {
+        "stage": stage,
+        "count": len(followed) + lost,
+        "lost": lost,
+        "sound": sound,
+        "faults": faults,
+        "open": open_,
+    }
 
 
 def _cell(head: Head) -> dict[str, Any]:

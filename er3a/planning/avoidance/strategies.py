@@ -58,6 +58,7 @@ GROWTH = 1.4
 HALVINGS = 12
 MOST_SIDES = 8
 FARTHEST: dict[Kind, float] = {"shift": 0.5, "tilt": 1.0}  # of the characteristic length; rad
+SAME_TIME = 0.01  # s
 SPARE = 1.0005  # keep this much more than the distance
 
 
@@ -594,19 +595,25 @@ def compare(segment: avoidance.SingularSegment, chosen: StrategyName | None = No
     return [_tried(segment, name) for name in STRATEGIES if chosen in (None, name)]
 
 
-def best(results: Iterable[StrategyResult], meets: bool) -> StrategyResult | None:
-    """Of the usable strategies the one that leaves the path least (mm and deg added), then the quickest; else None.
+def best(results: Iterable[StrategyResult], meets: bool, programmed: float = 0.0) -> StrategyResult | None:
+    """Of the usable strategies the one that leaves the path least (mm and deg added); else None.
+
+    Of equals, the one that takes least time beyond what is programmed (in steps of ``SAME_TIME``), then what keeps its
+    distance from singular poses, then what takes least of the limits of speed and acceleration.
 
     Parameters
     ----------
     meets : whether the path meets a singular pose; what goes through it is then taken only if nothing else is usable
+    programmed : duration of the path, s
     """
 
-    def price(cost: StrategyCost) -> tuple[bool, float, float]:
+    def price(cost: StrategyCost) -> tuple[bool, float, int, bool, float]:
         far, turned = cost.distance.max(), cost.angle.max()
         on_path = far < ON_PATH[0] and turned < ON_PATH[1]
         away = 0.0 if on_path else float(far * 1000 + np.degrees(turned))
-        return meets and not cost.keeps_clear, away, cost.motion.duration
+        ratio = max(cost.max_joint_speed_ratio, cost.max_joint_acceleration_ratio)
+        longer = round(max(0.0, cost.motion.duration - programmed) / SAME_TIME)
+        return meets and not cost.keeps_clear, away, longer, not cost.keeps_clear, ratio
 
     usable = [(price(result.cost), i, result) for i, result in enumerate(results) if result.cost and not result.reasons]
     return min(usable)[2] if usable else None

@@ -138,12 +138,13 @@ def _no_limits(
     grade: Grade | None,
 ) -> model.NoLimits:
     counted, shown = [path for path in paths if path.counts], (missing, doubts, grade)
+    at_rest = model.hardest_held(holding)
     if counted:
         path = max(counted, key=lambda path: path.hardest.peak)
         load = path.hardest
-        return model.NoLimits(len(counted), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown)
-    held = model.hardest_held(holding)
-    return model.NoLimits(0, held.joint, abs(held.torque), held.tolerance, held.unit, None, *shown)
+        more = at_rest if abs(at_rest.torque) > load.peak and at_rest.unit == load.unit else None
+        return model.NoLimits(len(counted), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown, more)
+    return model.NoLimits(0, at_rest.joint, abs(at_rest.torque), at_rest.tolerance, at_rest.unit, None, *shown)
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,7 @@ class NoLimits:
     missing_links : without mass, which count as massless
     doubts : findings on the masses besides
     grade : of the masses, where no document or scale gives them; None where one does
+    held : at rest, where that is more than on any path that counts
     """
 
     paths: int
@@ -93,6 +94,7 @@ class NoLimits:
     missing_links: tuple[int, ...]
     doubts: int
     grade: Grade | None
+    held: HoldingTorque | None = None
     code: Literal["dynamics.no_limits"] = "dynamics.no_limits"
 
 

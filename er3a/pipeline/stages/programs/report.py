@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup, escape
 
+from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy_at
 from er3a.pipeline.messages.say import bracketed, say
@@ -81,6 +82,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         faults={fault.name: fault for fault in faults(results)},
         player=player(robot, motions(robot, results), scene),
         bodies=[each.name for each in scene.solids] if scene else [],
+        solids=solid_rows(scene),
         drawing_head=drawing_head(),
     )
 

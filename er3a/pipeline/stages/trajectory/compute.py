@@ -33,7 +33,7 @@ from er3a.pipeline.stages.trajectory.motion import (
     planning_of,
     proof_requirements,
 )
-from er3a.pipeline.stages.trajectory.written_programs import program_files
+from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
 from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare, deviation
@@ -107,7 +107,7 @@ class AvoidanceTask:
         met = {result.name: self._meets(result.cost, margin) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
-        chosen = best(free, meets)
+        chosen = best(free, meets, motion.built.duration)
         tried = tuple(_tried(self.robot, result, *met.get(result.name, (None, None))) for result in results)
         return Avoided(
             tried=tried,
@@ -401,8 +401,9 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         last = judgement.clear_until(surroundings, motion, found, along, margin)
         paths.append(replace(path_summary(robot, motion, found, along, avoided, limits), clear_until=last))
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
+        close = near_assumed_shapes(robot, each.name, paths[-1].clearance, settings.assumed_margin_mm)
         asked = settings.programs, settings.write_unsafe
-        programs.append(program_files(robot, motion, paths[-1].verdict, *asked, repair))
+        programs.append(program_files(robot, motion, paths[-1].verdict, *asked, near=close, repaired=repair))
     checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)

@@ -9,9 +9,18 @@ import numpy as np
 
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.language import own_title, tr
-from er3a.pipeline.messages.programs import REMEDIES, say
-from er3a.pipeline.messages.say import joined, say_first, sentence, word
-from er3a.pipeline.messages.trajectory import advice, cause_text, end_text, event_word, path_text, repair_text
+from er3a.pipeline.messages.programs import remedy, say
+from er3a.pipeline.messages.say import joined, sentence
+from er3a.pipeline.messages.trajectory import (
+    IF_ASSUMED,
+    advice,
+    cause_text,
+    end_text,
+    event_word,
+    first_faults,
+    path_text,
+    repair_text,
+)
 from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
@@ -53,7 +62,8 @@ def motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
         )
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
-            motions.append(PlayedMotion(repaired(path), advice(path) or "", repair.t_s, meant(robot, repair.q_deg)))
+            text = advice(path, limits=results.summary.joint_limits) or ""
+            motions.append(PlayedMotion(repaired(path), text, repair.t_s, meant(robot, repair.q_deg)))
     return motions
 
 
@@ -71,9 +81,9 @@ def faults(results: TrajectoryResults) -> list[Fault]:
         if is_safe(path, results.summary.verdict.shapes):
             continue
         clearance = path.clearance if path.verdict == "safe" else None
-        what, t = (near, clearance.t_s) if clearance else _first_fault(path)
+        what, t = (say(near), clearance.t_s) if clearance else _first_fault(path)
         status, verdict = shown_verdict(path, near)
-        to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name))
+        to_do, instead = _to_do(path, results.checks.take(results.checks.path == path.name), results.summary)
         found.append(
             Fault(
                 path.name,
@@ -81,7 +91,7 @@ def faults(results: TrajectoryResults) -> list[Fault]:
                 status,
                 verdict,
                 path.expect == path.verdict != "safe",
-                "" if t is None else tr("{time} s", time=fixed(t, 2)),
+                "" if t is None else tr("{time} s", time=fixed(t, 3)),
                 what,
                 to_do,
                 address_of("trajectory", path.name, t or 0.0, path.name),
@@ -92,20 +102,13 @@ def faults(results: TrajectoryResults) -> list[Fault]:
 
 
 def _first_fault(path: PathSummary) -> tuple[str, float | None]:
-    """What is wrong first with a path that is not safe, and when (s), if it has a time; how fast it is counts where
-    nothing else is, singular poses before it, and assumed limits where no known one is exceeded."""
-    if path.no_way:
-        return path_text(path), None
-    faults: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
-    if not any(faults) and path.verdict != "singular":
-        fast = [part for part in path.too_fast if path.verdict != "too fast" or not _assumed(part)]
-        faults = [fast or path.undecided]
-    firsts = sorted((min(each, key=_start) for each in faults if each), key=_start)
-    if not firsts:
-        times = _singular_times(path) or [event.t_s for event in path.singularities]
+    """What is wrong first with a path that is not safe, and when (s), if it has a time; then what is wrong later."""
+    found = [] if path.no_way else first_faults(path)
+    if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
+        times = [] if path.no_way else _singular_times(path) or [event.t_s for event in path.singularities]
         return path_text(path), min(times, default=None)
-    later = [tr("at t = {time} s: {text}", time=fixed(part.t0_s, 2), text=say_first(part.cause)) for part in firsts[1:]]
-    return joined([say_first(firsts[0].cause), *later]), firsts[0].t0_s
+    later = [tr("at t = {time} s: {text}", time=fixed(t, 3), text=text) for t, text in found[1:]]
+    return joined([found[0][1], *later]), found[0][0]
 
 
 def _singular_times(path: PathSummary) -> list[float]:
@@ -114,28 +117,26 @@ def _singular_times(path: PathSummary) -> list[float]:
     return [*crossed, *(jump.t_s for jump in path.jumps)]
 
 
-def _start(part: Stretch[Any]) -> float:
-    return part.t0_s
-
-
 def _assumed(part: Stretch[Any]) -> bool:
     """Whether what a stretch exceeds is an assumed limit."""
-    return bool(part.cause.code.endswith("_if_assumed"))
+    return bool(part.cause.code.endswith(IF_ASSUMED))
 
 
-def _to_do(path: PathSummary, rows: PathChecks) -> tuple[str, tuple[str, str] | None]:
+def _to_do(path: PathSummary, rows: PathChecks, summary: TrajectorySummary) -> tuple[str, tuple[str, str] | None]:
     """What to do instead of running a path as it is, and the motion that may be run with its address."""
     if path.chosen:
         name = repaired(path)
-        return repair_text(path, in_short=True), (name, address_of("trajectory", name, 0.0, path.name))
-    if path.verdict == "safe":
-        return word("remedy", REMEDIES, "clear_of_assumed"), None
+        repair = sentence("finding", finding=repair_text(path, summary.joint_limits))
+        return repair, (name, address_of("trajectory", name, 0.0, path.name))
+    if near := near_assumed(path, summary):
+        return remedy(near), None
     last = last_sound(path, rows)
     if last is None:
         todo = advice(path)
         return sentence("finding", finding=todo) if todo else "", None
-    name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 2))
-    return end_text(path, last[1]), (name, address_of("trajectory", path.name, last[0], path.name))
+    name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 3))
+    end = end_text(path, last[1], assumed=summary.verdict.shapes is not None)
+    return end, (name, address_of("trajectory", path.name, last[0], path.name))
 
 
 def repaired(path: PathSummary) -> str:
@@ -159,19 +160,19 @@ def last_sound(path: PathSummary, rows: PathChecks) -> tuple[float, tuple[float,
     return (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())) if len(sound) else None
 
 
-def shown_verdict(path: PathSummary, near: str) -> tuple[Weight, str]:
+def shown_verdict(path: PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
     return WEIGHTS[path.verdict], outcome_word(path.verdict)
 
 
-def near_assumed(path: PathSummary, summary: TrajectorySummary) -> str:
-    """That a path is clear of assumed shapes by less than these may be wrong by; else empty."""
+def near_assumed(path: PathSummary, summary: TrajectorySummary) -> ClearOfAssumed | None:
+    """That a path is clear of assumed shapes by less than these may be wrong by."""
     shapes = summary.verdict.shapes
     if shapes is None or path.name not in shapes.near or path.clearance is None:
-        return ""
-    return say(ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm))
+        return None
+    return ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm)
 
 
 def events(path: PathSummary) -> list[PlayedEvent]:

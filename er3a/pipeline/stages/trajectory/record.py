@@ -87,13 +87,14 @@ def _runs(robot: Robot, results: TrajectoryResults, path: PathSummary) -> Iterat
         shapes=[*still, *_trail(shown, HIGHLIGHT)],
     )
     if path.chosen and path.chosen.motion:
+        to_do = advice(path, limits=results.summary.joint_limits) or ""
         repair: MotionRows = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
         repaired = repair.take(_frames(repair))
         yield Run(
             **_moved(robot, repaired),
             name=f"{path.name}, repaired",
-            text=f"## {path.name}, repaired\n{advice(path)}.",
-            outcome=advice(path) or "",
+            text=f"## {path.name}, repaired\n{to_do}.",
+            outcome=to_do,
             shapes=[*still, *_trail(repaired, MODEL)],
         )
 

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import tr
-from er3a.pipeline.messages.say import joined
+from er3a.pipeline.messages.programs import remedy
+from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import (
     advice,
     cause_text,
@@ -80,6 +82,7 @@ class PathSection:
     kind: str
     text: str
     advice: str | None
+    near: str
     branches: list[str]
     speed: str
     events: list[list[str]]
@@ -114,6 +117,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_section(results, count),
+        solids=solid_rows(scene),
         assumed=assumed,
         drawn_paths=count,
         turning=in_space(robot, results, paths[:count], scene),
@@ -141,8 +145,9 @@ def _section(
         status=status.replace("plain", "pass"),
         verdict=verdict,
         kind=kind_word(path.kind),
-        text=joined([path_text(path), near]),
-        advice=advice(path, last_sound(path, rows)),
+        text=joined([path_text(path), say(near) if near else ""]),
+        advice=advice(path, last_sound(path, rows), summary.joint_limits),
+        near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
         events=[_event_row(path.name, event) for event in path.singularities],
@@ -150,9 +155,14 @@ def _section(
         strategies=_strategies(path),
         programs=[each for each in programs if not _repairs(path, each)],
         repaired=[each for each in programs if _repairs(path, each)],
-        shortest="–" if path.fastest_s is None or path.verdict in AT_ANY_PACE else fixed(path.fastest_s, 2),
+        shortest="–" if (shortest := _shortest(path)) is None else fixed(shortest, 2),
         figure=figure,
     )
+
+
+def _shortest(path: model.PathSummary) -> float | None:
+    """The shortest time (s) of a path; None where none follows it, or it fails at any pace."""
+    return None if path.verdict in AT_ANY_PACE else path.fastest_s
 
 
 def _repairs(path: model.PathSummary, program: ProgramLink) -> bool:
@@ -217,8 +227,8 @@ def _strategies(path: model.PathSummary) -> list[list[str]]:
             rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
         else:
             rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
-    if path.fastest_s:
-        costs = ["0", "0", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
+    if shortest := _shortest(path):
+        costs = ["0", "0", "1.00", "1.00", clearance, fixed(shortest, 2)]
         rows.append([tr("the path at its fastest"), *costs, tr("for comparison")])
     return rows
 

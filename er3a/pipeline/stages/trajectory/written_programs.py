@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from er3a.collision.shapes import shapes_assumed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.stages.trajectory.model import AvoidanceRows, ProgramFiles
+from er3a.pipeline.stages.trajectory.model import AvoidanceRows, MinClearance, ProgramFiles
 from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram
 from er3a.planning.commands import CommandSource, JointTableCommand, PlanCommand, ToolMoveCommand
 from er3a.planning.names import PathVerdict
@@ -16,7 +17,7 @@ from er3a.planning.profiles import Times
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import not_written, write_program
-from er3a.programs.program_findings import WriteFinding, WrittenUnsafe
+from er3a.programs.program_findings import WriteFinding, WrittenNearAssumed, WrittenUnsafe
 from er3a.programs.syntax import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown
@@ -28,9 +29,9 @@ STRAIGHT = 1e-4  # rad or m: by how much joints that move straight between writt
 
 
 def written(
-    robot: Robot, motion: Motion, verdict: PathVerdict, language: LanguageName
+    robot: Robot, motion: Motion, verdict: PathVerdict, language: LanguageName, near: tuple[WriteFinding, ...] = ()
 ) -> tuple[Mapping[str, str], tuple[WriteFinding, ...]]:
-    """The files of a path by suffix, and what is to be said of them.
+    """The files of a path by suffix, and what is to be said of them; ``near`` as of :func:`near_assumed_shapes`.
 
     Raises
     ------
@@ -42,7 +43,7 @@ def written(
     start = motion.q[0]
     if not np.isfinite(start).all():
         raise ValueError(f"{motion.entry.name}: the start can't be reached")
-    unsafe: tuple[WriteFinding, ...] = () if verdict == "safe" else (WrittenUnsafe(motion.entry.name, verdict),)
+    unsafe: tuple[WriteFinding, ...] = near if verdict == "safe" else (WrittenUnsafe(motion.entry.name, verdict),)
     head = (f"path {motion.entry.name} for {ascii_text(robot.title)}: {ascii_text(motion.entry.title)}",)
     if language == "csv":
         times = motion.samples
@@ -67,6 +68,15 @@ def written(
     return program.files, program.findings
 
 
+def near_assumed_shapes(
+    robot: Robot, name: str, clearance: MinClearance | None, margin_mm: float
+) -> tuple[WriteFinding, ...]:
+    """That a path is clear of assumed shapes by less than these may be wrong by; empty where that is not so."""
+    if clearance is None or not (shapes := shapes_assumed(robot, margin_mm, {name: clearance.least_mm})):
+        return ()
+    return (WrittenNearAssumed(name, clearance.least_mm, margin_mm),) if shapes.near else ()
+
+
 def repair_name(path: str) -> str:
     """Name of the program that holds the motion which repairs a path."""
     return program_name(path, LONGEST_NAME - len(REPAIRED)) + REPAIRED
@@ -78,6 +88,8 @@ def program_files(
     verdict: PathVerdict,
     languages: Sequence[LanguageName],
     write_unsafe: bool,
+    *,
+    near: tuple[WriteFinding, ...],
     repaired: AvoidanceRows,
 ) -> ProgramFiles:
     """The path's programs as rows, none where they are refused; with the rows of the motion that repairs it, if any."""
@@ -87,7 +99,7 @@ def program_files(
     for language in languages if allowed else ():
         if not_written(language, robot):
             continue
-        files, _ = written(robot, motion, verdict, language)
+        files, _ = written(robot, motion, verdict, language, near)
         rows += [(language, name + suffix, text) for suffix, text in files.items()]
     for language in languages if len(repaired) else ():
         if not not_written(language, robot):

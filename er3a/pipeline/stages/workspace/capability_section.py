@@ -428,11 +428,12 @@ def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.C
 
 def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
     if clear.scene is None:
-        what = tr("An estimate: {share} % of the poses reached can be held without the arm touching itself.",
+        what = tr("An estimate by volume: {share} % of the poses reached can be held without the arm touching itself.",
                   share=number(100 * clear.share, 2))  # fmt: skip
     else:
         what = tr(
-            "An estimate: {share} % of the poses reached can be held without touching “{scene}” or the arm itself.",
+            "An estimate by volume: {share} % of the poses reached can be held without touching “{scene}” or the arm "
+            "itself.",
             share=number(100 * clear.share, 2),
             scene=own_title(clear.scene),
         )
@@ -445,15 +446,17 @@ def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
     if assumed:
         tried = tr(
             "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them clear of "
-            "the assumed shapes; in {without} cells and sectors none was found. Shares of so few tries distinguish "
-            "good regions from bad ones, not single cells.",
+            "the assumed shapes; in {without} cells and sectors none was found. Outer cells hold more volume, so the "
+            "share is not the quotient of these counts. Shares of so few tries distinguish good regions from bad ones, "
+            "not single cells.",
             **numbers,
         )
     else:
         tried = tr(
             "{tries} random poses were tried in each cell and sector: {reached} are reached, {clear} of them proven"
-            " collision-free; in {without} cells and sectors none was found. Shares of so few tries distinguish "
-            "good regions from bad ones, not single cells.",
+            " collision-free; in {without} cells and sectors none was found. Outer cells hold more volume, so the "
+            "share is not the quotient of these counts. Shares of so few tries distinguish good regions from bad ones, "
+            "not single cells.",
             **numbers,
         )
     return tr("{first} {rest}", first=what, rest=tried)
@@ -506,6 +509,8 @@ def _slices_caption(capability: model.CapabilitySummary) -> str:
     return joined(
         [
             first,
+            tr("These solutions are averaged over the directions reached; of random joint values, as the page of the "
+               "stage inverse draws them, more solutions are found, because poses with many are met more often."),
             tr("Plan work where all three are bright; dark rims are reached only with the arm stretched, folded or "
                "twisted."),
         ],
