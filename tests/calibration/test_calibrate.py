@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from er3a.errors import InputError
 from er3a.files.by_name import COLUMNS, load_measurements
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
+from er3a.pipeline.messages.calibration import lines_of
 from er3a.robots.robot import to_modified
 from testing.simulated_measurements import covered, measured
 
@@ -71,6 +73,8 @@ def test_estimates_are_those_of_an_independent_solver(random):
     robot = load_robot("er3a_c60")
     rows = measured(bent(robot, random), poses_in(robot, random, 30), 0.05, random)
     found = er3a.calibrate(robot, rows)
+    for scatter, warned in ((found.scatter, False), (0.1, True)):  # deviations of metres explain anything
+        assert ("far below the stated" in lines_of(replace(found, scatter=scatter))) == warned
     kept = [each.parameter for each in found.estimates]
     q = np.radians([row.pose for row in rows])
     seen = np.array([row.xyz_mm for row in rows])
