@@ -247,7 +247,8 @@ def _touches(
 
 def touches(robot: Robot, seen: PointObservations) -> PointObservations:
     """Touches all over the joint range of the first few things that are touched, as they would be by the table."""
-    x, q, new = seen.positions(robot), meant(robot, np.array(spread(robot))), []
+    x, q = seen.positions(robot), meant(robot, np.array(spread(robot)))
+    new: list[Measurement] = []
     point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
     for thing, (_, rows) in list(zip(seen.things(), seen.groups()))[:FEW]:
         lengths = seen.lengths_mm(rows) / 1000
