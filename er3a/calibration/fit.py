@@ -194,7 +194,7 @@ class Fit:
     @property
     def freedom(self) -> int:
         """Degrees of freedom of what remains."""
-        return max(len(self.rest) - self.J.shape[1], 1)
+        return max(len(self.rest) - int(self.J.shape[1]), 1)
 
     @property
     def covariance(self) -> Reals:

@@ -431,7 +431,7 @@ def _innovations(basis: Reals) -> Reals:
     """Orthonormal rows (k - r, k) beside a basis (k, r), each with no part in one more of the last places than the row
     before it."""
     outside = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :].T
-    found: Reals = np.linalg.qr(outside[:, ::-1], mode="r")[:, ::-1]
+    found: Reals = np.asarray(np.linalg.qr(outside[:, ::-1], mode="r"))[:, ::-1]
     return found
 
 

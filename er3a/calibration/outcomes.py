@@ -112,13 +112,13 @@ class NoCorrectionFits:
     code: Literal["no_correction_fits"] = "no_correction_fits"
 
 
-NotCalibrated = NoPositions | MorePositions | NoCorrectionFits
+NotCalibrated = NoPositions | MorePositions | MoreTouches | NoCorrectionFits
 
 
 class CalibrationError(Er3aError):
     """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
 
-    def __init__(self, finding: NotCalibrated | MoreTouches, problem: str):
+    def __init__(self, finding: NotCalibrated, problem: str):
         self.finding = finding
         super().__init__(problem)
 

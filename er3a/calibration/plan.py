@@ -216,7 +216,7 @@ def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObser
             [k for k, each in enumerate(measurements) if each.touched == touched or (not touched[1] and each.pair)]
         )
         lengths = np.array([measurements[k].length_mm or 0.0 for k in rows]) / 1000
-        options += _touches(robot, own, seen, touched, x[rows], lengths, len(options))
+        options += _touches(robot, own, seen, touched, x=x[rows], lengths=lengths, known=len(options))
     return options
 
 
@@ -225,6 +225,7 @@ def _touches(
     q: Reals,
     seen: PointObservations,
     touched: tuple[TouchKind, str],
+    *,
     x: Reals,
     lengths: Reals,
     known: int = 0,
@@ -247,11 +248,12 @@ def _touches(
 
 def touches(robot: Robot, seen: PointObservations) -> PointObservations:
     """Touches all over the joint range of the first few things that are touched, as they would be by the table."""
-    x, q, new = seen.positions(robot), meant(robot, np.array(spread(robot))), []
+    x, q = seen.positions(robot), meant(robot, np.array(spread(robot)))
+    new: list[Measurement] = []
     point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
     for thing, (_, rows) in list(zip(seen.things(), seen.groups()))[:FEW]:
         lengths = seen.lengths_mm(rows) / 1000
-        for option in _touches(robot, q, seen, (thing.kind, thing.name), x[rows], lengths, len(new)):
+        for option in _touches(robot, q, seen, (thing.kind, thing.name), x=x[rows], lengths=lengths, known=len(new)):
             new += [_as_measured(each, point, bool(lengths.any())) for each in option]
     found = observed(new, robot, [name for name in PLACEMENTS if name not in seen.free])
     assert isinstance(found, PointObservations)
