@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from er3a.collision.along import clearance, clearance_along
+from er3a.collision.along import _Motion, clearance, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
@@ -141,3 +141,9 @@ def test_stretch_out_of_reach_has_no_clearance():
     reached = np.isfinite(followed.joints(found.t)[:, 0])
     np.testing.assert_array_equal(np.isfinite(found.distance), reached)
     assert 0 < reached.sum() < len(reached)
+
+
+def test_rows_of_coupled_joints_move_by_the_sum_of_what_their_joints_can():
+    robot = load_robot("er3_600").replace(coupling=np.eye(6) - 0.5 * np.eye(6, k=-1))
+    motion = _Motion(Bodies(robot, None), None, None)
+    np.testing.assert_allclose(motion._of_rows(np.arange(1.0, 7.0)), [1, 2.5, 4, 5.5, 7, 8.5])

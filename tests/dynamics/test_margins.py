@@ -222,6 +222,15 @@ def test_no_pose_needs_more_holding_torque_than_the_bound(arm, kind):
     assert (found.bound <= np.abs(found.values) * (1.03 if kind in ("coupled", "seven", "sum") else 1.002) + 1e-9).all()
 
 
+def test_of_an_arm_that_hardly_moves_the_bound_is_what_it_holds(arm):
+    """Weight and a push at the tool, together and against each other."""
+    load = Load(1.5, (0.03, -0.02, 0.09), force=(40.0, -20.0, 90.0), moment=(3.0, -1.0, 2.0))
+    for q in np.random.default_rng(7).uniform(arm.lower, arm.upper, (1, 6)):
+        held = np.abs(er3a.gravity(arm, q, load))
+        found = worst_holding(arm_model(arm.replace(lower=q - 1e-6, upper=q + 1e-6), load))
+        np.testing.assert_allclose(found.bound, held, rtol=2e-3, atol=1e-3)
+
+
 def test_a_bound_that_the_budget_cuts_short_still_holds(arm, monkeypatch):
     whole = worst_holding(arm_model(arm)).bound
     monkeypatch.setattr(pose_bound, "MOST_CORNERS", 1)

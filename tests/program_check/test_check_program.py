@@ -89,6 +89,12 @@ def test_the_examples_pass_and_their_times_agree_over_languages(suffix):
     assert 25 < check.cycle.blended_s <= check.cycle.stopping_s < 30
 
 
+def test_a_zone_too_large_for_one_of_its_two_lines_is_named(tmp_path):
+    to = "LIN {{X {0}.0, Y {1}.0, Z 320.0, A 0.0, B 0.0, C 180.0}}".format
+    body = f"$APO.CDIS=80\n{to(380, 160)}\n{to(400, 160)} C_DIS\n{to(400, 0)}"
+    assert "zone_too_large" in codes(checked(body, tmp_path))
+
+
 def test_limits_reach_and_speeds_by_what_is_written(tmp_path):
     low, high = np.degrees(ROBOT.lower[2]), np.degrees(ROBOT.upper[2])
     inside = checked(f"PTP {{A3 {high - 0.01:.3f}}}", tmp_path)
