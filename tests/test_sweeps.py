@@ -141,8 +141,9 @@ RANGE = {"from": None, "to": None, "steps": None}
     ("changes", "field", "words"),
     [
         ({"robot": "er3"}, "sweeps.a3.robot", "the study has no robot 'er3'. Known: er3a_c60, "),
-        ({"vary": "joints.7.a_mm"}, "sweeps.a3.vary", "'joints.7.a_mm' is no entry that can be varied"),
-        ({"vary": "joints.12.a_mm"}, "sweeps.a3.vary", "Write joints.1 to joints.6 with one of a_mm, "),
+        ({"vary": "joints.11.a_mm"}, "sweeps.a3.vary", "'joints.11.a_mm' is no entry that can be varied"),
+        ({"vary": "joints.12.a_mm"}, "sweeps.a3.vary", "Write joints.1 to joints.10 with one of a_mm, "),
+        ({"vary": "joints.7.a_mm"}, "sweeps.a3", "joints.7.a_mm = 40: the robot has 6 joints. Name one of them"),
         ({"vary": "joints.3.direction"}, "sweeps.a3.vary", "is no entry that can be varied"),
         ({"vary": "tool.a_mm"}, "sweeps.a3.vary", "or tool with one of x_mm, "),
         ({"from": "40"}, "sweeps.a3.from", "'40' is refused. Write a number"),

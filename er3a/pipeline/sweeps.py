@@ -13,6 +13,7 @@ from er3a.errors import InputError
 from er3a.files.robot_file import Name, Placement, RobotFile, Text, check_placement
 from er3a.files.yaml_file import StrictModel, parse
 from er3a.pipeline.messages.language import N_, tr
+from er3a.robots.robot import MOST_JOINTS
 
 MOST_VALUES = 1000
 DECIMALS = 9
@@ -51,14 +52,14 @@ _OF_THE_TOOL = {
 }
 ENTRIES = {
     f"joints.{joint}.{column}": Entry(joint, group, column, label, unit)
-    for joint in range(1, 7)
+    for joint in range(1, MOST_JOINTS + 1)
     for column, (group, label, unit) in _OF_A_JOINT.items()
 } | {f"tool.{key}": Entry(None, *where) for key, where in _OF_THE_TOOL.items()}
 
 
 def _known_entry(path: str) -> str:
     if path not in ENTRIES:
-        remedy = f"Write joints.1 to joints.6 with one of {', '.join(_OF_A_JOINT)}; or tool with one of "
+        remedy = f"Write joints.1 to joints.{MOST_JOINTS} with one of {', '.join(_OF_A_JOINT)}; or tool with one of "
         raise ValueError(f"'{path}' is no entry that can be varied | {remedy}{', '.join(_OF_THE_TOOL)}")
     return path
 
@@ -101,6 +102,8 @@ class Variant:
         if entry.group not in data:
             raise self._refusal(f"the robot's file gives no {entry.group}", f"Add the group {entry.group} to it")
         group: dict[str, Any] = data[entry.group]
+        if entry.joint > len(group["rows"]):
+            raise self._refusal(f"the robot has {len(group['rows'])} joints", "Name one of them")
         group["rows"][entry.joint - 1][entry.column] = self.value
         group |= {"source": f"{group['source'][:1000]}; {self.vary} as varied by the study", "grade": "inferred"}
         if entry.group == "dh":
@@ -129,7 +132,8 @@ class Variant:
         if isinstance(entry.column, int):
             return getattr(tool or Placement(), entry.group)[entry.column]
         group = getattr(content, entry.group)
-        return getattr(group.rows[entry.joint - 1], entry.column) if group and entry.joint else None
+        rows = group.rows if group else ()
+        return getattr(rows[entry.joint - 1], entry.column) if entry.joint and entry.joint <= len(rows) else None
 
     def _refusal(self, problem: str, remedy: str) -> InputError:
         return InputError(None, f"sweeps.{self.sweep}", f"{self.vary} = {self.value:.9g}: {problem}", remedy)
