@@ -46,7 +46,8 @@ def test_findings_are_lines_as_compilers_print_them():
     assert done.exit_code == 1
     first = done.stdout.splitlines()[0]
     assert (
-        first == f"{FAULTS}/outside_limits.src:9: error: J3 goes to 140.0 deg; its upper limit is 105 deg [above_limit]"
+        first == f"{FAULTS}/outside_limits.src:9: error: J3 goes above its upper limit of 105 deg, up to 140.0 deg "
+        "[above_limit]"
     )
 
 
