@@ -126,19 +126,21 @@ def choose_level(robot: Robot, observations: Observations) -> Level:
     scale = scale_of(robot, observations) if isinstance(observations, PointObservations) else None
     left = left_of_touched(robot, observations)
     spare = len(observations) - getattr(observations, "dropped", 0)
-    rich = _rich(robot, observations, spare)
+    rich = _rich(robot, observations)
     more: list[MorePositions | MoreTouches] = []
     for name in LEVELS[::-1]:
         for first in (placed, ()) if placed else ((),):
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
             here = subspace(robot, parameters, observations, left)
-            best = subspace(robot, parameters, rich, left) if rich else here
+            best = subspace(robot, parameters, rich, left) if len(rich) else here
             settled = len(best.kept) <= len(here.kept)
             if not settled or spare <= len(here.kept):
                 more.append(_what_more(robot, name, parameters, (here, best), observations))
             if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept):
-                return Level(name, parameters, here, more[0] if more else None, scale)
-    problem = f"{len(observations)} coordinates determine too little; positions to be added: {more[-1].least} at least"
+                what = next((each for each in more if isinstance(each, MoreTouches)), more[-1] if more else None)
+                return Level(name, parameters, here, what, scale)
+    lack = "numbers" if isinstance(more[-1], MoreTouches) else "positions"
+    problem = f"{len(observations)} coordinates determine too little; {lack} to be added: {more[-1].least} at least"
     raise CalibrationError(more[-1], problem)
 
 
@@ -177,11 +179,11 @@ def _what_touches(settled: int, best: int, observations: PointObservations) -> M
     return MoreTouches(observations.poses, numbers, settled, best, least, tuple(each))
 
 
-def _rich(robot: Robot, observations: Observations, spare: int) -> Observations | None:
-    """The same points all over the joint range; None where touched ones are so many that they settle all they can."""
+def _rich(robot: Robot, observations: Observations) -> Observations:
+    """The same points all over the joint range, or more touches of the same things."""
     if not (isinstance(observations, PointObservations) and observations.all_touched):
         return observations.rich(robot)
-    return touches(robot, observations) if spare < len(parameters_of(robot, "all_entries")) else None
+    return touches(robot, observations)
 
 
 def _examples(robot: Robot, kept: list[Parameter], observations: Observations) -> tuple[Pose, ...]:

@@ -303,6 +303,8 @@ class ProgramMemory:
         for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
             for name in [each for each in (*values, *more) if root(each) == variable]:
                 values[name] = syntax.Unclear(f"{name}, changed")
+        if not any(root(name) == variable for name in (*self.local, *self.shared)):
+            self.shared[variable] = syntax.Unclear(f"{variable}, changed")
 
     def _set_field(self, target: syntax.Member, value: syntax.Value) -> bool:
         """Give a field of a kept value a value; False if the field is kept under its whole name."""

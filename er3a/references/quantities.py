@@ -379,14 +379,18 @@ class SectionExtent(Extreme):
 def undecided_from(quantity: Quantity, expected: float, size: float) -> float:
     """The uncertainty from which on a value taken at random, of those that are plausible, would pass as often as not.
 
-    Plausible are points within ``size`` (mm) of the base along each axis, any angle, and speeds up to twice the stated.
+    Plausible are points within ``size`` (mm) of the base along each axis, any angle (those between two lines
+    from 0 to 180, or 90 where a direction has no sign), and speeds up to twice the stated.
     """
     if isinstance(quantity, Speed):
         return abs(expected) / 2
     if quantity.unit != "deg":
         return size / 2
-    half_turn = isinstance(quantity, SegmentAngle) or (isinstance(quantity, AxisAngle) and not quantity.signed)
-    return 45.0 if half_turn else 90.0
+    if not isinstance(quantity, SegmentAngle | AxisAngle):
+        return 90.0
+    span = 180.0 if isinstance(quantity, SegmentAngle) or quantity.signed else 90.0
+    from_end = min(abs(expected), span - abs(expected))
+    return max(span / 4, span / 2 - from_end)
 
 
 NotOfArm = Literal["no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns"]

@@ -598,6 +598,19 @@ def test_a_frame_that_a_program_of_rpl_changes_is_not_the_one_given(tmp_path, ch
     assert codes(check(tmp_path, f"{changed}\n{moves}", "a.pgm"))["frame_not_given"][-1] == 3
 
 
+@pytest.mark.parametrize(
+    "changed",
+    ["IF io.din1 THEN\nwobj0.x := 100;\nEND_IF;\n{0}", "{0}WHILE io.din1 DO\n{0}wobj0.x := 100;\nEND_WHILE;\n"],
+)
+def test_so_is_one_that_a_side_or_a_round_changes_for_motions_that_name_none(tmp_path, changed):
+    start, line = (
+        "MJOINT(POINTJ(0,0,0,0,-70,0), v50perc, fine, tool0);\n",
+        "MLIN(POINTC(400,0,400,0,0,180), v50, fine, tool0);\n",
+    )
+    assert "frame_not_given" not in codes(check(tmp_path, start + line, "a.pgm"))
+    assert "frame_not_given" in codes(check(tmp_path, start + changed.format(line), "a.pgm"))
+
+
 def test_functions_of_rpl_whose_unit_no_source_tells_have_no_value(tmp_path):
     for angle, known in (("SIN(30)", False), ("ABS(-30)", True), ("SQRT(-30)", False)):
         (motion,) = motions(tmp_path, f"MJOINT(POINTJ({angle},0,0,0,-70,0), v50perc, fine, tool0);\n", "a.pgm")

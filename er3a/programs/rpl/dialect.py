@@ -24,6 +24,7 @@ class RplDialect(Dialect):
     """RPL, as a run needs it."""
 
     whole_division = None
+    modal = frozenset((NO_BASE,))
 
     def is_signal(self, name: str) -> bool:
         """Outputs, and what goes to the field bus."""
@@ -82,7 +83,8 @@ def _word(memory: ProgramMemory, expression: syntax.Expression | None) -> str:
 
 def _frame(memory: ProgramMemory, name: str, pose: Reals | None) -> instructions.NamedFrame:
     """A tool or base as the cell has it; of no known pose where the program writes to it."""
-    changed = any(root(each) == name for each in (*memory.shared, *memory.local))
+    kept = (*memory.shared.items(), *memory.local.items())
+    changed = any(root(each) == name and not isinstance(value, syntax.Unset) for each, value in kept)
     return instructions.NamedFrame(f"{name}, changed", None) if changed else instructions.NamedFrame(name, pose)
 
 
