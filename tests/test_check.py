@@ -70,13 +70,21 @@ CAMERA = "kind: hand_eye\ntitle: A\nsource: A\nsetup: eye_to_hand\nsamples: away
         PATH.format("program, program: away.src"),
         "kind: programs\nprograms:\n- {name: a, title: A, file: away.src}\n",
         CAMERA,
+        CAMERA.replace("samples: away.csv", "streams: {flange: away.csv, target: away.csv}"),
+        CAMERA.replace("away", "seen") + "images: {board: {pattern: chessboard, squares: [9, 6], square_mm: 25}}\n",
     ],
 )
 def test_a_file_that_leads_to_a_missing_one_is_not_in_order(tmp_path, monkeypatch, text):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.yaml").write_text(text)
+    (tmp_path / "seen.csv").write_text("image\naway.png\n")
     with pytest.raises(InputError, match=r"away\.\w+"):
         check_file(Path("a.yaml"))
+
+
+def test_files_of_a_project_are_checked_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert check_file(ROOT / "data/programs/er3a_c60.yaml") == "programs"
 
 
 def test_a_study_that_names_a_missing_file_is_refused(tmp_path, monkeypatch):

@@ -93,7 +93,7 @@ class Plan:
     proposals : poses, the one that adds most first
     beyond : where these go beyond the measured poses
     widths : of all numbers that are settled with the proposals, for the deviation stated or else 0.1 mm
-    untold : bars of unknown length of which nothing can be said: by the table their points are no ball's
+    undetermined_bars : bars of unknown length of which nothing can be said: by the table their points are no ball's
     """
 
     settled: tuple[str, ...]
@@ -102,7 +102,7 @@ class Plan:
     proposals: tuple[Proposal, ...]
     beyond: tuple[OutOfMeasured, ...]
     widths: tuple[Width, ...]
-    untold: tuple[str, ...] = ()
+    undetermined_bars: tuple[str, ...] = ()
 
 
 ASSUMED_MM = 0.1
@@ -140,7 +140,7 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
         proposals=proposals,
         beyond=_beyond(measurements, proposals),
         widths=tuple(Width(name, units.get(name, "mm"), now.get(name), width) for name, width in new.items()),
-        untold=tuple(name for name, _ in seen.unknown_bars() if f"bar_{name}" not in ever),
+        undetermined_bars=tuple(name for name, _ in seen.unknown_bars() if f"bar_{name}" not in ever),
     )
 
 

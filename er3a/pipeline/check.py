@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import chdir
 from pathlib import Path
@@ -13,7 +12,7 @@ from er3a.errors import InputError
 from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_header
 from er3a.files.dh_table import read_dh_table
-from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye
+from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye, sample_rows
 from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths, read_path_table
 from er3a.files.program_file import ProgramsFile, load_programs
 from er3a.files.reference_sets import FILE as DOCUMENTS
@@ -68,6 +67,15 @@ def _check_hand_eye(path: Path) -> None:
     file = load(HandEyeFile, path)
     for table in filter(None, (file.samples, file.touched)):
         check_samples(path.parent / table)
+    if file.streams is not None:
+        for table in (file.streams.flange, file.streams.target):
+            read_header(path.parent / table)
+    elif file.images is not None:
+        samples = path.parent / str(file.samples)
+        for row in sample_rows(samples)[0]:
+            if not (samples.parent / str(row.get("image"))).is_file():
+                where = f"row {row['row']}, column image"
+                raise InputError(samples, where, f"'{row.get('image')}' is no file", "Name the sample's image")
 
 
 def _check_vision(path: Path) -> None:
@@ -75,7 +83,7 @@ def _check_vision(path: Path) -> None:
 
 
 _CHECKS: dict[str, Callable[[Path], object]] = {
-    "study": load_study,
+    "study": lambda path: check_study(path),
     "robot": load_robot,
     "targets": read_targets,
     "paths": _check_paths,
@@ -122,8 +130,8 @@ def check_file(path: Path) -> str:
 
     A folder stands for the study in it.
 
-    Of a study each file that it names is looked at too, from the folder that it is run in: that which ``config``, where
-    it stands, and ``data`` stand in, or else the working folder.
+    Each file that it names is looked at too, from the folder that a study is run in: that which ``config`` or ``data``,
+    where it stands, stands in, or else the working folder.
     """
     if path.is_dir():
         return check_file(path / "config" / "config.yaml")
@@ -144,16 +152,14 @@ def check_file(path: Path) -> str:
     if path.suffix not in (".yaml", ".yml"):
         raise InputError(path, None, f"'{path.suffix}' files are none of er3a's inputs", "Give a .yaml or .csv file")
     kind = read_yaml(path).get("kind")
-    if kind == "study":
-        file = path.absolute()
-        own = file.parent.parent
-        with chdir(own if file.parent.name == "config" and (own / "data").is_dir() else Path.cwd()):
-            check_study(Path(os.path.relpath(file)))
-        return _WORDS[kind]
     if not isinstance(kind, str) or kind not in _CHECKS:
         problem = "missing" if kind is None else f"'{kind}' is not known"
         raise InputError(path, "kind", problem, f"Write one of: {', '.join(_CHECKS)}")
-    _CHECKS[kind](path)
+    homes = (each.parent for each in path.absolute().parents if each.name in ("config", "data"))
+    home = next((home for home in homes if (home / "data").is_dir()), Path.cwd())
+    within = path if home == Path.cwd() else path.absolute().relative_to(home)
+    with chdir(home):
+        _CHECKS[kind](within)
     return _WORDS[kind]
 
 

@@ -251,18 +251,18 @@ def test_the_command_tells_positions_held_back(tmp_path):
     used.write_text("\n".join([lines[0], *lines[21:]]) + "\n", encoding="utf-8")
     held.write_text("\n".join(lines[:21]) + "\n", encoding="utf-8")
     words = ["calibrate", str(MEASUREMENTS / "wam.yaml"), str(used), "--held-back", str(held)]
-    told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
-    assert told["held_back"]["positions"] == 20
-    assert told["held_back"]["mean_mm"] < 3
-    assert told["output"] is None
+    found = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    assert found["held_back"]["positions"] == 20
+    assert found["held_back"]["mean_mm"] < 3
+    assert found["output"] is None
     text = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "mine.yaml")]).stdout
-    assert f"held back: 20 positions, {told['held_back']['mean_mm']:.4g} mm off on average" in text
-    assert f"at worst (row {told['held_back']['worst_row']})" in text
+    assert f"held back: 20 positions, {found['held_back']['mean_mm']:.4g} mm off on average" in text
+    assert f"at worst (row {found['held_back']['worst_row']})" in text
     assert "tried: J3 once a turn" in text
-    alone = told["held_back"]["table_mean_mm"]
-    assert alone > told["held_back"]["mean_mm"]
+    alone = found["held_back"]["table_mean_mm"]
+    assert alone > found["held_back"]["mean_mm"]
     assert f"as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
-    table, model = told["left_out"]["mean_mm"], told["beyond"]["left_out"]["mean_mm"]
+    table, model = found["left_out"]["mean_mm"], found["beyond"]["left_out"]["mean_mm"]
     assert f"it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm." in text
     assert load_robot(tmp_path / "mine.yaml").joints == 7
 
@@ -533,10 +533,10 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     ]
     robot = load_robot("er3_600")
     if least:
-        with pytest.raises(CalibrationError) as told:
+        with pytest.raises(CalibrationError) as refused:
             er3a.calibrate(robot, rows)
-        assert told.value.finding.each == ((kind, 1, least),)
-        assert str(least) in say(told.value.finding)
+        assert refused.value.finding.each == ((kind, 1, least),)
+        assert str(least) in say(refused.value.finding)
         return
     lone = replace(rows[0], plane="lone"), replace(rows[9], plane="lone")
     found = er3a.calibrate(robot, [*rows, *lone])

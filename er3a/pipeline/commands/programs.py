@@ -125,7 +125,8 @@ def write(
         bool, typer.Option("--unsafe", help="write paths that are not safe too, and say so in the file")
     ] = False,
 ):
-    """Write the paths of a file as programs; exit code 1 where one is refused as not safe, or loses a motion."""
+    """Write the paths of a file as programs; exit code 1 where one is refused as not safe, or loses a motion or the
+    speeds that its file gives."""
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
     from er3a.pipeline.messages.expectations import outcome_word

@@ -88,7 +88,7 @@ def plan_lines(found: Plan, robot: Robot) -> str:
     lines += [f"settled by no poses: {say(reason)}" for reason in found.held]
     lines += [
         f"bar_{name}: the table is too far off for its points to tell; calibrate first, and plan from the robot file"
-        for name in found.untold
+        for name in found.undetermined_bars
     ]
     if found.beyond:
         beyond = (
@@ -116,7 +116,7 @@ def plan_record(found: Plan) -> dict[str, object]:
         "settled": list(found.settled),
         "lacking": list(found.lacking),
         "held": [say(reason) for reason in found.held],
-        "untold": list(found.untold),
+        "undetermined_bars": list(found.undetermined_bars),
         "proposals": [vars(each) for each in found.proposals],
         "beyond": [vars(each) for each in found.beyond],
         "half_widths": [vars(each) for each in found.widths],

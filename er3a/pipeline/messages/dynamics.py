@@ -52,7 +52,7 @@ FIGURES = {
     "mass": N_("Mass of the links"),
     "peak_torque": N_("Greatest torque on a path that may be run"),
     "holding_torque": N_("Greatest holding torque found"),
-    "energy": N_("Greatest energy of a path"),
+    "energy": N_("Greatest energy of a path that may be run"),
     "utilisation": N_("Highest utilisation of a limit"),
     "power_balance": N_("Power balance, greatest error"),
 }

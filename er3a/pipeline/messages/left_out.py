@@ -43,7 +43,7 @@ TEXTS = texts(
         ),
         "left_out.program_starts": "motions from where the arm is not known to stand",
         "left_out.outer_axes": "axes beside the arm's, which are taken to be at rest",
-        "left_out.controller_language": "which of these languages the controller takes",
+        "left_out.controller_language": "which robot language the controller takes",
         "left_out.controller_ramps": "the controller's own ramps and blends, which decide times and corners",
         "left_out.joint_vectors": "joint vectors other than {amount:,.0f} random ones: shares are estimates",
         "left_out.lost_cells": "whether {amount:,.0f} cells in which no clear arm was found are really blocked",

@@ -364,7 +364,7 @@ def advice(
             return joined([no_way, _until(path, sound)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
-    return joined([sentence("advice.none", why=why), _within_reach(path, sound is not None), _until(path, sound)], ". ")
+    return joined([sentence("advice.none", why=why), _within_reach(path), _until(path, sound)], ". ")
 
 
 def _until(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> str:
@@ -394,15 +394,13 @@ def _slower_throughout(path: PathSummary) -> str:
     return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
 
 
-def _within_reach(path: PathSummary, with_sound: bool) -> str:
-    """How far a path that leaves the reach could be used; empty for others. ``with_sound``: whether it is said beside
-    this up to where nothing is wrong."""
+def _within_reach(path: PathSummary) -> str:
+    """How far a path that leaves the reach could be used; empty for others."""
     part = min(path.unreachable, key=lambda part: part.t0_s, default=None)
     if part is None or part.s0_m <= 0:
         return ""
     first, what = first_faults(path)[0]
-    later = first < part.t0_s and (with_sound or first <= 0)
-    form = "advice.within_reach#later" if later else "advice.within_reach"
+    form = "advice.within_reach#later" if first < part.t0_s else "advice.within_reach"
     return sentence(form, t=part.t0_s, far=part.s0_m * 1000, first=first, what=what)
 
 
@@ -451,7 +449,8 @@ def repair_text(path: PathSummary, limits: LimitsUsed | None = None) -> str:
         time=_takes(motion.duration_s, path.duration_s, tried.name),
         clearance=clearance,
     )
-    near = "" if motion.keeps_clear or not path.singularities else sentence("advice.region")
+    passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
+    near = sentence("advice.region") if passes else ""
     return joined([chosen, near, _of_limits(motion, limits) if limits else ""], ". ")
 
 

@@ -32,7 +32,7 @@ function valueOf(text) {
 }
 
 // Where a verdict stands among all, the gravest first; -1 for a cell without one.
-const GRAVEST = ["fail", "conflict", "caution", "no_reference", "not_computed", "pass"];
+const GRAVEST = ["fail", "conflict", "caution", "no_reference", "not_computed", "not_examined", "pass"];
 function gravity(cell) {
   const shown = cell?.querySelector(".badge, .decision");
   return GRAVEST.findIndex((status) => shown?.classList.contains(status));

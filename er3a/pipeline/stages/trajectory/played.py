@@ -128,7 +128,7 @@ def _to_do(path: PathSummary, rows: PathChecks, summary: TrajectorySummary) -> t
         name = repaired(path)
         repair = sentence("finding", finding=repair_text(path, summary.joint_limits))
         return repair, (name, address_of("trajectory", name, 0.0, path.name))
-    if near := near_assumed(path, summary):
+    if path.verdict == "safe" and (near := near_assumed(path, summary)):
         return remedy(near), None
     last = last_sound(path, rows)
     if last is None:

@@ -72,7 +72,7 @@ def near_assumed_shapes(
     robot: Robot, name: str, clearance: MinClearance | None, margin_mm: float
 ) -> tuple[WriteFinding, ...]:
     """That a path is clear of assumed shapes by less than these may be wrong by; empty where that is not so."""
-    if clearance is None or not (shapes := shapes_assumed(robot, margin_mm, {name: clearance.least_mm})):
+    if clearance is None or not (shapes := shapes_assumed(robot, margin_mm / 1000, {name: clearance.least_mm / 1000})):
         return ()
     return (WrittenNearAssumed(name, clearance.least_mm, margin_mm),) if shapes.near else ()
 
