@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from random import Random
 
 import pytest
@@ -21,6 +22,7 @@ D_MM, TITLE = "d_mm: 367.5", ROBOT.split("title: ")[1].split("\n")[0]
 
 @pytest.mark.long
 def test_sound_files_are_accepted_and_read_as_they_are_written(tmp_path):
+    shutil.copytree(ROBOTS.parent, tmp_path / "data")  # also what these files lead to
     for name, content in seeds():
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)

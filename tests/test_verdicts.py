@@ -128,7 +128,8 @@ def test_part_of_a_study_has_verdicts_an_index_and_a_report(study, tmp_path, mon
         "validation",
         "teach",
         "validation",
-    ]  # next, panel, cell
+        "validation",
+    ]  # next, panel, table, cell
     skipped = etree.parse(reports / "junit.xml").findall(".//skipped")
     assert len(skipped) == len(others)
 

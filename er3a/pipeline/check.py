@@ -159,7 +159,13 @@ def check_file(path: Path) -> str:
     home = next((home for home in homes if (home / "data").is_dir()), Path.cwd())
     within = path if home == Path.cwd() else path.absolute().relative_to(home)
     with chdir(home):
-        _CHECKS[kind](within)
+        try:
+            _CHECKS[kind](within)
+        except InputError as error:
+            if kind == "study" or error.file is None or Path(error.file).name == path.name:
+                raise
+            where = str(error.file) + (f": {error.field}" if error.field else "")
+            raise InputError(path, where, error.problem, error.remedy) from None
     return _WORDS[kind]
 
 
