@@ -87,6 +87,15 @@ def test_files_of_a_project_are_checked_from_any_folder(tmp_path, monkeypatch):
     assert check_file(ROOT / "data/programs/er3a_c60.yaml") == "programs"
 
 
+def test_who_works_below_a_folder_called_data_names_files_from_there(tmp_path, monkeypatch):
+    own = tmp_path / "data" / "cell"
+    own.mkdir(parents=True)
+    monkeypatch.chdir(own)
+    Path("a.yaml").write_text("kind: programs\nprograms:\n- {name: a, title: A, file: a.src}\n")
+    Path("a.src").write_text("DEF a( )\nEND\n")
+    assert check_file(Path("a.yaml")) == "programs"
+
+
 def test_a_study_that_names_a_missing_file_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     content = yaml.safe_load((ROOT / "config/small.yaml").read_text())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,13 +12,13 @@ PENETRATION_TOLERANCE = 0.001  # m; no overlap deeper than this goes unnoticed, 
 ASSUMED_MARGIN = 0.02  # m, within which of assumed shapes nothing is settled, where nothing else is asked
 
 
-class TwoBodies:
+class TwoBodies(ABC):
     """Two bodies that can meet."""
 
     @property
+    @abstractmethod
     def names(self) -> tuple[str, str]:
         """Of both bodies."""
-        raise NotImplementedError
 
     @property
     def label(self) -> str:
