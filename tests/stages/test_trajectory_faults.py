@@ -113,20 +113,22 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("before_mm", [2, None])
-def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_path, before_mm):
-    """Just before the edge, and at the last sound point that index and page name."""
+def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_path):
+    """At the last sound point, which index and page name: before the joints get too fast for the edge."""
     results = compute(study_of(tmp_path, "line_out"), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
-    far = float(re.search(r"within reach up to t = \S+ s \(([\d.]+) mm of the path\): end it before", advice(path))[1])
+    said = advice(path, last_sound(path, results.checks))
     (entry,) = (each for each in load_paths(f"data/paths/{ROBOT}.yaml").paths if each.name == "line_out")
     start, end = np.array(entry.start.xyz_mm), np.array(entry.end.xyz_mm)
-    named = [float(x) for x in re.search(r"x, y, z = (.*?) mm", fault.to_do)[1].split(", ")]
-    length = far - before_mm if before_mm else np.linalg.norm(named - start)
-    part = float(length / np.linalg.norm(end - start))
-    there = {"xyz_mm": (start + part * (end - start)).tolist(), "rpy_deg": list(entry.end.rpy_deg)}
-    (shorter,) = paths_of(tmp_path, "line_out", end=there, duration_s=4 * part)
+    point = re.search(r"anything is wrong is at t = \S+ s, the tool at x, y, z = (.*?) mm: end it there", said)[1]
+    named = np.array([float(x) for x in point.split(", ")])
+    part = float(np.linalg.norm(named - start) / np.linalg.norm(end - start))
+    there = {"xyz_mm": named.tolist(), "rpy_deg": list(entry.end.rpy_deg)}
+    (shorter,) = paths_of(tmp_path, "line_out", end=there, duration_s=path.duration_s * part)
     assert path.verdict == "unreachable"
+    assert "It is within reach up to t = " in said
+    assert f"End it there, with the tool at x, y, z = {point} mm" in fault.to_do
+    assert named == pytest.approx(start + part * (end - start), abs=0.06)
     assert shorter.verdict == "safe"
     assert shorter.clearance.least_mm >= 20
 

@@ -119,8 +119,8 @@ TEXTS = texts(
             "at {contact} mm"
         ),
         "advice.within_reach": (
-            "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path): end it before, while joint speeds "
-            "still have a bound, or move its end or the workpiece nearer to the arm"
+            "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path): move its end or the workpiece nearer "
+            "to the arm"
         ),
         "advice.within_reach#later": (
             "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path), but something is wrong before: from "
