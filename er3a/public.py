@@ -8,7 +8,7 @@ take what they are given, because validation computes with tables that no arm ca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import update_wrapper
 from inspect import Parameter, signature
 from pathlib import Path
@@ -23,7 +23,6 @@ Check = Callable[[Any], None]
 Function = TypeVar("Function", bound=Callable[..., Any])
 LOOK_FOR_CROSSED_LIMITS = {"diagnose"}
 JOINT_VALUES = ("q", "q_ref", "q0", "q_start")
-CONTAINERS = (Sequence, Mapping)
 CALLED = {str: "a text", Path: "a path", NoneType: "None"}
 
 

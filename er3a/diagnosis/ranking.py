@@ -287,7 +287,7 @@ class Ranking(Displayed):
     Attributes
     ----------
     pool : all that were evaluated
-    score : (H,), smaller is better; untouched : score of the table as it is
+    score : (H,), smaller is better
     explains : (H,), whether all references are met
     groups : rows of the pool, best group first; the first row of a group is its best, the others are those that no
         reference tells from it
@@ -297,7 +297,6 @@ class Ranking(Displayed):
 
     pool: Pool
     score: Reals
-    untouched: float
     explains: Flags
     groups: tuple[tuple[int, ...], ...]
     before: Reals
@@ -334,7 +333,7 @@ def rank_case(case: Case) -> Ranking | None:
     untouched = float(_misfit(before / case.uncertainty, units))
     explains = pool.explains(case.uncertainty)
     groups = _Groups(case.given, pool, score, explains, case.uncertainty).found(untouched)
-    return Ranking(pool, score, untouched, explains, groups, before, stated)
+    return Ranking(pool, score, explains, groups, before, stated)
 
 
 def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:

@@ -7,7 +7,7 @@ import struct
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from er3a.errors import InputError
 from er3a.numerics.arrays import Integers, Reals
 
 Unit = Literal["m", "mm"]
-UNITS: tuple[Unit, ...] = get_args(Unit)
 FORMATS = (".stl", ".obj", ".dae", ".glb")
 MOST_TRIANGLES = 1_000_000
 MOST_BYTES = 200_000_000

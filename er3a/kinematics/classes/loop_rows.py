@@ -165,37 +165,24 @@ def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:
             for c in range(k + 1, 9):
                 M[r, c] -= x * M[k, c]
     Y = np.zeros((2, 9))
-    _null_vector(M, order, 8, Y[0])
+    _null_vector(M, order, 8, 8, Y[0])
     count = 0
     m.pairs[count, 0], m.pairs[count, 1] = _angles_of(Y[0], slides)
     count += 1
     if abs(M[7, 7]) < NEAR_NULL * abs(M[0, 0]):
-        _null_vector(M, order, 7, Y[1])
-        Y[0, order[7]] = 0.0
-        _null_vector_of_both(M, order, Y[0])
+        _null_vector(M, order, 7, 7, Y[1])
+        _null_vector(M, order, 8, 7, Y[0])
         count = _pencil(Y, 3, slides, m.pairs, count)
         count = _pencil(Y, 1, slides, m.pairs, count)
     return count
 
 
 @inner_kernel
-def _null_vector(M: Reals, order: Integers, last: int, y: Reals) -> None:
-    """Null vector of the reduced equations with 1 at place ``last`` and 0 behind it."""
+def _null_vector(M: Reals, order: Integers, one: int, pivots: int, y: Reals) -> None:
+    """Null vector of the reduced equations with 1 at place ``one`` and 0 at the others from ``pivots`` on."""
     y[:] = 0.0
-    y[order[last]] = 1.0
-    for k in range(last - 1, -1, -1):
-        total = 0.0
-        for c in range(k + 1, 9):
-            total -= M[k, c] * y[order[c]]
-        y[order[k]] = total / M[k, k] if M[k, k] != 0.0 else 0.0
-
-
-@inner_kernel
-def _null_vector_of_both(M: Reals, order: Integers, y: Reals) -> None:
-    """Null vector with 1 at the last place and 0 at the one before it, where both have no pivot."""
-    y[:] = 0.0
-    y[order[8]] = 1.0
-    for k in range(6, -1, -1):
+    y[order[one]] = 1.0
+    for k in range(pivots - 1, -1, -1):
         total = 0.0
         for c in range(k + 1, 9):
             total -= M[k, c] * y[order[c]]
