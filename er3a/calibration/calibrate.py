@@ -309,7 +309,9 @@ class Calibration(ByValue, Displayed):
     bars : ball bars of unknown length, by the table alone
     left_out : at poses left out, by what the robot's file holds; None of reference sets and of too few poses
     residuals : what remains: noise, or structure; None as for ``left_out``
-    tried : terms beyond the table, in the order in which they were taken, then those that were not
+    tried : terms beyond the table, in the order in which they were taken, then those that were not; of too few
+        measurements for all kinds those that a robot file can hold
+    tried_for_file : those that a robot file can hold, beside no others, where others were taken
     beyond : the model with those that were taken; None if there are none
     """
 
@@ -334,6 +336,7 @@ class Calibration(ByValue, Displayed):
     left_out: HeldOutErrors | None = None
     residuals: ResidualStructure | None = None
     tried: tuple[TriedTerm, ...] = ()
+    tried_for_file: tuple[TriedTerm, ...] = ()
     beyond: Beyond | None = None
 
     @property
@@ -552,13 +555,14 @@ def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tupl
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Points that are used, the table alone but for ratios, and the table with the terms that are chosen (the same if
+    """Points that are used, the table with what a robot file can hold, and with all terms that are chosen (the same if
     there are none)."""
 
     observations: PointObservations
     level: Level
     table: Fit
     choice: ChosenTerms
+    for_file: ChosenTerms
     whole: Fit
 
     @property
@@ -576,11 +580,12 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         table = fit(robot, level.kept, observations)
     here = corrected(robot, table.kept, table.amounts)
     choice = choose_terms(robot, here, table.kept, observations)
+    for_file = ChosenTerms((), ())
+    if free_ratios and (choice.terms or not choice.tried):  # else all kinds were tried, and none taken
+        for_file = choose_terms(robot, here, table.kept, observations, IN_ROBOT_FILE)
+        table = fit(robot, level.kept, observations, for_file.terms) if for_file.terms else table
     whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
-    if choice.terms and free_ratios:
-        ratios = choose_terms(robot, here, table.kept, observations, IN_ROBOT_FILE).terms
-        table = fit(robot, level.kept, observations, ratios) if ratios else table
-    return _Model(observations, level, table, choice, whole)
+    return _Model(observations, level, table, choice, for_file, whole)
 
 
 def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> Calibration:
@@ -599,8 +604,9 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
         left_out=_left_out(observations, model.table),
         residuals=_structure(robot, observations, model.table),
-        tried=model.choice.tried,
-        beyond=_beyond(robot, observations, model.whole) if model.whole.terms else None,
+        tried=model.choice.tried or model.for_file.tried,
+        tried_for_file=model.for_file.tried if model.choice.tried else (),
+        beyond=_beyond(robot, observations, model.whole) if model.choice.terms else None,
     )
 
 

@@ -28,7 +28,7 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
 TermKind = Literal["ratio", "once", "twice", "sag", "weight", "ripple", "coupling"]
-KINDS: tuple[TermKind, ...] = get_args(TermKind)[:-1]
+KINDS: tuple[TermKind, ...] = get_args(TermKind)
 IN_ROBOT_FILE: tuple[TermKind, ...] = ("ratio", "coupling")
 RIPPLES = range(3, 257)
 """How many times a turn an error is looked for; strain wave gears have some 200 a turn."""
@@ -71,14 +71,16 @@ class JointTerm:
 
 def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTerm, ...]:
     """The terms that are tried beside ripples; prismatic joints have no turns."""
-    joints = range(1, robot.rows + 1) if "coupling" in kinds else ()
-    return tuple(JointTerm("coupling", row, by=by) for row in joints for by in joints if row != by) + tuple(
-        JointTerm(kind, row + 1)
+    joints = range(1, robot.rows + 1)
+    return tuple(
+        JointTerm(kind, row, by=by)
         for kind in kinds
-        for row in range(robot.rows)
-        if kind not in ("ripple", "coupling")
-        and (kind != "weight" or any(each.link > row for each in robot.masses.links))
-        and (kind in ("ratio", "sag", "weight") or not robot.sliding[row])
+        for row in joints
+        for by in (joints if kind == "coupling" else [0])
+        if kind != "ripple"
+        and row != by
+        and (kind != "weight" or any(each.link >= row for each in robot.masses.links))
+        and (kind not in ("once", "twice") or not robot.sliding[row - 1])
     )
 
 
