@@ -249,20 +249,31 @@ def test_the_command_tells_positions_held_back(tmp_path):
     used.write_text("\n".join([lines[0], *lines[21:]]) + "\n", encoding="utf-8")
     held.write_text("\n".join(lines[:21]) + "\n", encoding="utf-8")
     words = ["calibrate", str(MEASUREMENTS / "wam.yaml"), str(used), "--held-back", str(held)]
-    found = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    record = tmp_path / "mine.json"
+    record.write_text(CliRunner().invoke(app, [*words, "--json"]).stdout, encoding="utf-8")
+    found, robot = json.loads(record.read_text(encoding="utf-8")), load_robot(MEASUREMENTS / "wam.yaml")
     assert found["held_back"]["positions"] == 20
     assert found["held_back"]["mean_mm"] < 3
     assert found["output"] is None
     text = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "mine.yaml")]).stdout
     assert f"held back: 20 positions, {found['held_back']['mean_mm']:.4g} mm off on average" in text
     assert f"at worst (row {found['held_back']['worst_row']})" in text
-    assert "tried: J3 once a turn" in text
+    assert "tried: J3 coupled to J1" in text
     alone = found["held_back"]["table_mean_mm"]
     assert alone > found["held_back"]["mean_mm"]
     assert f"as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
     table, model = found["left_out"]["mean_mm"], found["beyond"]["left_out"]["mean_mm"]
     assert f"it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm." in text
-    assert load_robot(tmp_path / "mine.yaml").joints == 7
+    mine, rows = load_robot(tmp_path / "mine.yaml"), load_measurements(held, robot)
+    model, q = er3a.load_calibration(record, robot), np.radians([row.pose for row in rows])
+    for name, T in (("xyz_mm", model.forward(q)), ("table_xyz_mm", er3a.forward(mine, q))):
+        said = np.array([each[name] for each in found["held_back"]["rows"]])
+        assert 1000 * T[:, :3, 3] == pytest.approx(said, abs=1e-6)
+    assert model.distances_mm(rows).max() == found["held_back"]["worst_mm"]
+    with pytest.raises(InputError, match="tool_x was 0 mm where the calibration started"):
+        er3a.load_calibration(record, mine)
+    with pytest.raises(InputError, match="is no file with a calibration"):
+        er3a.load_calibration(tmp_path / "mine.yaml", robot)
 
 
 def test_a_worst_position_beyond_all_fitted_poses_is_named():

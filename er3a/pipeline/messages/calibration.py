@@ -269,7 +269,8 @@ def _beyond_lines(found: Beyond) -> list[str]:
     if found.residuals:
         lines.append(f"with terms, {_residual_line(found.residuals)}")
     lines.append(
-        "all terms are in --json and in found.forward(q) in Python; a robot file holds ratios and couplings alone"
+        "all terms are in --json, of which er3a.load_calibration(FILE, robot) in Python makes the model again; a robot "
+        "file holds ratios and couplings alone"
     )
     return lines
 
@@ -312,7 +313,9 @@ def calibration_record(found: Calibration, others: Sequence[Measurement] = ()) -
 
 
 def _held_back(found: Calibration, others: Sequence[Measurement]) -> dict[str, object]:
-    model, alone = found.distances_mm(others), found.without_terms().distances_mm(others)
+    models = found.model, found.without_terms().model
+    model, alone = (each.distances_mm(others) for each in models)
+    positions = zip(others, *(each.positions_mm(others).tolist() for each in models))
     return {
         "positions": len(model),
         "mean_mm": float(model.mean()),
@@ -320,6 +323,7 @@ def _held_back(found: Calibration, others: Sequence[Measurement]) -> dict[str, o
         "worst_row": others[int(model.argmax())].row,
         "table_mean_mm": float(alone.mean()),
         "table_worst_mm": float(alone.max()),
+        "rows": [{"row": each.row, "xyz_mm": xyz, "table_xyz_mm": table} for each, xyz, table in positions],
     }
 
 

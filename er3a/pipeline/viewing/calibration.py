@@ -75,11 +75,11 @@ def measured_errors(robot: Robot, measurements: Sequence[Measurement], found: Ca
     assert isinstance(seen, PointObservations)
     nothing = found.without_terms()
     by_model = {
-        "before": replace(nothing, robot=robot).differences_mm(measurements),
-        "table": nothing.differences_mm(measurements),
+        "before": replace(nothing, robot=robot).model.differences_mm(measurements),
+        "table": nothing.model.differences_mm(measurements),
     }
     if found.beyond:
-        by_model["model"] = found.differences_mm(measurements)
+        by_model["model"] = found.beyond.differences_mm(measurements)
     poses = np.array([each.pose for each in measurements], dtype=float)
     return MeasuredErrors(poses, 1000 * seen.positions(found.robot), by_model, [each.row for each in measurements])
 
