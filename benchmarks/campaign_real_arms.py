@@ -202,7 +202,7 @@ def _file_row(name: str, found: Calibration, run: Unseen, count: int) -> str:
 
 def _worst_pose(name: str, found: Calibration, run: Unseen) -> str:
     """Where it is among the others, and how far the models are from it."""
-    rows = load(name)[1]
+    rows = run.rows
     poses = np.array([row.pose for row in rows])
     worst = int(run.model.argmax())
     own, others = poses[worst], np.delete(poses, worst, axis=0)
