@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from er3a.files.by_name import calibrate as calibrate
     from er3a.files.by_name import diagnose as diagnose
     from er3a.files.by_name import evidence as evidence
+    from er3a.files.by_name import load_calibration as load_calibration
     from er3a.files.by_name import load_measurements as load_measurements
     from er3a.files.by_name import load_table as load_table
     from er3a.files.hand_eye_file import load_hand_eye as load_hand_eye
@@ -94,6 +95,7 @@ _PUBLIC = {
     "evidence": "er3a.files.by_name",
     "calibrate": "er3a.files.by_name",
     "load_measurements": "er3a.files.by_name",
+    "load_calibration": "er3a.files.by_name",
     "load_table": "er3a.files.by_name",
     "load_references": "er3a.files.reference_sets",
     "load_hand_eye": "er3a.files.hand_eye_file",

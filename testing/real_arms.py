@@ -47,12 +47,14 @@ class Unseen:
     table, model : by what a robot file holds, and by the model with terms where it has any
     plain : by a fit without er3a
     found : the calibration without each part
+    rows : (P,), the measurements
     """
 
     table: Reals
     model: Reals
     plain: Reals
     found: tuple[Calibration, ...]
+    rows: tuple[Measurement, ...]
 
 
 def unseen(name: str, far: bool, seed: int, parts: int = PARTS) -> Unseen:
@@ -75,7 +77,8 @@ def unseen(name: str, far: bool, seed: int, parts: int = PARTS) -> Unseen:
         table[out] = found[-1].without_terms().distances_mm(others)
         plain[out] = distances(arm, plain_fit(arm, ~out), out)
     tried = np.isfinite(table)
-    return Unseen(table[tried], model[tried], plain[tried], tuple(found))
+    unseen_rows = tuple(row for row, own in zip(rows, tried) if own)
+    return Unseen(table[tried], model[tried], plain[tried], tuple(found), unseen_rows)
 
 
 def halves(name: str, splits: int, seed: int) -> tuple[tuple[str, ...], NDArray[np.bool_]]:

@@ -48,7 +48,7 @@ def covered(
         arm = corrected(robot, kept, truth)
         q = random.uniform(robot.lower, robot.upper, (poses, 6))
         found = calibrate(robot, measured(arm, q, deviation_mm, random))
-        terms += found.beyond is not None
+        terms += found.beyond is not None or bool(found.ratios)
         by_parameter = {estimate.parameter: estimate for estimate in found.estimates}
         for k, parameter in enumerate(kept):
             estimate = by_parameter[parameter]

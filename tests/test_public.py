@@ -67,6 +67,7 @@ CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "diagnose": lambda robot, T: er3a.diagnose(robot, "er3_600"),
     "evidence": lambda robot, T: er3a.evidence(robot, load_references("er3_600").references[:1]),
     "calibrate": lambda robot, T: er3a.calibrate(robot, load_references("er3_600")),
+    "load_calibration": lambda robot, T: er3a.load_calibration("mine.json", robot),
     "to_modified": lambda robot, T: er3a.to_modified(robot),
     "to_standard": lambda robot, T: er3a.to_standard(robot),
     "export_urdf": lambda robot, T: er3a.export_urdf(robot),

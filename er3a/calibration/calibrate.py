@@ -61,10 +61,7 @@ from er3a.calibration.parameters import (
 )
 from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
-from er3a.calibration.terms import IN_ROBOT_FILE, JointErrors, TermKind, effects, places_of
-from er3a.kinematics.chain import row_values
-from er3a.kinematics.forward import forward
-from er3a.kinematics.table_batch import frames_of, tables_of
+from er3a.calibration.terms import IN_ROBOT_FILE, CorrectedModel, JointErrors, TermKind, effects, places_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import INTERVAL_95, ReferenceSet
@@ -263,13 +260,11 @@ class TermEstimate:
 
 
 @dataclass(frozen=True, eq=False)
-class Beyond(ByValue):
+class Beyond(CorrectedModel):
     """A model with errors of joints that no table holds, fitted together with a table of its own.
 
     Attributes
     ----------
-    robot : its table, base and tool; it is right with the terms alone
-    errors : by how much joints miss what they are meant to do
     terms : their coefficients
     estimates : the table's corrections
     rms_mm : of what remains
@@ -277,8 +272,6 @@ class Beyond(ByValue):
     residuals : what remains: noise, or structure
     """
 
-    robot: Robot
-    errors: JointErrors
     terms: tuple[TermEstimate, ...]
     estimates: tuple[Estimate, ...]
     rms_mm: float
@@ -309,7 +302,9 @@ class Calibration(ByValue, Displayed):
     bars : ball bars of unknown length, by the table alone
     left_out : at poses left out, by what the robot's file holds; None of reference sets and of too few poses
     residuals : what remains: noise, or structure; None as for ``left_out``
-    tried : terms beyond the table, in the order in which they were taken, then those that were not
+    tried : terms beyond the table, in the order in which they were taken, then those that were not; of too few
+        measurements for all kinds those that a robot file can hold
+    tried_for_file : those that a robot file can hold, beside no others, where others were taken
     beyond : the model with those that were taken; None if there are none
     """
 
@@ -334,6 +329,7 @@ class Calibration(ByValue, Displayed):
     left_out: HeldOutErrors | None = None
     residuals: ResidualStructure | None = None
     tried: tuple[TriedTerm, ...] = ()
+    tried_for_file: tuple[TriedTerm, ...] = ()
     beyond: Beyond | None = None
 
     @property
@@ -349,33 +345,29 @@ class Calibration(ByValue, Displayed):
         beyond = tuple(each.name for each in self.estimates if abs(each.correction) > each.half_width)
         return outcomes.CorrectionsFound(beyond) if beyond else outcomes.NoCorrectionFound(len(self.estimates))
 
+    @property
+    def model(self) -> CorrectedModel:
+        """The corrected arm, with the terms beyond the table if there are any."""
+        return self.beyond or CorrectedModel(self.robot, JointErrors(self.robot, (), np.empty(0)))
+
     def forward(self, q: Reals) -> Reals:
-        """Pose of the tool (..., 4, 4), m, for commanded joint values (..., n), rad or m: with the terms beyond the
-        table, if there are any; else as ``er3a.forward(found.robot, q)``."""
-        return forward(self.robot, q) if self.beyond is None else _with_errors(self.beyond, np.asarray(q, float))
+        """Pose of the tool (..., 4, 4), m, for commanded joint values (..., n), rad or m, by the model; without terms
+        as ``er3a.forward(found.robot, q)``."""
+        return self.model.forward(q)
 
     def without_terms(self) -> Calibration:
         """The same with what a robot file holds: the table, and ratios."""
         return replace(self, beyond=None)
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
-        """How far the model (as of :meth:`forward`) is from other measurements, (P,): over their measured coordinates.
+        """How far the model is from other measurements, (P,): over their measured coordinates.
 
         Raises
         ------
         InputError
             for poses of another arm, or outside its limits
         """
-        return _lengths(self.differences_mm(measurements))
-
-    def differences_mm(self, measurements: Sequence[Measurement]) -> Reals:
-        """Of each measurement what the model (as of :meth:`forward`) says minus what was observed, (P, 3); NaN where
-        nothing was. Of a touched place or plane, and of distances, see :class:`PointObservations`."""
-        return _differences_mm(self.robot if self.beyond is None else self.beyond.robot, self._errors, measurements)
-
-    @property
-    def _errors(self) -> JointErrors | None:
-        return None if self.beyond is None else self.beyond.errors
+        return self.model.distances_mm(measurements)
 
     def sheet(self) -> Sheet:
         """A row for each estimated entry."""
@@ -389,21 +381,6 @@ class Calibration(ByValue, Displayed):
             left,
             (shortly(self.conclusion), *(f"held: {shortly(why)}" for why in self.held)),
         )
-
-
-def _lengths(differences: Reals) -> Reals:
-    """Of differences (P, 3) the distances over what was observed, (P,)."""
-    found: Reals = np.sqrt(np.nansum(differences**2, axis=1))
-    return found
-
-
-def _differences_mm(robot: Robot, errors: JointErrors | None, measurements: Sequence[Measurement]) -> Reals:
-    seen = observed(measurements, robot)
-    assert isinstance(seen, PointObservations)
-    meant = seen.shifted(errors.amounts(seen.row_values, seen.points(errors.robot))) if errors else seen
-    found = np.full(seen.seen.shape, np.nan)
-    found[seen.seen] = meant.predict(robot, (), np.zeros((1, 0)))[0] - seen.values_mm
-    return found
 
 
 @dataclass(frozen=True)
@@ -453,15 +430,6 @@ def joint_shares(found: Calibration, robot: Robot, measurements: Sequence[Measur
         )
         shares.append(JointShare(joint, placement, tuple(each.name for each in mine), *ways))
     return tuple(shares)
-
-
-def _with_errors(model: Beyond, q: Reals) -> Reals:
-    errors, flat = model.errors, q.reshape(-1, q.shape[-1])
-    x = row_values(model.robot, flat)
-    points = np.broadcast_to(errors.robot.tool[:3, 3], (len(x), 3))
-    flange = frames_of(tables_of(model.robot), model.robot, x + errors.amounts(x, points))[0][:, -1]
-    T: Reals = (flange @ model.robot.tool).reshape(*q.shape[:-1], 4, 4)
-    return T
 
 
 def calibrate(
@@ -552,13 +520,14 @@ def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tupl
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Points that are used, the table alone but for ratios, and the table with the terms that are chosen (the same if
+    """Points that are used, the table with what a robot file can hold, and with all terms that are chosen (the same if
     there are none)."""
 
     observations: PointObservations
     level: Level
     table: Fit
     choice: ChosenTerms
+    for_file: ChosenTerms
     whole: Fit
 
     @property
@@ -576,11 +545,12 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         table = fit(robot, level.kept, observations)
     here = corrected(robot, table.kept, table.amounts)
     choice = choose_terms(robot, here, table.kept, observations)
+    for_file = ChosenTerms((), ())
+    if free_ratios and (choice.terms or not choice.tried):  # else all kinds were tried, and none taken
+        for_file = choose_terms(robot, here, table.kept, observations, IN_ROBOT_FILE)
+        table = fit(robot, level.kept, observations, for_file.terms) if for_file.terms else table
     whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
-    if choice.terms and free_ratios:
-        ratios = choose_terms(robot, here, table.kept, observations, IN_ROBOT_FILE).terms
-        table = fit(robot, level.kept, observations, ratios) if ratios else table
-    return _Model(observations, level, table, choice, whole)
+    return _Model(observations, level, table, choice, for_file, whole)
 
 
 def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> Calibration:
@@ -599,8 +569,9 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
         outliers=tuple(Outlier(int(every.lines[k]), float(distances[k])) for k in np.flatnonzero(~used)),
         left_out=_left_out(observations, model.table),
         residuals=_structure(robot, observations, model.table),
-        tried=model.choice.tried,
-        beyond=_beyond(robot, observations, model.whole) if model.whole.terms else None,
+        tried=model.choice.tried or model.for_file.tried,
+        tried_for_file=model.for_file.tried if model.choice.tried else (),
+        beyond=_beyond(robot, observations, model.whole) if model.choice.terms else None,
     )
 
 

@@ -42,12 +42,12 @@ from er3a.robots.robot import Robot
 PARTS = 10
 SEEDS = 1, 2, 3, 4
 SURE = 1e-5
-"""How improbable a term's share has to be if there is only noise; some 40 terms are tried, again with each taken."""
+"""How improbable a term's share has to be if there is only noise; some 80 terms are tried, again with each taken."""
 LEAST_GAIN = 0.01
 """Share of the mean squared error at poses left out that a term has to take away, either way of leaving out."""
 LEAST_POSES = 40
-LEAST_SPARE = 4
-"""Coordinates for each number of the largest model, for terms to be tried."""
+LEAST_SPARE = 3
+"""Coordinates for each number of the model with all terms that are tried, for them to be tried."""
 RIDGE = 1e-12
 
 
@@ -178,8 +178,9 @@ def choose_terms(
     robot : the table to start from; here : corrected without terms
     kinds : that are tried
     """
-    fixed_terms, count = candidates(robot), len(kept)
-    numbers = count + sum(term.count for term in fixed_terms) + 2 * int((~robot.sliding).sum())
+    fixed_terms, count = candidates(robot, kinds), len(kept)
+    ripples = "ripple" in kinds and not (observations.touched >= 0).any()
+    numbers = count + sum(term.count for term in fixed_terms) + ripples * 2 * int((~robot.sliding).sum())
     rows, last = observations.independent(here)
     pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm
     if not can_leave_out(pose_of, 0) or len(last) < LEAST_SPARE * numbers:
@@ -187,9 +188,7 @@ def choose_terms(
     J = rows @ jacobian(here, kept, observations)
     rest = rows @ (observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0])
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
-    fixed_terms = candidates(robot, kinds)
     parts = [part for seed in SEEDS for part in parts_of(observations.row_values, seed)]
-    ripples = "ripple" in kinds and not (observations.touched >= 0).any()
     search = _RippleSearch(here, observations) if ripples else None
     taken: dict[JointTerm, TriedTerm] = {}
     dropped: dict[JointTerm, TriedTerm] = {}

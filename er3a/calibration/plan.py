@@ -11,9 +11,9 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -152,7 +152,7 @@ def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[i
     for _ in range(min(count, len(blocks))):
         half = np.linalg.solve(np.linalg.cholesky(information), np.concatenate(blocks).T).T
         ends = np.cumsum([0, *(len(block) for block in blocks)])
-        parts = [half[start:end] for start, end in pairwise(ends)]
+        parts = [half[start:end] for start, end in itertools.pairwise(ends)]
         gain = [np.linalg.slogdet(np.eye(len(part)) + part @ part.T)[1] for part in parts]
         for at in chosen:
             gain[at] = -1.0
@@ -174,20 +174,21 @@ def _chosen(
     J = SCALE * jacobian(robot, kept, every) / every.deviation_mm[:, None]
     old = J[every.pose_of < measured]
     ends = measured + np.cumsum([0, *(len(option) for option in options)])
-    blocks = [J[(every.pose_of >= start) & (every.pose_of < end)] for start, end in pairwise(ends)]
+    blocks = [J[(every.pose_of >= start) & (every.pose_of < end)] for start, end in itertools.pairwise(ends)]
     return d_optimal(old.T @ old, blocks, count)
 
 
 def _with(
     robot: Robot, measurements: Sequence[Measurement], proposals: Sequence[Proposal], seen: PointObservations
 ) -> PointObservations:
-    """The observations with those at proposed poses, as they would be by the table."""
+    """The observations with those at proposed poses, as they would be by the table, of the median deviation."""
     point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
     known = {each.touched for each in measurements if each.length_mm is not None}
     new = [_as_measured(each, point, each.kind == "pair" or (each.kind, each.name) in known) for each in proposals]
     found = observed([*measurements, *new], robot, [name for name in PLACEMENTS if name not in seen.free])
     assert isinstance(found, PointObservations)
-    return found.with_deviation(float(np.median(seen.deviation_mm)))
+    usual = np.full(len(found) - len(seen), np.median(seen.deviation_mm))
+    return replace(found, deviation_mm=np.r_[seen.deviation_mm, usual])
 
 
 def _as_measured(proposal: Proposal, point: Literal["flange", "tool"], with_length: bool) -> Measurement:
@@ -205,7 +206,7 @@ def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObser
     q = meant(robot, np.round(quasi_random_points(low, high, CANDIDATES)))
     q = q[((q >= robot.lower) & (q <= robot.upper)).all(axis=1)]
     q = q[clearance(robot, q, None).distance > 0]
-    x = seen.positions(robot)
+    x, labels = seen.positions(robot), _labels(seen)
     options: list[tuple[Proposal, ...]] = []
     for number, touched in enumerate(kinds):
         own = q[number :: len(kinds)]
@@ -216,7 +217,7 @@ def _options(robot: Robot, measurements: Sequence[Measurement], seen: PointObser
             [k for k, each in enumerate(measurements) if each.touched == touched or (not touched[1] and each.pair)]
         )
         lengths = np.array([measurements[k].length_mm or 0.0 for k in rows]) / 1000
-        options += _touches(robot, own, seen, touched, x=x[rows], lengths=lengths, known=len(options))
+        options += _touches(robot, own, seen, touched, x=x[rows], lengths=lengths, labels=labels)
     return options
 
 
@@ -228,9 +229,9 @@ def _touches(
     *,
     x: Reals,
     lengths: Reals,
-    known: int = 0,
+    labels: Iterator[str],
 ) -> list[tuple[Proposal, ...]]:
-    """What joint values near to q (N, n) touch of what points x (P, 3) have touched; ``known`` options have names."""
+    """What joint values near to q (N, n) touch of what points x (P, 3) have touched; ``labels`` of new pairs."""
     kind, name = touched
     first = q[: len(q) // 2] if kind == "pair" else q
     around = _points(robot, first, seen)
@@ -239,21 +240,26 @@ def _touches(
     for k in np.flatnonzero(done):
         length = 1000 * float(size[k])
         if kind == "pair":
-            label = f"next {known + len(found) + 1}"
+            label = next(labels)
             found.append(tuple(Proposal(_pose(robot, each[k]), kind, label, length) for each in (first, second)))
         else:
             found.append((Proposal(_pose(robot, second[k]), kind, name, length),))
     return found
 
 
+def _labels(seen: PointObservations) -> Iterator[str]:
+    """Of pairs, such as nothing that was measured has."""
+    return (name for number in itertools.count(1) if (name := f"next {number}") not in seen.names)
+
+
 def touches(robot: Robot, seen: PointObservations) -> PointObservations:
     """Touches all over the joint range of the first few things that are touched, as they would be by the table."""
-    x, q = seen.positions(robot), meant(robot, np.array(spread(robot)))
+    x, q, labels = seen.positions(robot), meant(robot, np.array(spread(robot))), _labels(seen)
     new: list[Measurement] = []
     point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
     for thing, (_, rows) in list(zip(seen.things(), seen.groups()))[:FEW]:
         lengths = seen.lengths_mm(rows) / 1000
-        for option in _touches(robot, q, seen, (thing.kind, thing.name), x=x[rows], lengths=lengths, known=len(new)):
+        for option in _touches(robot, q, seen, (thing.kind, thing.name), x=x[rows], lengths=lengths, labels=labels):
             new += [_as_measured(each, point, bool(lengths.any())) for each in option]
     found = observed(new, robot, [name for name in PLACEMENTS if name not in seen.free])
     assert isinstance(found, PointObservations)
@@ -326,7 +332,7 @@ def _beyond(measurements: Sequence[Measurement], proposals: Sequence[Proposal]) 
 def _half_widths(robot: Robot, parameters: Sequence[Parameter], seen: PointObservations) -> dict[str, float]:
     """Of the numbers that are settled the half-widths of their 95 % intervals, mm or deg."""
     kept = [parameters[k] for k in subspace(robot, parameters, seen).kept]
-    J = SCALE * jacobian(robot, kept, seen) / seen.deviation_mm[:, None]
+    J = seen.independent(robot)[0] @ (SCALE * jacobian(robot, kept, seen) / seen.deviation_mm[:, None])
     covariance = np.asarray(SCALE**2 * np.linalg.pinv(J.T @ J), np.float64)
     errors = np.sqrt(np.diag(covariance))
     found = {each.name: INTERVAL_95 * float(error) * each.in_unit for each, error in zip(kept, errors)}

@@ -22,13 +22,15 @@ from typing import Literal, get_args
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.calibration.observations import PointObservations
+from er3a.calibration.observations import Measurement, PointObservations, observed
+from er3a.kinematics.chain import row_values
+from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
 TermKind = Literal["ratio", "once", "twice", "sag", "weight", "ripple", "coupling"]
-KINDS: tuple[TermKind, ...] = get_args(TermKind)[:-1]
+KINDS: tuple[TermKind, ...] = get_args(TermKind)
 IN_ROBOT_FILE: tuple[TermKind, ...] = ("ratio", "coupling")
 RIPPLES = range(3, 257)
 """How many times a turn an error is looked for; strain wave gears have some 200 a turn."""
@@ -71,14 +73,16 @@ class JointTerm:
 
 def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTerm, ...]:
     """The terms that are tried beside ripples; prismatic joints have no turns."""
-    joints = range(1, robot.rows + 1) if "coupling" in kinds else ()
-    return tuple(JointTerm("coupling", row, by=by) for row in joints for by in joints if row != by) + tuple(
-        JointTerm(kind, row + 1)
+    joints = range(1, robot.rows + 1)
+    return tuple(
+        JointTerm(kind, row, by=by)
         for kind in kinds
-        for row in range(robot.rows)
-        if kind not in ("ripple", "coupling")
-        and (kind != "weight" or any(each.link > row for each in robot.masses.links))
-        and (kind in ("ratio", "sag", "weight") or not robot.sliding[row])
+        for row in joints
+        for by in (joints if kind == "coupling" else [0])
+        if kind != "ripple"
+        and row != by
+        and (kind != "weight" or any(each.link >= row for each in robot.masses.links))
+        and (kind not in ("once", "twice") or not robot.sliding[row - 1])
     )
 
 
@@ -135,6 +139,55 @@ class JointErrors(ByValue):
         for coefficient, (row, values) in zip(self.coefficients, self.columns(x, points)):
             found[:, row] += coefficient * values
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedModel(ByValue):
+    """A corrected arm with errors of joints that no table holds.
+
+    Attributes
+    ----------
+    robot : its table, base and tool; it is right with the errors alone
+    errors : by how much joints miss what they are meant to do
+    """
+
+    robot: Robot
+    errors: JointErrors
+
+    def forward(self, q: Reals) -> Reals:
+        """Pose of the tool (..., 4, 4), m, for commanded joint values (..., n), rad or m."""
+        if not self.errors.terms:
+            return forward(self.robot, q)
+        q = np.asarray(q, float)
+        x = row_values(self.robot, q.reshape(-1, q.shape[-1]))
+        points = np.broadcast_to(self.errors.robot.tool[:3, 3], (len(x), 3))
+        flange = frames_of(tables_of(self.robot), self.robot, x + self.errors.amounts(x, points))[0][:, -1]
+        T: Reals = (flange @ self.robot.tool).reshape(*q.shape[:-1], 4, 4)
+        return T
+
+    def positions_mm(self, measurements: Sequence[Measurement]) -> Reals:
+        """Where the measured points are by the model, (P, 3)."""
+        return 1000 * self._seen(measurements).positions(self.robot)
+
+    def differences_mm(self, measurements: Sequence[Measurement]) -> Reals:
+        """Of each measurement what the model says minus what was observed, (P, 3); NaN where nothing was. Of a touched
+        place or plane, and of distances, see :class:`PointObservations`."""
+        seen = self._seen(measurements)
+        found = np.full(seen.seen.shape, np.nan)
+        found[seen.seen] = seen.predict(self.robot, (), np.zeros((1, 0)))[0] - seen.values_mm
+        return found
+
+    def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
+        """How far the model is from measurements, (P,): over what was observed."""
+        found: Reals = np.sqrt(np.nansum(self.differences_mm(measurements) ** 2, axis=1))
+        return found
+
+    def _seen(self, measurements: Sequence[Measurement]) -> PointObservations:
+        seen = observed(measurements, self.robot)
+        assert isinstance(seen, PointObservations)
+        if not self.errors.terms:
+            return seen
+        return seen.shifted(self.errors.amounts(seen.row_values, seen.points(self.errors.robot)))
 
 
 def term_jacobian(

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -115,15 +115,20 @@ def conventions_of(robot: Robot, references: Sequence[Reference], meets: float) 
     return chosen if chosen and chosen.faults else None
 
 
-def counted_from_ground(robot: Robot, references: Sequence[Reference], meets: float) -> list[Conventions]:
+def counted_from_ground(
+    robot: Robot, references: Sequence[Reference], meets: float, limits_besides: bool = False
+) -> list[Conventions]:
     """Which joint references count from the ground (J3 - J2), so that all of them are met, in each way that does it.
     Its limits may be stated either way: of the table's joint, or of the one counted so.
 
     Parameters
     ----------
     references, meets : as of :func:`conventions_of`
+    limits_besides : where positions tell, limits that are other ones, as those of a linkage often are, are set right
     """
     if robot.coupling is not None or robot.sliding.any():
+        return []
+    if limits_besides and all(isinstance(r.quantity, Limit | PoseOutside) for r in references):
         return []
     axes, found = frames(robot, np.zeros(robot.joints))[:-1, :3, 2], dict[Fault, Conventions]()
     quantities, (expected, uncertainty) = quantities_of(references), expected_of(references)
@@ -131,11 +136,12 @@ def counted_from_ground(robot: Robot, references: Sequence[Reference], meets: fl
         parallel = [k for k in range(joint) if abs(axes[k] @ axes[joint]) > PARALLEL]
         for along in dict.fromkeys((*((k,) for k in reversed(parallel)), tuple(parallel))):
             for sign, ends in itertools.product(SIGNS if along else (), (False, True)):
-                arm = _from_ground(robot, joint, along, sign, ends)
-                off = (predict_tables(tables_of(arm), arm, quantities)[0] - expected) / uncertainty
+                fault = CountedFromGround(joint + 1, tuple(k + 1 for k in along), sign)
+                own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends), meets)
+                own = _with_limits(robot, own, references) if limits_besides and not ends else own
+                off = (predict_tables(tables_of(own.corrected), own.corrected, quantities)[0] - expected) / uncertainty
                 if np.abs(off).max() <= meets:
-                    fault = CountedFromGround(joint + 1, tuple(k + 1 for k in along), sign)
-                    found.setdefault(fault, Conventions((fault,), arm, float(np.abs(off).max())))
+                    found.setdefault(fault, replace(own, left=float(np.abs(off).max())))
     return list(found.values())
 
 

@@ -356,7 +356,10 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
         return Diagnosis(NothingToExplain(len(stated), resolution_of(case)), len(stated), 0, None, ())
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
-    from_ground = counted_from_ground(robot, stated, MEETS)
+    explained = bool(hypotheses) and hypotheses[0].explains
+    from_ground = counted_from_ground(robot, stated, MEETS) or (
+        [] if explained else counted_from_ground(robot, stated, MEETS, limits_besides=True)
+    )
     chosen = from_ground[0] if from_ground else None
     if chosen is None and _may_be_chosen(robot, hypotheses):
         chosen = conventions_of(robot, stated, MEETS)
@@ -364,7 +367,7 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
         difference = predict_tables(tables_of(chosen.corrected), chosen.corrected, quantities_of(stated))[0]
         left = difference - expected_of(stated)[0]
         first = _defined_otherwise(ranking, chosen, left, hypotheses)
-        if first.explains or not (hypotheses and hypotheses[0].explains):
+        if first.explains or not explained:
             alike = tuple(each.faults for each in from_ground[1:])
             first = replace(first, indistinguishable_from=(*alike, *first.indistinguishable_from))
             conclusion = _concluded(first, first.indistinguishable_from if from_ground else ())

@@ -99,12 +99,6 @@ def moved(tables: Tables, numbers: Sequence[FreeNumber], which: Integers, amount
     return replace(tables, **columns)
 
 
-def wrapped(angle: Reals) -> Reals:
-    """The same angles (rad) within (-pi, pi]."""
-    turned: Reals = np.pi - (np.pi - angle) % (2 * np.pi)
-    return turned
-
-
 def _degrees(angle: float) -> float:
     return float(np.degrees(angle))
 

@@ -45,8 +45,8 @@ from er3a.diagnosis.fitting import (
     meet,
     moved,
     scanned,
-    wrapped,
 )
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.predict import predict_tables
@@ -260,8 +260,8 @@ def _distinct(case: Case, starts: Tables, fits: Fits) -> Fits:
     """Fits with angles within half a turn, without those that change nothing or say the same as a better one."""
     is_angle = np.array([number.is_angle for number in case.numbers])[fits.which]
     values = np.stack([number.value(starts) for number in case.numbers], axis=1)[fits.start[:, None], fits.which]
-    amounts = np.where(is_angle, wrapped(values + fits.amounts) - values, fits.amounts)
-    changes: Flags = np.all(np.abs(np.where(is_angle, wrapped(amounts), amounts)) > UNCHANGED, axis=1)
+    amounts = np.where(is_angle, wrap_to_pi(values + fits.amounts) - values, fits.amounts)
+    changes: Flags = np.all(np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED, axis=1)
     is_scale = np.array([number.column is None for number in case.numbers])[fits.which]
     changes &= ~(is_scale & (1 + amounts < LEAST_SCALE)).any(axis=1)
     fits = Fits(fits.start, fits.which, amounts, fits.left)
@@ -271,7 +271,7 @@ def _distinct(case: Case, starts: Tables, fits: Fits) -> Fits:
     for back in range(1, DENSE.basins):
         same = (fits.start[back:] == fits.start[:-back]) & (fits.which[back:] == fits.which[:-back]).all(axis=1)
         apart = fits.amounts[back:] - fits.amounts[:-back]
-        apart = np.abs(np.where(is_angle[back:], wrapped(apart), apart))
+        apart = np.abs(np.where(is_angle[back:], wrap_to_pi(apart), apart))
         kept[back:] &= ~(same & (apart < tolerance[back:]).all(axis=1))
     return fits[kept]
 
@@ -415,7 +415,7 @@ class _Groups:
     def _turned_by(self, rows: Integers) -> Reals:
         """By how much (rad) hypotheses turn the table's angles, rounded."""
         tables = self.pool.tables[rows]
-        turned = [np.abs(wrapped(getattr(tables, name) - getattr(self.given, name))) for name in ("alpha", "offset")]
+        turned = [np.abs(wrap_to_pi(getattr(tables, name) - getattr(self.given, name))) for name in ("alpha", "offset")]
         total: Reals = np.sum(turned, axis=(0, 2)).round(3)
         return total
 
@@ -454,5 +454,5 @@ class _Groups:
         tables = self.pool.tables[[row, other]]
         lengths = max(float(np.ptp(getattr(tables, name), axis=0).max()) for name in ("a", "d"))
         angles = (getattr(tables, name) for name in ("alpha", "offset", "lower", "upper"))
-        turned = max(float(np.abs(wrapped(angle[1] - angle[0])).max()) for angle in angles)
+        turned = max(float(np.abs(wrap_to_pi(angle[1] - angle[0])).max()) for angle in angles)
         return lengths < SAME_LENGTH * arm_lengths(tables).max() and turned < SAME_ANGLE

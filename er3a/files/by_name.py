@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,6 +18,8 @@ from er3a.calibration import calibrate as calibration
 from er3a.calibration.calibrate import Calibration
 from er3a.calibration.observations import PLACEMENTS, Measurement, TouchKind, check_poses
 from er3a.calibration.outcomes import FixedName
+from er3a.calibration.parameters import Parameter, corrected
+from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
@@ -31,6 +34,7 @@ from er3a.references.reference import Document, Documents, Reference, ReferenceS
 from er3a.robots.robot import MOST_JOINTS, Robot, Source
 
 _NUMBER = CsvColumn(float)
+NOMINAL = 1e-9  # mm, deg
 JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 
 
@@ -245,6 +249,37 @@ def calibrate(
     named = ["dh", "zero"] + [name for name in PLACEMENTS if not np.array_equal(*_both(found.robot, robot, name))]
     named += ["coupling"] if found.ratios else []
     return replace(found, robot=found.robot.replace(sources=dict(robot.sources) | dict.fromkeys(named, source)))
+
+
+def load_calibration(path: str | Path, robot: Robot) -> CorrectedModel:
+    """The model with all terms that ``er3a calibrate ROBOT MEASUREMENTS.csv --json`` has written, to predict with.
+
+    Parameters
+    ----------
+    robot : the one that the calibration started from
+
+    Raises
+    ------
+    InputError
+        if the file holds no calibration, or that of another table
+    """
+    try:
+        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        own = record["beyond"] or {"entries": record["entries"], "terms": record["ratios"]}
+        names = [re.fullmatch(r"(\D+)(\d*)", each["name"]) for each in own["entries"]]
+        kept = [Parameter(name[1], int(name[2] or 0)) for name in names if name]
+        corrections = [(float(each["nominal"]), float(each["correction"])) for each in own["entries"]]
+        terms = tuple(JointTerm(each["kind"], each["joint"], each["turns"], each["by"]) for each in own["terms"])
+        coefficients = np.array([value for each in own["terms"] for value in each["coefficients"]], dtype=float) / 1000
+    except (OSError, ValueError, KeyError, TypeError):
+        remedy = "Write one: er3a calibrate ROBOT MEASUREMENTS.csv --json > FILE.json"
+        raise InputError(path, None, "is no file with a calibration", remedy) from None
+    for entry, (nominal, _) in zip(kept, corrections):
+        if entry.joint > robot.rows or abs(entry.nominal(robot) - nominal) > NOMINAL:
+            problem = f"{entry.name} was {nominal:g} {entry.unit} where the calibration started, unlike {robot.name}'s"
+            raise InputError(path, "entries", problem, "Give the robot that was calibrated, not the corrected one")
+    amounts = np.array([correction / entry.in_unit for entry, (_, correction) in zip(kept, corrections)])
+    return CorrectedModel(corrected(robot, kept, amounts), JointErrors(robot, terms, coefficients))
 
 
 def _both(first: Robot, second: Robot, name: str) -> tuple[Reals, Reals]:

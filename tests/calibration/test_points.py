@@ -14,14 +14,12 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 import er3a
-from er3a.calibration.calibrate import choose_level
-from er3a.calibration.cross_validation import choose_terms
-from er3a.calibration.fit import Fit, covariance_by_poses, fit
-from er3a.calibration.observations import Measurement, PointObservations, observed
+from er3a.calibration.fit import Fit, covariance_by_poses
+from er3a.calibration.observations import Measurement, PointObservations
 from er3a.calibration.outcomes import CalibrationError, NotToldApart
-from er3a.calibration.parameters import corrected, coupled
+from er3a.calibration.parameters import coupled
 from er3a.calibration.plan import plan
-from er3a.calibration.terms import IN_ROBOT_FILE, JointErrors, JointTerm, candidates
+from er3a.calibration.terms import JointErrors, JointTerm, candidates
 from er3a.dynamics.arm_model import arm_model
 from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
@@ -142,7 +140,7 @@ TERMS = [
 
 def test_a_joint_that_slides_has_no_turns_but_may_sag():
     kinds = {joint: {term.kind for term in candidates(sliding_arm()) if term.joint == joint} for joint in (2, 3)}
-    assert kinds == {2: {"ratio", "once", "twice", "sag"}, 3: {"ratio", "sag"}}
+    assert kinds == {2: {"ratio", "once", "twice", "sag", "coupling"}, 3: {"ratio", "sag", "coupling"}}
 
 
 @pytest.mark.long
@@ -251,20 +249,31 @@ def test_the_command_tells_positions_held_back(tmp_path):
     used.write_text("\n".join([lines[0], *lines[21:]]) + "\n", encoding="utf-8")
     held.write_text("\n".join(lines[:21]) + "\n", encoding="utf-8")
     words = ["calibrate", str(MEASUREMENTS / "wam.yaml"), str(used), "--held-back", str(held)]
-    found = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    record = tmp_path / "mine.json"
+    record.write_text(CliRunner().invoke(app, [*words, "--json"]).stdout, encoding="utf-8")
+    found, robot = json.loads(record.read_text(encoding="utf-8")), load_robot(MEASUREMENTS / "wam.yaml")
     assert found["held_back"]["positions"] == 20
     assert found["held_back"]["mean_mm"] < 3
     assert found["output"] is None
     text = CliRunner().invoke(app, [*words, "--output", str(tmp_path / "mine.yaml")]).stdout
     assert f"held back: 20 positions, {found['held_back']['mean_mm']:.4g} mm off on average" in text
     assert f"at worst (row {found['held_back']['worst_row']})" in text
-    assert "tried: J3 once a turn" in text
+    assert "tried: J3 coupled to J1" in text
     alone = found["held_back"]["table_mean_mm"]
     assert alone > found["held_back"]["mean_mm"]
     assert f"as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
     table, model = found["left_out"]["mean_mm"], found["beyond"]["left_out"]["mean_mm"]
     assert f"it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm." in text
-    assert load_robot(tmp_path / "mine.yaml").joints == 7
+    mine, rows = load_robot(tmp_path / "mine.yaml"), load_measurements(held, robot)
+    model, q = er3a.load_calibration(record, robot), np.radians([row.pose for row in rows])
+    for name, T in (("xyz_mm", model.forward(q)), ("table_xyz_mm", er3a.forward(mine, q))):
+        said = np.array([each[name] for each in found["held_back"]["rows"]])
+        assert 1000 * T[:, :3, 3] == pytest.approx(said, abs=1e-6)
+    assert model.distances_mm(rows).max() == found["held_back"]["worst_mm"]
+    with pytest.raises(InputError, match="tool_x was 0 mm where the calibration started"):
+        er3a.load_calibration(record, mine)
+    with pytest.raises(InputError, match="is no file with a calibration"):
+        er3a.load_calibration(tmp_path / "mine.yaml", robot)
 
 
 def test_a_worst_position_beyond_all_fitted_poses_is_named():
@@ -545,14 +554,19 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
 
 
-def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(random, tmp_path):
-    """J4 turns a little with J2; the arm's coupling holds it, beside that which it has."""
+@pytest.mark.parametrize("poses", [130, 80])
+def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(poses, random, tmp_path):
+    """J4 turns a little with J2; the arm's coupling holds it, beside that which it has. From few poses only what the
+    file can hold is tried."""
     bench = Bench("six", random, {JointTerm("coupling", 4, by=2): [1e-3]})
-    seen = observed(bench.measured(130, 0.02), bench.robot)
-    kept = choose_level(bench.robot, seen).kept
-    here = corrected(bench.robot, kept, fit(bench.robot, kept, seen).amounts)
-    (term,) = choose_terms(bench.robot, here, kept, seen, IN_ROBOT_FILE).terms
-    assert (term.kind, term.joint, term.by) == ("coupling", 4, 2)
+    found = er3a.calibrate(bench.robot, bench.measured(poses, 0.02))
+    for terms in (found.ratios, found.beyond.terms if poses > 100 else found.ratios):
+        assert [(each.kind, each.joint, each.by) for each in terms] == [("coupling", 4, 2)]
+    tried = found.tried_for_file if poses > 100 else found.tried
+    assert {each.kind for each in tried} == {"ratio", "coupling"}
+    assert len(tried) == 6 + 6 * 5
+    assert [(each.joint, each.by) for each in tried if each.verdict == "taken"] == [(4, 2)]
+    assert (found.beyond is None) == (poses < 100)
     robot = bench.robot.replace(coupling=np.eye(6) - np.eye(6, k=-1) * [0, 1, 0, 0, 0, 0])  # J3 - J2
     file, q = coupled(robot, {(4, 2): 1e-3}).replace(name="coupled"), bench.joints(20)
     write_robot(file, tmp_path / "coupled.yaml")

@@ -156,5 +156,9 @@ def test_a_sheet_that_counts_a_joint_from_the_ground_is_named(name, joint, sign)
         about = JointLimit(joint, side), "limits", Limit(joint, side)
         stated.append(Reference(*about, float(value), 0.5, "sheet", "official", "sheet"))
     assert er3a.diagnose(right, stated)[0].faults == (CountedFromGround(joint, (2,), sign),)
+    other = Reference(*about, float(value) - 30, 0.5, "sheet", "official", "sheet")  # as the linkage has it
+    best = er3a.diagnose(right, [*stated[:-1], other])[0]
+    assert best.explains
+    assert best.faults[0] == CountedFromGround(joint, (2,), sign)
     limits_alone = er3a.diagnose(right, stated[-2:])[0]
     assert (CountedFromGround(joint, (2,), sign),) in (limits_alone.faults, *limits_alone.indistinguishable_from)

@@ -71,7 +71,8 @@ def lines_of(found: Calibration) -> str:
         lines.append(f"as in a robot file, {_left_out_line(found.left_out)}")
     if found.residuals:
         lines.append(f"as in a robot file, {_residual_line(found.residuals)}")
-    lines += [_tried_line(each) for each in found.tried]
+    lines += _tried_lines("tried", found.tried)
+    lines += _tried_lines("tried for the robot file", found.tried_for_file)
     if found.beyond:
         lines += _beyond_lines(found.beyond)
     if found.more:
@@ -248,12 +249,16 @@ def residual_texts(found: ResidualStructure) -> list[str]:
     return [correlated, by_value, play, greatest]
 
 
-def _tried_line(found: TriedTerm) -> str:
-    changes = f"{as_text(found.change, '+.1%')}, far from all others {as_text(found.far_change, '+.1%')}"
-    name = term_name(found)
-    return (
-        f"tried: {name:<20} squared error left out {changes}, p {found.probability:.1e}: {tr(VERDICTS[found.verdict])}"
-    )
+def _tried_lines(title: str, tried: Sequence[TriedTerm]) -> list[str]:
+    shown = [each for each in tried if each.verdict != "noise"]
+    lines = []
+    for each in shown:
+        changes = f"{as_text(each.change, '+.1%')}, far from all others {as_text(each.far_change, '+.1%')}"
+        what = f"squared error left out {changes}, p {each.probability:.1e}: {tr(VERDICTS[each.verdict])}"
+        lines.append(f"{title}: {term_name(each):<20} {what}")
+    if more := len(tried) - len(shown):
+        lines.append(f"{title}: {more} more terms, left because noise may have made them; --html and --json list them")
+    return lines
 
 
 def _beyond_lines(found: Beyond) -> list[str]:
@@ -264,7 +269,8 @@ def _beyond_lines(found: Beyond) -> list[str]:
     if found.residuals:
         lines.append(f"with terms, {_residual_line(found.residuals)}")
     lines.append(
-        "all terms are in --json and in found.forward(q) in Python; a robot file holds ratios and couplings alone"
+        "all terms are in --json, of which er3a.load_calibration(FILE, robot) in Python makes the model again; a robot "
+        "file holds ratios and couplings alone"
     )
     return lines
 
@@ -300,13 +306,16 @@ def calibration_record(found: Calibration, others: Sequence[Measurement] = ()) -
         "left_out": vars(found.left_out) if found.left_out else None,
         "residuals": _residuals(found.residuals),
         "tried": [vars(each) for each in found.tried],
+        "tried_for_file": [vars(each) for each in found.tried_for_file],
         "beyond": _beyond(found.beyond) if found.beyond else None,
         "held_back": _held_back(found, others) if others else None,
     }
 
 
 def _held_back(found: Calibration, others: Sequence[Measurement]) -> dict[str, object]:
-    model, alone = found.distances_mm(others), found.without_terms().distances_mm(others)
+    models = found.model, found.without_terms().model
+    model, alone = (each.distances_mm(others) for each in models)
+    positions = zip(others, *(each.positions_mm(others).tolist() for each in models))
     return {
         "positions": len(model),
         "mean_mm": float(model.mean()),
@@ -314,6 +323,7 @@ def _held_back(found: Calibration, others: Sequence[Measurement]) -> dict[str, o
         "worst_row": others[int(model.argmax())].row,
         "table_mean_mm": float(alone.mean()),
         "table_worst_mm": float(alone.max()),
+        "rows": [{"row": each.row, "xyz_mm": xyz, "table_xyz_mm": table} for each, xyz, table in positions],
     }
 
 

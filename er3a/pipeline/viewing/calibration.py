@@ -75,11 +75,11 @@ def measured_errors(robot: Robot, measurements: Sequence[Measurement], found: Ca
     assert isinstance(seen, PointObservations)
     nothing = found.without_terms()
     by_model = {
-        "before": replace(nothing, robot=robot).differences_mm(measurements),
-        "table": nothing.differences_mm(measurements),
+        "before": replace(nothing, robot=robot).model.differences_mm(measurements),
+        "table": nothing.model.differences_mm(measurements),
     }
     if found.beyond:
-        by_model["model"] = found.differences_mm(measurements)
+        by_model["model"] = found.beyond.differences_mm(measurements)
     poses = np.array([each.pose for each in measurements], dtype=float)
     return MeasuredErrors(poses, 1000 * seen.positions(found.robot), by_model, [each.row for each in measurements])
 
@@ -132,7 +132,8 @@ def write_calibration(
             entries=_entries(found),
             held=[say(why) for why in found.held],
             outliers=[(str(each.row), number(each.distance_mm, 3)) for each in found.outliers],
-            tried=_tried(found),
+            tried=_tried(found.tried, found.beyond.terms if found.beyond else found.ratios),
+            tried_for_file=_tried(found.tried_for_file, found.ratios),
             layers=layer_rows(comparison),
             headline=headline(comparison),
             compare_command=shlex.join(["er3a", "compare", table, f"{corrected.name}.yaml", "--html", "compared.html"]),
@@ -219,16 +220,16 @@ def _entries(found: Calibration) -> list[list[str]]:
     ]
 
 
-def _tried(found: Calibration) -> list[list[str]]:
-    taken = {(each.kind, each.joint, each.turns): each for each in (found.beyond.terms if found.beyond else ())}
+def _tried(tried: Sequence[TriedTerm], terms: Sequence[TermEstimate]) -> list[list[str]]:
+    taken = {(each.kind, each.joint, each.turns, each.by): each for each in terms}
 
     def row(each: TriedTerm) -> list[str]:
-        term = taken.get((each.kind, each.joint, each.turns)) if each.verdict == "taken" else None
+        term = taken.get((each.kind, each.joint, each.turns, each.by)) if each.verdict == "taken" else None
         changes = (as_text(value, "+.1%") for value in (each.change, each.far_change))
         p, result = number(each.probability, 2), tr(VERDICTS[each.verdict])
         return [f"J{each.joint}", term_kind(each), *changes, p, result, _coefficients(term) if term else "–"]
 
-    return [row(each) for each in found.tried]
+    return [row(each) for each in tried]
 
 
 def _coefficients(term: TermEstimate) -> str:
