@@ -328,10 +328,11 @@ class LineNotChecked:
 
 @dataclass(frozen=True)
 class SpeedNotGiven:
-    """The program does not give the speed; one was assumed (m/s, or a share of the joints')."""
+    """The program does not give the speed, or by ``word``, which is not known; one was assumed (m/s, or a share)."""
 
     assumed: float
     unit: Literal["m/s", "share"]
+    word: str = ""
     code: Literal["speed_not_given"] = "speed_not_given"
 
 
@@ -515,6 +516,8 @@ def level_of(finding: CheckFinding) -> Level:
         return "caution" if finding.turns or finding.angle_deg is None else "note"
     if isinstance(finding, FrameNotGiven):
         return "fail" if finding.needed else "caution"
+    if isinstance(finding, SpeedNotGiven) and finding.word:
+        return "caution"
     return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"
 
 

@@ -253,6 +253,7 @@ TEXTS = texts(
         ),
         "speed_not_given": "the program gives no speed; {assumed:g} m/s were assumed for the duration",
         "speed_not_given.share": "the program gives no speed; {percent:g} % were assumed for the duration",
+        "speed_not_given.word": "the speed '{word}' is not known; {assumed} was assumed for duration and joint speeds",
         "rest_not_checked.targets": (
             "only the first {checked} motions that are carried out were checked; of those from here on {targets} "
             "targets, for reach and limits, but not the motions between them"
@@ -457,6 +458,9 @@ def _(found: found_in.ArcGoesOn) -> str:
 
 @say.register
 def _(found: found_in.SpeedNotGiven) -> str:
+    if found.word:
+        assumed = f"{100 * found.assumed:g} %" if found.unit == "share" else f"{found.assumed:g} m/s"
+        return sentence("speed_not_given.word", word=found.word, assumed=assumed)
     if found.unit == "share":
         return sentence("speed_not_given.share", percent=found.assumed * 100)
     return say_as(found)
