@@ -65,6 +65,7 @@ CARRIED_OUT = {
     **{f"{code}": OF_SETS for code in ("board_scale", "little_motion", "few_samples", "no_rotation", "angle_order")},
     **{f"{code}": OF_SETS for code in ("transposed_rotations", "parallel_axes", "quaternion_order", "position_axes")},
     "all_samples_equal#flange": OF_SETS,
+    **{f"moved_between#{what}": OF_SETS for what in ("camera", "board")},
     **{f"measure_angle#{column}": MEASURED for column in ("offset", "alpha")},
     **{f"measure_length#{column}": MEASURED for column in ("a", "d")},
     "look_at_motion": "test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not",

@@ -181,8 +181,15 @@ TEXTS = texts(
             "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
             "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated"
         ),
+        "moved_between": by(
+            "what",
+            camera="from {sample} on the camera stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one "
+            "of the two parts of the set alone, or take the samples again",
+            board="from {sample} on the board stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one of "
+            "the two parts of the set alone, or take the samples again",
+        ),
         "few_samples": (
-            "only {samples} samples: a wrong one can't be found among so few, and the intervals rest on little; add "
+            "samples at only {samples} poses: a wrong one can't be found among so few, and the intervals rest on little; add "
             "poses, ten or more are advised"
         ),
         "too_few_samples": "{samples} samples; {needed} are needed, and ten or more advised",
