@@ -22,6 +22,7 @@ from er3a.programs.instructions import ArmMotion, JointTarget, Listing, PoseTarg
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.writing import WriteOptions
+from testing.arms import palletiser
 
 ROBOT = load_robot("er3a_c60")
 HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
@@ -774,6 +775,14 @@ def test_what_is_harmless_and_never_reached_is_not_named(tmp_path):
     assert "never_reached" not in codes(check(tmp_path, text))
     hidden = krl(f"PTP {axes(NEAR)}\nRETURN\nBAS(#VEL_PTP,10)\n$OUT[1]=TRUE\nWAIT SEC 1\n")
     assert "never_reached" not in codes(check(tmp_path, hidden, "a.src"))
+
+
+def test_a_line_of_a_coupled_arm_without_a_closed_form_is_named(tmp_path):
+    program = written(tmp_path, krl("LIN {A1 10,A2 -60,A3 60,A4 10}"), "a.src")
+    start = np.radians([0.0, -50, 50, 0])
+    found = check_program(program, palletiser(), CheckOptions(start=start, measures=False))
+    assert "line_not_checked" in codes(found)
+    assert found.level == "caution"
 
 
 XML = """<Xpl-source><XplEnvironment><VarDeclarations><VarGlobal>{declared}</VarGlobal></VarDeclarations><Pous><Pou>

@@ -413,7 +413,10 @@ def with_poses_added(samples: CalibrationSet) -> CalibrationSet:
     return CalibrationSet(samples.setup, *both)
 
 
-def of_two_setups(setup: str, count: int, first: int, board=np.eye(4), camera=np.eye(4)) -> CalibrationSet:
+STAYS = np.eye(4)
+
+
+def of_two_setups(setup: str, count: int, first: int, board=STAYS, camera=STAYS) -> CalibrationSet:
     """Before sample ``first`` everything stands where it should, from there on board or camera is moved."""
     random = np.random.default_rng(31)
     flange = flange_poses(random, count)

@@ -9,7 +9,7 @@ from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
-from er3a.kinematics.singularity import EventType
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.language import N_, tr
@@ -109,13 +109,10 @@ REMEDIES: dict[str, str] = {
     ),
     "load_above_payload": N_("Carry less, or correct the load if it is wrong."),
 }
-SINGULAR: dict[EventType, str] = {
+SINGULAR: dict[SingularityType, str] = {
     "wrist": N_("Tilt the tool so that J5 stays away from 0."),
     "elbow": N_("Keep the path nearer to the arm, so that it is not stretched."),
     "shoulder": N_("Keep the wrist at a distance from axis 1."),
-    "dependent_axes": N_(
-        "End the line before that point, and go on by a joint move, which singular poses do not disturb."
-    ),
 }
 STOPPED: dict[EndKind, str] = {
     "drifts": N_(
