@@ -65,6 +65,7 @@ CARRIED_OUT = {
     **{f"{code}": OF_SETS for code in ("board_scale", "little_motion", "few_samples", "no_rotation", "angle_order")},
     **{f"{code}": OF_SETS for code in ("transposed_rotations", "parallel_axes", "quaternion_order", "position_axes")},
     "all_samples_equal#flange": OF_SETS,
+    **{f"moved_between#{what}": OF_SETS for what in ("camera", "board")},
     **{f"measure_angle#{column}": MEASURED for column in ("offset", "alpha")},
     **{f"measure_length#{column}": MEASURED for column in ("a", "d")},
     "look_at_motion": "test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not",
@@ -81,7 +82,6 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("all_samples_equal#target", "ambiguous_tilt", "void_advice#cause", "void_advice#predicate"),
     *("read_limit#lower", "read_limit#upper", "time_joint", "at_singularity#wrist", "other_direction#both"),
     *("payload.unknown", "void.expected"),
-    "singular.dependent_axes",  # which no arm meets whose lines are checked
 }
 NO_ADVICE = {f"not_of_this_arm#{why}" for why in ("no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns")}
 

@@ -58,6 +58,7 @@ from er3a.calibration.parameters import (
     coupled,
     parameters_of,
     placements_of,
+    settles,
 )
 from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
@@ -200,6 +201,7 @@ class Estimate:
     ----------
     nominal : the table's value; correction : to be added to it; standard_error : of the correction
     quantile : half-width of its 95 % interval in standard errors
+    settled : whether that is less than what the table could be wrong by
     """
 
     parameter: Parameter
@@ -207,6 +209,7 @@ class Estimate:
     correction: float
     standard_error: float
     quantile: float = INTERVAL_95
+    settled: bool = True
 
     @property
     def name(self) -> str:
@@ -338,12 +341,19 @@ class Calibration(ByValue, Displayed):
         return self.scatter <= MOST_SCATTER
 
     @property
+    def open(self) -> tuple[str, ...]:
+        """Estimates whose intervals are wider than what the table could be wrong by."""
+        return tuple(each.name for each in self.estimates if not each.settled)
+
+    @property
     def conclusion(self) -> outcomes.CalibrationConclusion:
         """What the measurements say about the table."""
         if not self.fits:
             return outcomes.Misfit(self.level, self.rms_before_mm, self.rms_after_mm)
         beyond = tuple(each.name for each in self.estimates if abs(each.correction) > each.half_width)
-        return outcomes.CorrectionsFound(beyond) if beyond else outcomes.NoCorrectionFound(len(self.estimates))
+        return (
+            outcomes.CorrectionsFound(beyond) if beyond else outcomes.NoCorrectionFound(len(self.estimates), self.open)
+        )
 
     @property
     def model(self) -> CorrectedModel:
@@ -513,6 +523,7 @@ def _estimates(robot: Robot, found: Fit, error: Reals, quantiles: Reals) -> tupl
             float(amount * parameter.in_unit),
             float(own * parameter.in_unit),
             float(quantile),
+            settles(robot, parameter.unit, float(quantile * own * parameter.in_unit)),
         )
         for parameter, amount, own, quantile in zip(found.kept, found.amounts, error, quantiles)
     )

@@ -143,9 +143,10 @@ class CorrectionsFound:
 
 @dataclass(frozen=True)
 class NoCorrectionFound:
-    """All 95 % intervals hold 0."""
+    """All 95 % intervals hold 0; those of ``open`` entries are wider than what a table could be wrong by."""
 
     intervals: int
+    open: tuple[str, ...] = ()
     code: Literal["no_correction_found"] = "no_correction_found"
 
 

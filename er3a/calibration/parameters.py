@@ -117,6 +117,16 @@ def placed(parameters: Sequence[Parameter], amounts: Reals) -> tuple[Reals, Real
     return S, np.array([by_column.get(column, 0.0) for column in TOOL_COLUMNS])
 
 
+WIDEST = 0.05
+"""Rad, and lengths in sizes of the arm: a table that is off by more is another arm's."""
+
+
+def settles(robot: Robot, unit: Literal["mm", "deg"], half_width: float) -> bool:
+    """Whether half of a 95 % interval, mm or deg, is less than what the table of an arm could be wrong by."""
+    size_mm = 1000 * float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
+    return half_width <= WIDEST * (size_mm if unit == "mm" else float(np.degrees(1)))
+
+
 def coupled(robot: Robot, errors: Mapping[tuple[int, int], float]) -> Robot:
     """The robot whose rows (from 1) move, for each (row, other), by ``error`` times what the other is meant to move by
     more than they are meant to, by its coupling."""

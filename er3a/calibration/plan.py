@@ -29,7 +29,7 @@ from er3a.calibration.observations import (
     spread,
 )
 from er3a.calibration.outcomes import FixedName, Held
-from er3a.calibration.parameters import Parameter, parameters_of, placements_of
+from er3a.calibration.parameters import Parameter, parameters_of, placements_of, settles
 from er3a.calibration.terms import JointErrors, effects
 from er3a.collision.along import clearance
 from er3a.kinematics.chain import row_values
@@ -87,7 +87,7 @@ class Plan:
 
     Attributes
     ----------
-    settled : numbers that they tell apart, ``bar_NAME`` a bar's length
+    settled : numbers that they tell to less than the table could be wrong by, ``bar_NAME`` a bar's length
     lacking : those that measurements of this kind at more poses would
     held : why no poses settle the others
     proposals : poses, the one that adds most first
@@ -133,9 +133,10 @@ def plan(robot: Robot, measurements: Sequence[Measurement], count: int, fixed: S
     now, new = (_half_widths(robot, parameters, each) for each in (seen, then))
     ever = (*(each.name for each in kept), *_bars(robot, (), every, np.zeros((0, 0))))
     units = {each.name: each.unit for each in parameters}
+    settled = tuple(name for name, width in now.items() if settles(robot, units.get(name, "mm"), width))
     return Plan(
-        settled=tuple(now),
-        lacking=tuple(name for name in ever if name not in now),
+        settled=settled,
+        lacking=tuple(name for name in ever if name not in settled),
         held=(*able.held, *held_with(scale)),
         proposals=proposals,
         beyond=_beyond(measurements, proposals),

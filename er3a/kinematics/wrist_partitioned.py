@@ -311,12 +311,10 @@ def solve_slots(
     """
     if (parallel := parallel_axes_arm(robot)) is not None:
         return _slots_of_parallel_axes(robot, parallel, T, q_ref)
-    shape = T.shape[0], closed_form.SLOTS
+    constants, shape = _constants(robot), (T.shape[0], closed_form.SLOTS)
     q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
     T, q_ref = for_kernel(T), for_kernel(row_values(robot, q_ref))
-    closed_form.solve(
-        _constants(robot), (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap)
-    )
+    closed_form.solve(constants, (robot.direction, robot.offset), T, q_ref, keep_folds, keep_free, (q, fault, gap))
     if robot.coupling is not None:
         q = wrap_to_pi(q @ np.round(np.linalg.inv(robot.coupling)).T)
     return q, fault, gap

@@ -382,6 +382,7 @@ def _followed_moments(
     q, velocity, acceleration = followed.rates(at)
     bounded = not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
     for event in events:
+        assert event.type != "dependent_axes"  # of arms whose lines are not followed here
         where = way.along_mm(event.t)
         if not event.crossing:
             scale = 1000.0 if event.type == "shoulder" else float(np.degrees(1.0))

@@ -8,7 +8,7 @@ from typing import Literal
 
 from er3a.collision.pairs import Pair, PairsUnexamined
 from er3a.kinematics.classes.class_solvers import BranchLabel
-from er3a.kinematics.singularity import EventType
+from er3a.kinematics.singularity import SingularityType
 from er3a.kinematics.solutions import Unsolved
 from er3a.planning.motion_faults import AboveLimit, BelowLimit, TooFast
 from er3a.planning.tool_proof import Undecided
@@ -87,7 +87,7 @@ class ConfigurationEnds:
 class MeetsSingularity:
     """The tool's way meets a singular pose; ``bounded`` if the joint speeds stay finite there."""
 
-    type: EventType
+    type: SingularityType
     at_mm: float
     bounded: bool
     code: Literal["meets_singularity"] = "meets_singularity"
@@ -97,7 +97,7 @@ class MeetsSingularity:
 class PassesSingularity:
     """The tool's way passes by a singular pose at a distance (of wrist and elbow in deg, of the shoulder in mm)."""
 
-    type: EventType
+    type: SingularityType
     at_mm: float
     distance: float
     code: Literal["passes_singularity"] = "passes_singularity"
@@ -328,10 +328,11 @@ class LineNotChecked:
 
 @dataclass(frozen=True)
 class SpeedNotGiven:
-    """The program does not give the speed; one was assumed (m/s, or a share of the joints')."""
+    """The program does not give the speed, or by ``word``, which is not known; one was assumed (m/s, or a share)."""
 
     assumed: float
     unit: Literal["m/s", "share"]
+    word: str = ""
     code: Literal["speed_not_given"] = "speed_not_given"
 
 
@@ -515,6 +516,8 @@ def level_of(finding: CheckFinding) -> Level:
         return "caution" if finding.turns or finding.angle_deg is None else "note"
     if isinstance(finding, FrameNotGiven):
         return "fail" if finding.needed else "caution"
+    if isinstance(finding, SpeedNotGiven) and finding.word:
+        return "caution"
     return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"
 
 

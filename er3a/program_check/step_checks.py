@@ -734,9 +734,11 @@ class StepChecker:
             return CheckedMotion(motion.kind, placed, before, None, None, tuple(findings))
         if not is_given(motion):
             assumed = self.rules.assumed
-            joint = motion.kind == "joint"
+            word = "" if motion.speed is None else motion.speed.text
             findings.append(
-                found_in.SpeedNotGiven(*((assumed.joint_share, "share") if joint else (assumed.tool_speed, "m/s")))
+                found_in.SpeedNotGiven(assumed.joint_share, "share", word)
+                if motion.kind == "joint"
+                else found_in.SpeedNotGiven(assumed.tool_speed, "m/s", word)
             )
         if before is None:
             findings.append(found_in.PathNotKnown())

@@ -291,14 +291,14 @@ def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
     ----------
     known : variables that are given elsewhere; those that begin with ``$`` or ``%`` always are
     """
-    given = {_variable(each.target) for each in data}
+    given = {variable_of(each.target) for each in data}
     used: set[str] = set()
     for routine in routines:
         given |= {parameter.name for parameter in routine.parameters}
         for operation in routine.code:
             expressions = syntax.expressions_of(operation)
             if isinstance(operation, syntax.Assign):
-                given.add(_variable(operation.target))
+                given.add(variable_of(operation.target))
                 expressions = () if operation.value is None else (operation.value,)
             elif isinstance(operation, syntax.Move):
                 expressions = tuple(each for each in operation.arguments[:1] if each is not None)
@@ -306,7 +306,8 @@ def lacks_data(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]
     return any(name[0] not in "$%" and name not in known for name in used - given)
 
 
-def _variable(target: syntax.Expression) -> str:
+def variable_of(target: syntax.Expression) -> str:
+    """The variable that an assignment changes."""
     while isinstance(target, (syntax.Member, syntax.Element)):
         target = target.of
     return target.name if isinstance(target, syntax.Variable) else ""

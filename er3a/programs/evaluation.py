@@ -189,6 +189,10 @@ class Dialect(ABC):
         """Whether an assignment to this name sets an output."""
         return False
 
+    def reads_back(self, name: str) -> bool:
+        """Whether an output has what the program gave it last."""
+        return True
+
     def is_followed(self, name: str, value: syntax.Value) -> bool:
         """Whether motions are followed as a variable asks that is set to a value."""
         return True
@@ -401,6 +405,8 @@ class ProgramMemory:
             if kind in ("REAL", "LREAL") and not isinstance(value, float):
                 return float(value)
             if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float) and abs(value) < LARGEST_WHOLE:
+                if self.functions.whole_division is None and value % 1:
+                    return syntax.Unclear(f"{value:g}, of which no source tells how it becomes a whole number")
                 return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
         return value
 
@@ -459,6 +465,8 @@ class ProgramMemory:
                 return syntax.Unclear("a root") if isinstance(power, complex) else power
             if sign not in ARITHMETIC:
                 return syntax.Unclear(f"... {sign} ...")
+            if sign in ("%", "MOD") and min(a, b) < 0:
+                return syntax.Unclear(f"{a:g} {sign} {b:g}, of which no source tells the sign")
             found = ARITHMETIC[sign](a, b)
         except (ZeroDivisionError, OverflowError, ValueError):
             return syntax.Unclear("a division by zero or an overflow")

@@ -19,7 +19,7 @@ from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocati
 
 DEEPEST = 40
 LONGEST = 200
-NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 
 
 class MisreadError(Exception):

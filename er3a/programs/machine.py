@@ -607,7 +607,7 @@ class Machine:
             memory.forget(root(memory.key(each.target) or ""))
         name = memory.key(each.target) or each.text
         if self.dialect.is_signal(name):
-            memory.write(name, value)
+            memory.write(name, value if self.dialect.reads_back(name) else syntax.Unclear(name))
             return instructions.Output(name, syntax.shown(value))
         declared = each.type_name == "global" or not self.dialect.local_by_default
         local = each.local or (not declared and self._is_new(memory, name))

@@ -44,11 +44,14 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.vision import calibration_set, vision_findings
 from er3a.vision.classic_methods import METHOD_NAMES, MethodName, mean_pose, solved_by
 from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, refine, residuals, whitening
+from er3a.vision.setup_changes import moved_between
 
 DEVIATIONS = 6.0  # of the angle between two samples; beyond, a pair is in conflict
 MOST_DEVIATION = np.radians(2.0)  # of a camera that is of any use
 ROUNDING = 1e-6  # rad
 SAME_POSITION_M, SAME_ROTATION_RAD = 5e-5, 2e-4
+MOSTLY_APART = 0.8  # of samples that stand apart, so that their residuals are judged as independent
+PLACE_M, PLACE_RAD = 1e-3, np.radians(0.2)  # within which the flange stands at one place
 COPY_DECIMALS = 9  # of m and of rotation matrices
 FALSE_ALARMS = 0.01  # of sound sets in which a sample is called far from the fit
 BOARD_TURNS: dict[vision_findings.SuspectKind, tuple[str, tuple[float, ...]]] = {  # axis of the board, and deg
@@ -181,14 +184,23 @@ def worst_sample(
     )
 
 
+def _near(flange: Reals, i: int, distance: float, turn: float) -> Flags:
+    """Which of the samples before one stand within a distance, m, and a turn, rad, of it: (i,)."""
+    step = step_between(np.broadcast_to(flange[i], (i, 4, 4)), flange[:i])
+    near: Flags = (np.linalg.norm(step[:, :3], axis=1) < distance) & (np.linalg.norm(step[:, 3:], axis=1) < turn)
+    return near
+
+
+def _places(flange: Reals) -> int:
+    """At how many places the flange stood: errors of the arm, and most of the board's, are one at each."""
+    return sum(not _near(flange, i, PLACE_M, PLACE_RAD).any() for i in range(len(flange)))
+
+
 def repeated_poses(samples: calibration_set.CalibrationSet) -> tuple[vision_findings.RepeatedPose, ...]:
     """Samples taken where the flange had been before."""
     found = []
     for i in range(1, len(samples)):
-        step = step_between(np.broadcast_to(samples.flange[i], (i, 4, 4)), samples.flange[:i])
-        near = (np.linalg.norm(step[:, :3], axis=1) < SAME_POSITION_M) & (
-            np.linalg.norm(step[:, 3:], axis=1) < SAME_ROTATION_RAD
-        )
+        near = _near(samples.flange, i, SAME_POSITION_M, SAME_ROTATION_RAD)
         if near.any():
             first = int(near.argmax())
             seen = step_between(samples.target[first], samples.target[i])
@@ -482,8 +494,12 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     warnings: list[vision_findings.CalibrationWarning] = [angles.warning] if angles.warning else []
     directions = directions_tried(kept, refined)
     warnings += _warnings(kept, refined, greatest, apart, directions)
-    covariance = refined.covariance + _shared_covariance(kept, refined)
-    half_width = scipy.special.stdtrit(refined.freedom, (1 + SURE) / 2) * np.sqrt(np.diag(covariance))
+    share = _places(kept.flange) / len(kept)  # samples at one place count as one
+    others = [each.code for each in vision_findings.grave_warnings(warnings) if each.code != "unexplained_residuals"]
+    if not others and share > MOSTLY_APART and (step := moved_between(samples, used, refined)):
+        warnings.append(step)
+    covariance = refined.covariance / share + _shared_covariance(kept, refined)
+    half_width = scipy.special.stdtrit(refined.freedom * share, (1 + SURE) / 2) * np.sqrt(np.diag(covariance))
     found = HandEye(
         samples=samples,
         used=used,
@@ -586,8 +602,8 @@ def _warnings(
     found: list[vision_findings.CalibrationWarning] = []
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
         found.append(vision_findings.LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
-    if len(samples) <= FEW_SAMPLES:
-        found.append(vision_findings.FewSamples(len(samples)))
+    if (places := _places(samples.flange)) <= FEW_SAMPLES:
+        found.append(vision_findings.FewSamples(places))
     free = 6 * len(samples) - 12
     largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:

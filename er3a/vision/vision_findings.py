@@ -161,6 +161,21 @@ class MoreScatter:
     code: Literal["more_scatter"] = "more_scatter"
 
 
+@dataclass(frozen=True)
+class MovedBetween:
+    """From ``sample`` on the camera, or the board, stands elsewhere: the set is of two setups.
+
+    ``probability``: that chance makes such a step; 0 where one end of the set was left out and a step explains it.
+    """
+
+    sample: str
+    what: Literal["camera", "board"]
+    moved_mm: float
+    moved_deg: float
+    probability: float
+    code: Literal["moved_between"] = "moved_between"
+
+
 RotationReading = QuaternionOrder | AngleOrder | TransposedRotations
 OtherReading = RotationReading | PositionAxes
 CalibrationWarning = (
@@ -175,6 +190,7 @@ CalibrationWarning = (
     | LittleMotion
     | FewSamples
     | MoreScatter
+    | MovedBetween
 )
 
 

@@ -14,13 +14,22 @@ from typer.testing import CliRunner
 import er3a
 from er3a.calibration.fit import jacobian
 from er3a.calibration.observations import observed
-from er3a.calibration.outcomes import CalibrationError, MorePositions, MovesNothing, NoCorrectionFits, NotToldApart
+from er3a.calibration.outcomes import (
+    CalibrationError,
+    MorePositions,
+    MovesNothing,
+    NoCorrectionFits,
+    NoCorrectionFound,
+    NotToldApart,
+)
 from er3a.calibration.parameters import parallel_pairs, parameters_of, placements_of
+from er3a.calibration.plan import plan
 from er3a.errors import InputError
 from er3a.files.by_name import COLUMNS, load_measurements
 from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.calibration import lines_of
+from er3a.pipeline.messages.diagnosis import say
 from er3a.robots.robot import to_modified
 from testing.simulated_measurements import covered, measured
 
@@ -98,6 +107,23 @@ def test_estimates_are_those_of_an_independent_solver(random):
         assert estimate.correction == pytest.approx(amount * parameter.in_unit, abs=1e-3 * estimate.standard_error)
         assert estimate.standard_error == pytest.approx(own * parameter.in_unit, rel=1e-3)
     assert found.scatter == pytest.approx(1.0, abs=0.35)
+
+
+@pytest.mark.parametrize(("deviation", "least", "most"), [(0.05, 0.99, 1.0), (5000.0, 0.0, 0.0)])
+def test_what_intervals_leave_wider_than_a_table_may_be_off_is_not_settled(random, deviation, least, most):
+    robot = load_robot("er3a_c60")
+    rows = measured(robot, poses_in(robot, random, 30), 0.05, random)
+    rows = [replace(row, deviation_mm=deviation) for row in rows]
+    found, planned = er3a.calibrate(robot, rows), plan(robot, rows, 1)
+    estimated = len(found.estimates)
+    settled = estimated - len(found.open)
+    assert least <= settled / estimated <= most
+    assert f"settle {settled} of {estimated + len(found.held)} numbers" in lines_of(found)
+    assert least <= len(planned.settled) / (len(planned.settled) + len(planned.lacking)) <= most
+    if not settled:
+        assert found.conclusion == NoCorrectionFound(estimated, found.open)
+        assert "settle nothing of base_x" in say(found.conclusion)
+        assert "no correction" not in say(found.conclusion)
 
 
 def test_what_positions_cannot_tell_apart_is_held(random):

@@ -22,6 +22,7 @@ from er3a.programs.instructions import ArmMotion, JointTarget, Listing, PoseTarg
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.writing import WriteOptions
+from testing.arms import palletiser
 
 ROBOT = load_robot("er3a_c60")
 HOME = np.radians([0.0, -10.0, -10.0, 0.0, -70.0, 0.0])
@@ -774,3 +775,93 @@ def test_what_is_harmless_and_never_reached_is_not_named(tmp_path):
     assert "never_reached" not in codes(check(tmp_path, text))
     hidden = krl(f"PTP {axes(NEAR)}\nRETURN\nBAS(#VEL_PTP,10)\n$OUT[1]=TRUE\nWAIT SEC 1\n")
     assert "never_reached" not in codes(check(tmp_path, hidden, "a.src"))
+
+
+def test_a_line_of_a_coupled_arm_without_a_closed_form_is_named(tmp_path):
+    program = written(tmp_path, krl("LIN {A1 10,A2 -60,A3 60,A4 10}"), "a.src")
+    start = np.radians([0.0, -50, 50, 0])
+    found = check_program(program, palletiser(), CheckOptions(start=start, measures=False))
+    assert "line_not_checked" in codes(found)
+    assert found.level == "caution"
+
+
+XML = """<Xpl-source><XplEnvironment><VarDeclarations><VarGlobal>{declared}</VarGlobal></VarDeclarations><Pous><Pou>
+<Name>Main</Name><Type>Program</Type><Body>{body}</Body>{more}</Pou></Pous></XplEnvironment>{behind}</Xpl-source>"""
+JOINT = """<mjoint{as_}><target>{to}</target><speed>v20perc</speed><zone>fine</zone><tool>tool0</tool>{more}</mjoint>"""
+MOVE, HOME_POINT = JOINT.format(as_="", to="POINTJ(0,-10,-10,0,-70,0)", more=""), "(0,-10,-10,0,-70,0)"
+BELOW = f"<Pou><Name>1</Name><Body>{MOVE}</Body></Pou>"
+
+
+def of_xml(body=MOVE, more="", behind="", declared=""):
+    return XML.format(body=body, more=more, behind=behind, declared=declared)
+
+
+def with_part(part):
+    return of_xml(MOVE.replace("</mjoint>", part + "</mjoint>"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        of_xml(more=BELOW),  # a body that no loop names
+        of_xml(f"{MOVE}<while><cond>io.DIn[1]</cond><pouref>1</pouref></while>", BELOW + BELOW),
+        of_xml(f"{MOVE}<while><cond>io.DIn[1]</cond><pouref>1</pouref>{MOVE}</while>", BELOW),
+        of_xml(f"{MOVE}<for><var>i</var><from>1</from><to>2</to><step>2</step><pouref>1</pouref></for>", BELOW),
+        of_xml(more=MOVE),
+        of_xml(behind=f"<XplEnvironment>{BELOW}</XplEnvironment>"),
+        of_xml(f"{MOVE}MJOINT(POINTJ(0,0,0,0,0,0), v20perc, fine, tool0);"),
+        with_part("<offset>OFFSET(0,0,-300)</offset>"),
+        with_part("<target>POINTJ(0,0,0,0,0,0)</target>"),
+        with_part("relative"),
+        *(
+            of_xml(JOINT.format(as_=each, to="POINTJ" + HOME_POINT, more=""))
+            for each in (' disable="1"', ' rel="true"')
+        ),
+        of_xml().replace("<Body>", '<Body disable="true">'),
+        of_xml(f"{MOVE}<wait><condition>io.DIn[1]</condition><timeout>5</timeout><label>L</label></wait>"),
+        of_xml(f"{MOVE}<call><cond>x</cond><subroutine><name>Main</name></subroutine></call>"),
+        of_xml(declared="<Var><Name>p</Name><Type>POINTJ</Type><Retain>file.dat</Retain></Var>"),
+        of_xml(MOVE.replace("v20perc", "vmax")),
+        of_xml(MOVE.replace("tool0", "")),
+        of_xml(
+            JOINT.format(as_="", to="p", more=""),
+            declared=f"<Var><Name>p</Name><Type>POINTJ</Type><InitValue>{HOME_POINT[:-1]},99)</InitValue></Var>",
+        ),
+    ],
+)
+def test_what_is_not_read_of_the_controllers_xml_is_named(tmp_path, text):
+    assert not {"program_not_understood", "may_move"} & set(codes(check(tmp_path, of_xml(), "a.XPL")))
+    found = check(tmp_path, text, "a.XPL", frames={"tool0": np.eye(4)})
+    named = {"program_not_understood", "may_move", "speed_not_given", "frame_not_given", "target_not_given"}
+    assert {each.finding.code for each in found.findings if each.level in ("caution", "fail")} & named
+    assert found.level in ("caution", "fail")
+
+
+def test_what_is_switched_off_with_its_bodies_is_not_named(tmp_path):
+    loop = '<while disable="true"><cond>io.DIn[1]</cond><pouref>1</pouref></while>'
+    found = check(tmp_path, of_xml(MOVE + loop, BELOW), "a.XPL", frames={"tool0": np.eye(4)})
+    assert codes(found) == codes(check(tmp_path, of_xml(), "a.XPL", frames={"tool0": np.eye(4)}))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "io.MoveTo(near);",
+        "log.run(near);",
+        "sys.override := 500;",
+        "near.q2 := -80;\nMJOINT(near, v20perc, fine, tool0);",
+        "Near := home;\nMJOINT(near, v20perc, fine, tool0);",
+        "MJOINT(POINTJ(-7 MOD 3,-10,-10,0,-70,0), v20perc, fine, tool0);",
+        "MJOINT(POINTJ(\uff11,-10,-10,0,-70,0), v20perc, fine, tool0);",
+        "fidbus.rw[3] := 0;\nIF fidbus.rw[3] = 1 THEN home.j1 := 500; END_IF;",
+    ],
+)
+def test_what_no_source_tells_of_rpl_is_no_pass(tmp_path, line):
+    points = f"Routine Var POINTJ {{}} := {HOME_POINT};\n"
+    (tmp_path / "a.var").write_text(points.format("near") + points.format("home"), encoding="utf-8")
+    text = "{}\nMJOINT(home, v20perc, fine, tool0);\n"
+    plain, found = (check(tmp_path, text.format(each), "a.pgm", frames={"tool0": np.eye(4)}) for each in ("", line))
+    worse = {"program_not_understood", "may_move", "target_not_given", "above_limit"}
+    assert not worse & set(codes(plain))
+    assert worse & set(codes(found))
+    assert found.level in ("caution", "fail")

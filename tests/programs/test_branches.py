@@ -236,7 +236,8 @@ ELSE, ELSIF = "<else><pouref>2</pouref></else>", "<elsif><cond>io.DIn[2]</cond><
     ],
 )
 def test_an_if_of_the_controllers_xml_has_its_sides(inside, ways, tmp_path):
-    text = XPL.format(inside=inside, after="", pous=POU.format(n=1) + POU.format(n=2))
+    pous = "".join(POU.format(n=n) for n in (1, 2) if f"<pouref>{n}<" in inside)
+    text = XPL.format(inside=inside, after="", pous=pous)
     program = program_of(tmp_path, "IF.XPL", text)
     assert [each.code for each in program.findings] == ["program_form_inferred"]
     execution = execute(program)

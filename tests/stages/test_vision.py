@@ -11,6 +11,7 @@ from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.vision.compute import _figures, _verdict
 from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.study import load_study
 from testing.hand_eye_sets import pose
@@ -54,6 +55,18 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
         "box_far_off": "not graspable",
     }
     assert {each.refusal.code for each in summary.objects if each.refusal} == {"grasp_collides", "grasp_out_of_reach"}
+
+
+@pytest.mark.long
+def test_objects_within_the_margin_of_assumed_shapes_count_apart(folders):
+    summary = read_results(folders["er3a_c60"], VisionResults).results.summary
+    for near, clear in (((), 2), (("can",), 1), (("can", "box"), 0)):
+        verdict = _verdict(summary.calibration, summary.objects, near)
+        assert (verdict.finding.objects, verdict.finding.grasped, verdict.finding.assumed) == (2, clear, near)
+        assert f"{clear} of 2 objects can be grasped" in say(verdict.finding)
+        assert (f"{len(near)} more only if" in say(verdict.finding)) == bool(near)
+        figures = {each.name: each.value for each in _figures(summary.calibration, summary.objects, near)}
+        assert figures["objects_grasped"] == clear
 
 
 @pytest.mark.long

@@ -14,7 +14,8 @@ from er3a.pipeline.messages.vision import say
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import METHOD_NAMES, solved_by
 from er3a.vision.hand_eye import calibrate_hand_eye, position_axes
-from er3a.vision.likelihood import flange_to_camera, residuals
+from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
+from er3a.vision.setup_changes import moved_between
 from er3a.vision.vision_findings import (
     READINGS,
     AllSamplesEqual,
@@ -25,6 +26,7 @@ from er3a.vision.vision_findings import (
     HandEyeError,
     LittleMotion,
     MoreScatter,
+    MovedBetween,
     NoRotation,
     OtherDirection,
     OtherReading,
@@ -411,6 +413,60 @@ def with_poses_added(samples: CalibrationSet) -> CalibrationSet:
     return CalibrationSet(samples.setup, *both)
 
 
+STAYS = np.eye(4)
+
+
+def of_two_setups(setup: str, count: int, first: int, board=STAYS, camera=STAYS) -> CalibrationSet:
+    """Before sample ``first`` everything stands where it should, from there on board or camera is moved."""
+    random = np.random.default_rng(31)
+    flange = flange_poses(random, count)
+    both = np.concatenate([seen(setup, flange[:first]), seen(setup, flange[first:], X_TRUE @ camera, Y_TRUE @ board)])
+    return CalibrationSet(setup, flange, noisy(both, random))
+
+
+SLID, ELSEWHERE, TURNED = (
+    pose([0, 0, 0], [0.005, 0.002, 0]),
+    pose([5, 0, 20], [0.05, 0.02, 0]),
+    pose([0, 3, 0], [0] * 3),
+)
+
+
+@pytest.mark.parametrize(
+    ("setup", "last", "what", "step"),
+    [
+        ("eye_in_hand", 7, "board", SLID),
+        ("eye_to_hand", 3, "board", SLID),
+        ("eye_in_hand", 12, "board", ELSEWHERE),
+        ("eye_to_hand", 7, "board", ELSEWHERE),
+        ("eye_in_hand", 3, "camera", TURNED),
+        ("eye_to_hand", 12, "camera", TURNED),
+    ],
+)
+def test_a_set_of_two_setups_is_named_with_the_sample_between(setup, last, what, step):
+    found = calibrate_hand_eye(of_two_setups(setup, 18, 18 - last, **{what: step}))
+    (named,) = (each for each in found.warnings if isinstance(each, MovedBetween))
+    assert named.what == what
+    assert abs(int(named.sample) - (19 - last)) <= 1
+    truth = np.linalg.norm(step[:3, 3]) * 1000
+    assert named.moved_mm == pytest.approx(truth, rel=0.3, abs=3)
+
+
+def test_sound_sets_are_not_of_two_setups():
+    for samples in (a_set(setup, seed, 15) for setup in SETUPS for seed in range(40, 50)):
+        assert moved_between(samples, np.ones(15, bool), refine(PoseObservations.of(samples), X_TRUE, Y_TRUE)) is None
+
+
+@pytest.mark.parametrize(("setup", "apart"), [("eye_in_hand", 1e-4), ("eye_to_hand", 2e-5)])
+def test_samples_at_one_pose_count_as_one(setup, apart):
+    """Four near copies of each of six samples tell no more than the six: with errors that the copies share."""
+    few, random = a_set(setup, 2, 6), np.random.default_rng(5)
+    flange, target = (noisy(np.repeat(T, 4, axis=0), random, apart, apart) for T in (few.flange, few.target))
+    alone, copied = calibrate_hand_eye(few), calibrate_hand_eye(CalibrationSet(setup, flange, target))
+    assert [each.samples for each in copied.warnings if isinstance(each, FewSamples)] == [6]
+    assert (copied.half_width > 0.5 * alone.half_width).all()
+    assert np.abs(off(copied.X, alone.X)).max() < 1e-3
+
+
 def scaled(samples: CalibrationSet, factor: float) -> CalibrationSet:
     """The set with a board this many times as large."""
     samples.target[:, :3, 3] *= factor
@@ -443,6 +499,10 @@ MENDED = {
         lambda samples, found: scaled(samples, found.factor),
     ),
     "few_samples": (lambda: a_set("eye_in_hand", 3, 5), lambda samples, _: with_poses_added(samples)),
+    "moved_between": (
+        lambda: of_two_setups("eye_in_hand", 24, 14, pose([0, 0, 0], [0.005, 0.002, 0])),
+        lambda samples, found: samples.take(np.arange(samples.names.index(found.sample))),
+    ),
     "too_few_samples": (lambda: a_set("eye_in_hand", 3, 2), lambda samples, _: with_poses_added(samples)),
     "little_motion": (lambda: moving(SMALL), lambda samples, _: with_poses_added(samples)),
     "no_rotation": (lambda: moving(STILL), lambda samples, _: with_poses_added(samples)),

@@ -43,7 +43,12 @@ def lines_of(found: Calibration) -> str:
     )
     lines = [
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
-        f"these measurements settle {len(found.estimates)} of {len(found.estimates) + len(found.held)} numbers",
+        f"these measurements settle {len(found.estimates) - len(found.open)} of "
+        f"{len(found.estimates) + len(found.held)} numbers",
+        *(
+            [f"not settled, by intervals wider than an arm's table may be off: {', '.join(found.open)}"]
+            * bool(found.open)
+        ),
         f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "
         + scatter,
         *_entry_lines(found.estimates),

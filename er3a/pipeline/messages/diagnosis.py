@@ -8,6 +8,7 @@ from er3a.calibration.outcomes import (
     Misfit,
     MorePositions,
     MoreTouches,
+    NoCorrectionFound,
     NotToldApart,
 )
 from er3a.diagnosis.conclusions import (
@@ -177,6 +178,9 @@ TEXTS = texts(
             "The positions indicate no correction: the 95 % interval contains 0.",
             "The positions indicate no correction: all {count} 95 % intervals contain 0.",
         ),
+        "no_correction_found#open": (
+            "The positions settle nothing of {open:, }: their 95 % intervals are wider than an arm's table may be off."
+        ),
         "not_told_apart#parallel": "{entries} can't be identified separately: axes {first} and {second} are parallel",
         "not_told_apart": "{entries} can't be identified separately",
         "more_positions#known": Plural(
@@ -233,6 +237,13 @@ def fitted(found: WrongAlpha | WrongOffset | WrongLimit | WrongLength) -> str:
         return "0"
     text = next((text for d in (4, 5, 6) if (text := as_text(fits, f".{d}g")) != as_text(given, f".{d}g")), "")
     return text or as_text(fits, ".7g")
+
+
+@say.register
+def _(found: NoCorrectionFound) -> str:
+    return joined(
+        ["" if len(found.open) == found.intervals else say_as(found), say_as(found, "open") if found.open else ""], " "
+    )
 
 
 @say.register

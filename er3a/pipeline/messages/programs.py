@@ -9,7 +9,7 @@ from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
-from er3a.kinematics.singularity import EventType
+from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.language import N_, tr
@@ -109,13 +109,10 @@ REMEDIES: dict[str, str] = {
     ),
     "load_above_payload": N_("Carry less, or correct the load if it is wrong."),
 }
-SINGULAR: dict[EventType, str] = {
+SINGULAR: dict[SingularityType, str] = {
     "wrist": N_("Tilt the tool so that J5 stays away from 0."),
     "elbow": N_("Keep the path nearer to the arm, so that it is not stretched."),
     "shoulder": N_("Keep the wrist at a distance from axis 1."),
-    "dependent_axes": N_(
-        "End the line before that point, and go on by a joint move, which singular poses do not disturb."
-    ),
 }
 STOPPED: dict[EndKind, str] = {
     "drifts": N_(
@@ -253,6 +250,7 @@ TEXTS = texts(
         ),
         "speed_not_given": "the program gives no speed; {assumed:g} m/s were assumed for the duration",
         "speed_not_given.share": "the program gives no speed; {percent:g} % were assumed for the duration",
+        "speed_not_given.word": "the speed '{word}' is not known; {assumed} was assumed for duration and joint speeds",
         "rest_not_checked.targets": (
             "only the first {checked} motions that are carried out were checked; of those from here on {targets} "
             "targets, for reach and limits, but not the motions between them"
@@ -457,6 +455,9 @@ def _(found: found_in.ArcGoesOn) -> str:
 
 @say.register
 def _(found: found_in.SpeedNotGiven) -> str:
+    if found.word:
+        assumed = f"{100 * found.assumed:g} %" if found.unit == "share" else f"{found.assumed:g} m/s"
+        return sentence("speed_not_given.word", word=found.word, assumed=assumed)
     if found.unit == "share":
         return sentence("speed_not_given.share", percent=found.assumed * 100)
     return say_as(found)

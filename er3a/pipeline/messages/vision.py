@@ -135,6 +135,11 @@ TEXTS = texts(
         "grasp_counts#grasped": Plural(
             "count", "{grasped} of {count} object can be grasped", "{grasped} of {count} objects can be grasped"
         ),
+        "grasp_counts#assumed": Plural(
+            "count",
+            "{count} more only if shapes that no document gives are right ({assumed:, })",
+            "{count} more only if shapes that no document gives are right ({assumed:, })",
+        ),
         "grasp_counts#error": "at the worst grasp 95 % of errors stay below {point_mm:.2g} mm",
         "grasp_counts#simulated": "The camera is simulated: no real one took the samples.",
         "grasp_counts#left_out": "calibrated without {left_out:, }",
@@ -181,9 +186,16 @@ TEXTS = texts(
             "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
             "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated"
         ),
+        "moved_between": by(
+            "what",
+            camera="from {sample} on the camera stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one "
+            "of the two parts of the set alone, or take the samples again",
+            board="from {sample} on the board stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one of "
+            "the two parts of the set alone, or take the samples again",
+        ),
         "few_samples": (
-            "only {samples} samples: a wrong one can't be found among so few, and the intervals rest on little; add "
-            "poses, ten or more are advised"
+            "samples at only {samples} poses: a wrong one can't be found among so few, and the intervals rest on "
+            "little; add poses, ten or more are advised"
         ),
         "too_few_samples": "{samples} samples; {needed} are needed, and ten or more advised",
         "all_samples_equal": by(
@@ -256,9 +268,11 @@ def _(found: DirectionContradicted) -> str:
 def _(found: GraspCounts) -> str:
     grasped = say_as(found, "grasped", count=found.objects)
     error = say_as(found, "error") if found.point_mm is not None else ""
+    assumed = say_as(found, "assumed", count=len(found.assumed)) if found.assumed else ""
     left = say_as(found, "left_out") if found.left_out else ""
     sentences = [
         grasped if found.objects else "",
+        assumed,
         error,
         *listed(found.missed),
         left,

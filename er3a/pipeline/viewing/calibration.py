@@ -150,7 +150,7 @@ def _texts(found: Calibration) -> list[str]:
     texts = [
         tr(
             "{settled} of {all} numbers are settled by {coordinates} coordinates at {poses} poses.",
-            settled=len(found.estimates),
+            settled=len(found.estimates) - len(found.open),
             all=len(found.estimates) + len(found.held),
             coordinates=found.coordinates,
             poses=found.poses,

@@ -11,13 +11,13 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
-from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, OUTER, POSITION
+from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, LIBRARY_NAMES, OUTER, POSITION
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
 ZONE = re.compile(r"z(\d+(?:\.\d+)?)$", re.IGNORECASE)
 NO_BASE = "wobj0"
 ROOTS: dict[str, Callable[[float], float]] = {"ABS": abs, "SQRT": math.sqrt}
-LIBRARIES = ("tcpip.", "io.", "fidbus.", "str.", "log.")
+SOCKETS = frozenset(f"tcpip.sock{what}" for what in ("open", "send", "recv", "close"))
 
 
 class RplDialect(Dialect):
@@ -29,6 +29,10 @@ class RplDialect(Dialect):
     def is_signal(self, name: str) -> bool:
         """Outputs, and what goes to the field bus."""
         return name.startswith(("io.", "fidbus."))
+
+    def reads_back(self, name: str) -> bool:
+        """Outputs; the other side of the bus, or of an input, has a say in what stands there."""
+        return name.startswith(("io.DOut", "io.AOut"))
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """Points, OFFSET, roots; no source tells in which unit angles of the others are."""
@@ -60,20 +64,24 @@ class RplDialect(Dialect):
             move.form,
             speed=_speed(_word(memory, given[1])),
             zone=_zone(_word(memory, given[2])),
-            tool=_frame(memory, tool, frames.get(tool)),
+            tool=_frame(memory, tool or "no tool", frames.get(tool)),
             base=_frame(memory, base or NO_BASE, base_pose),
         )
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
-        """Functions of libraries move nothing; others are unknown."""
+        """Functions that are known to move nothing; others are unknown."""
         call = doing.what
         assert isinstance(call, syntax.Invocation)
         return instructions.Aside(doing.text) if self.harmless(call) else instructions.Unknown(doing.text)
 
     def harmless(self, call: syntax.Invocation) -> bool:
-        """Functions of the controller's libraries for signals, texts and sockets, and those that are evaluated."""
+        """Functions of sockets, and those that are evaluated."""
         name = call.function
-        return name.startswith(LIBRARIES) or name in FIELDS or name == "OFFSET" or name.upper() in IN_DEGREES
+        return name in SOCKETS or name in FIELDS or name == "OFFSET" or name.upper() in IN_DEGREES
+
+    def is_followed(self, name: str, value: syntax.Value) -> bool:
+        """Variables of the controller may set anything, such as the override."""
+        return name.partition(".")[0] not in LIBRARY_NAMES
 
 
 def _word(memory: ProgramMemory, expression: syntax.Expression | None) -> str:
@@ -91,7 +99,7 @@ def _frame(memory: ProgramMemory, name: str, pose: Reals | None) -> instructions
 def _speed(word: str) -> instructions.Rate | None:
     match = SPEED.match(word)
     if match is None:
-        return None
+        return instructions.Rate(0.0, "m/s", word) if word else None
     value = float(match[1])
     return instructions.Rate(value / 100, "share", word) if match[2] else instructions.Rate(value / 1000, "m/s", word)
 
@@ -134,6 +142,8 @@ def _target(value: syntax.Value, text: str) -> instructions.Target:
         finite_word = value.text.upper().lstrip("+-") not in ("NAN", "INF")
         return instructions.UnresolvedTarget(value.text, "undefined" if finite_word else "not_finite")
     if not isinstance(value, syntax.Record):
+        return instructions.UnresolvedTarget(text, "not_understood")
+    if not {key for key, _ in value.items} <= set(FIELDS.get(value.kind, ())):
         return instructions.UnresolvedTarget(text, "not_understood")
     keys = JOINTS if value.kind in ("POINTJ", "EPOINTJ") else POSITION
     parts = [value.get(key) for key in keys]

@@ -6,12 +6,12 @@ Statements that are not understood are kept; blocks, comments and texts without 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked
+from er3a.programs.code_builder import CodeBuilder, fault, lacks_data, linked, variable_of
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 from er3a.programs.program_findings import DataFileMissing, NameTwice, NotUnderstood, ProgramFinding
@@ -49,7 +49,7 @@ FIELDS = {
 PLAIN = re.compile(
     r"(MJOINT|MLIN)\s*\(\s*(POINT[JC]\s*\([^()]*\))\s*,\s*(\w+)\s*,\s*(\w+)\s*,\s*(\w+)\s*(?:,\s*(\w+)\s*)?\)$"
 )
-POINT = re.compile(r'\s*(POINT[JC])\s*\(([-+.,\deE\s]*)(?:,\s*"(\w+)"((?:\s*,\s*[-+]?\d+)*)\s*)?\)\s*$')
+POINT = re.compile(r'\s*(POINT[JC])\s*\(([-+.,0-9eE\s]*)(?:,\s*"(\w+)"((?:\s*,\s*[-+]?\d+)*)\s*)?\)\s*$')
 WORD = re.compile(r"[^\W\d]\w*$")
 
 
@@ -85,14 +85,7 @@ def expression(text: str) -> syntax.Expression:
 
 def initial(text: str, kind: str) -> syntax.Expression:
     """A first value: a number, or ``(x,y,z,a,b,c,2,0,0,-1)`` of a position's type."""
-    if kind not in FIELDS or not text.startswith("("):
-        return expression(text)
-    parts = text.strip("() ").split(",")
-    try:
-        numbers = [float(part) for part in parts]
-    except ValueError:
-        return syntax.Opaque(text)
-    return syntax.Constant(syntax.Record(kind, tuple(zip(FIELDS[kind], numbers))))
+    return expression(kind + text if kind in FIELDS and text.startswith("(") else text)
 
 
 def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
@@ -185,10 +178,19 @@ def read_rpl(source: ProgramText) -> syntax.Program:
     if data_file_of(source.path, ".var") is None and lacks_data([routine], data, LIBRARY_NAMES):
         findings.append(DataFileMissing(source.path.with_suffix(".var").name))
     by_name, more = linked([routine])
-    findings = [*source.findings, *findings, *more]
+    findings = [*source.findings, *findings, *more, *alike([routine], data)]
     return syntax.Program(
         "rpl", source.path.stem, source.path, by_name, MAIN, tuple(data), tuple(findings), source.lines
     )
+
+
+def alike(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> Iterator[NotUnderstood]:
+    """Variables whose names differ by capital letters alone: no source tells whether they are one."""
+    first: dict[str, str] = {}
+    for each in (*data, *(operation for routine in routines for operation in routine.code)):
+        name = variable_of(each.target) if isinstance(each, syntax.Assign) else ""
+        if first.setdefault(name.upper(), name) != name:
+            yield NotUnderstood(f"{first[name.upper()]}, {name}", each.place)
 
 
 def _variables(source: ProgramText) -> tuple[list[syntax.Assign], list[ProgramFinding]]:

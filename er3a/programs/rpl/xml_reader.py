@@ -16,14 +16,14 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import FormInferred
-from er3a.programs.rpl.reader import expression, initial
+from er3a.programs.program_findings import FormInferred, NotUnderstood
+from er3a.programs.rpl.reader import WORD, alike, expression, initial
 
 DEEPEST_ELEMENT = 100
 DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class XmlNode:
     """An element."""
 
@@ -32,6 +32,8 @@ class XmlNode:
     attributes: dict[str, str]
     children: list[XmlNode] = field(default_factory=list)
     parts: list[str] = field(default_factory=list)
+    passed: bool = False  # whether it was read
+    asked: bool = False  # whether its attributes were
 
     @property
     def text(self) -> str:
@@ -40,7 +42,10 @@ class XmlNode:
 
     def child(self, tag: str) -> XmlNode | None:
         """The first child of a tag."""
-        return next((each for each in self.children if each.tag == tag), None)
+        found = next((each for each in self.children if each.tag == tag), None)
+        if found is not None:
+            found.passed = True
+        return found
 
     def text_of(self, tag: str) -> str:
         """The text of the first child of a tag; empty if there is none."""
@@ -49,7 +54,30 @@ class XmlNode:
 
     def all(self, tag: str) -> list[XmlNode]:
         """The children of a tag."""
-        return [each for each in self.children if each.tag == tag]
+        found = [each for each in self.children if each.tag == tag]
+        for each in found:
+            each.passed = True
+        return found
+
+    def below(self) -> Iterator[XmlNode]:
+        """All elements within it."""
+        for each in self.children:
+            yield each
+            yield from each.below()
+
+    def pass_over(self) -> None:
+        """Nothing of it needs to be read."""
+        for each in (self, *self.below()):
+            each.passed = each.asked = True
+
+    def unread(self) -> Iterator[XmlNode]:
+        """What was not read of it: elements, and those with attributes that nothing asked for, itself too."""
+        stray = self.children and self.text
+        if not self.passed or ((self.attributes or stray) and not self.asked):
+            yield self
+        else:
+            for each in self.children:
+                yield from each.unread()
 
 
 def read_xml(source: ProgramText) -> XmlNode:
@@ -100,6 +128,7 @@ def _no_xml(path: Path, error: expat.ExpatError) -> InputError:
 
 
 TOP = "Xpl-source"
+HEAD = ("Info", "Title", "Description", "Version", "Author")
 MOST_LOOPS = 50
 OTHER_SIDES = ("elsif", "elseif", "else")
 MOTION_PARTS = ("target", "speed", "zone", "tool", "refsys")
@@ -121,20 +150,38 @@ def read_xpl(source: ProgramText) -> syntax.Program:
     if top.tag != TOP or environment is None:
         problem = f"the top element is <{top.tag}>" if top.tag != TOP else "holds no <XplEnvironment>"
         raise InputError(source.path, f"line {top.line}", problem, f"An .XPL file has <{TOP}> with <XplEnvironment>")
+    top.passed = True
+    for each in (*top.all("HostEnvironment"), *(part for tag in HEAD for part in environment.all(tag))):
+        each.pass_over()
     pous = [each for group in environment.all("Pous") for each in group.all("Pou")]
     if not pous:
         raise InputError(source.path, f"line {environment.line}", "holds no <Pou>", "Give a program with its Main")
     readers = [_Pou(source, pou) for pou in pous]
     routines = [reader.routine() for reader in readers]
     by_name, findings = linked(routines)
-    entry = next((pou for pou in pous if pou.text_of("Type") == "Program"), pous[0])
+    entry = next((pou for pou in pous if pou.text_of("Type").upper() == "PROGRAM"), pous[0])
+    declarations = [each for group in environment.all("VarDeclarations") for each in group.children]
     data = tuple(
         _declared(source, var, local=False)
+        for tag in {each.tag: None for each in declarations}
         for group in environment.all("VarDeclarations")
-        for kind in group.children
+        for kind in group.all(tag)
         for var in kind.all("Var")
     )
-    found = (*source.findings, *findings, *(each for reader in readers for each in reader.inferred))
+    for each in (part for reader in readers for part in reader.whole):
+        each.pass_over()
+    unread = (
+        NotUnderstood(text_of(each), Place(source.path, each.line, f"<{each.tag}>"))
+        for each in top.unread()
+        if each.attributes or any(part.text for part in (each, *each.below()))
+    )
+    found = (
+        *source.findings,
+        *findings,
+        *(each for reader in readers for each in reader.inferred),
+        *unread,
+        *alike(routines, data),
+    )
     return syntax.Program(
         "xpl", source.path.stem, source.path, by_name, entry.text_of("Name"), data, found, source.lines
     )
@@ -142,6 +189,8 @@ def read_xpl(source: ProgramText) -> syntax.Program:
 
 def _declared(source: ProgramText, var: XmlNode, local: bool) -> syntax.Assign:
     kind, name, first = var.text_of("Type"), var.text_of("Name"), var.text_of("InitValue")
+    for tag in ("Comment", "Array"):
+        var.child(tag)
     place = Place(source.path, var.line, f"Var {name}")
     value = initial(first, kind) if first else None
     return syntax.Assign(place, syntax.Variable(name), value, f"{kind} {name} := {first}", kind, local)
@@ -155,6 +204,7 @@ class _Pou:
         self.name = pou.text_of("Name")
         self.place = Place(source.path, pou.line, self.name)
         self.inferred: list[FormInferred] = []
+        self.whole: list[XmlNode] = []  # what is named as a whole, or left out
 
     def routine(self) -> syntax.Routine:
         interface = [
@@ -163,8 +213,12 @@ class _Pou:
             for kind in group.all("VarInterface")
             for var in kind.all("Var")
         ]
+        for var in interface:
+            for tag in ("Type", "Comment", "Array"):
+                var.child(tag)
         parameters = tuple(
-            syntax.RoutineParameter(var.text_of("Name"), var.text_of("Attrib") not in ("In", "")) for var in interface
+            syntax.RoutineParameter(var.text_of("Name"), var.text_of("Attrib").upper() not in ("IN", ""))
+            for var in interface
         )
         builder = CodeBuilder(self.name, parameters, self.place)
         for group in self.pou.all("VarDeclarations"):
@@ -176,12 +230,19 @@ class _Pou:
 
     def _body(self, builder: CodeBuilder, pou: XmlNode, path: str, within: tuple[XmlNode, ...]) -> None:
         counts: dict[str, int] = {}
+        for tag in ("Name", "Type"):
+            pou.child(tag)
         for body in pou.all("Body"):
             for element, sides in _with_sides(body.children):
                 counts[element.tag] = counts.get(element.tag, 0) + 1
                 place = Place(self.source.path, element.line, f"{path}/{element.tag}[{counts[element.tag]}]")
-                if element.attributes.get("disable", "").lower() == "true":
+                element.passed, switch = True, element.attributes.get("disable", "false").lower()
+                element.asked = element.attributes.keys() == {"disable"} and switch in ("true", "false")
+                first, known = len(builder.code), True
+                disabled = element.asked and switch == "true"
+                if disabled:
                     builder.add(syntax.Fixed(place, Disabled(text_of(element))))
+                    self._leave_out(element, (*within, pou))
                 elif element.tag in ("while", "for"):
                     self._loop(builder, element, place, (*within, pou))
                 elif sides:
@@ -189,7 +250,22 @@ class _Pou:
                 elif element.child("pouref") is not None:
                     self._unknown_block(builder, element, place, (*within, pou))
                 else:
-                    _element(builder, element, place)
+                    known = _element(builder, element, place)
+                    if known and any(element.unread()):
+                        del builder.code[first:]
+                if not known:
+                    self.whole.append(element)
+                elif (unread := next(element.unread(), None)) is not None and not disabled:
+                    self.whole.append(element)
+                    builder.unknown(place, f"{text_of(element)} <{unread.tag}> {' '.join(_texts(unread))}")
+
+    def _leave_out(self, element: XmlNode, within: tuple[XmlNode, ...]) -> None:
+        """Nothing of an element is to be read, nor of the bodies that it names."""
+        self.whole.append(element)
+        for name in [each.text for each in element.below() if each.tag == "pouref"]:
+            body = self._named(name, within)
+            if body is not None and body not in self.whole:
+                self._leave_out(body, (*within, body))
 
     def _loop(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
         name = element.text_of("pouref")
@@ -204,7 +280,9 @@ class _Pou:
         else:
             first, last = (expression(element.text_of(tag)) for tag in ("from", "to"))
             step = expression(element.text_of("by")) if element.child("by") is not None else None
-            builder.open_for(place, element.text_of("var"), first, last, step, source)
+            if not WORD.match(counter := element.text_of("var")):
+                raise fault(place, f"'{counter}' is no variable that a loop could count", "Name a variable in <var>")
+            builder.open_for(place, counter, first, last, step, source)
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
 
@@ -227,7 +305,8 @@ class _Pou:
     def _unknown_block(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
         """An element that is not understood and has bodies: each may be carried out, or not."""
         source = text_of(element)
-        builder.unknown(place, source, may_move=False)
+        builder.unknown(place, source, may_move=any(each.children for each in element.children))
+        self.whole.append(element)
         for name in (each.text for each in element.all("pouref")):
             body = self._named(name, within)
             if body is None or body in within or len(within) > MOST_LOOPS:
@@ -238,11 +317,11 @@ class _Pou:
 
     def _named(self, name: str, within: tuple[XmlNode, ...]) -> XmlNode | None:
         """The body of a loop: the nearest around that has this name."""
-        for pou in reversed(within):
-            for each in pou.all("Pou"):
-                if each.text_of("Name") == name:
-                    return each
-        return next((each for each in _below(self.pou) if each.text_of("Name") == name), None)
+        places = (*(each for pou in reversed(within) for each in pou.children), *self.pou.below())
+        found = next((each for each in places if each.tag == "Pou" and each.text_of("Name") == name), None)
+        if found is not None:
+            found.passed = True
+        return found
 
 
 def _with_sides(elements: list[XmlNode]) -> Iterator[tuple[XmlNode, list[tuple[str, str]]]]:
@@ -270,6 +349,8 @@ def _sides(element: XmlNode, more: list[XmlNode]) -> list[tuple[str, str]]:
         known = all(each.tag in ("cond", "condition", "pouref", *OTHER_SIDES) for each in part.children)
         if part.tag == "else":
             conditions = ["", *conditions]
+        part.passed = True
+        known &= part is element or not part.attributes
         if not known or len(conditions) != 1 or not 1 <= len(bodies) <= 1 + (part is element and not others):
             return []
         found.append((conditions[0], bodies[0]))
@@ -277,14 +358,8 @@ def _sides(element: XmlNode, more: list[XmlNode]) -> list[tuple[str, str]]:
     return found if all(condition for condition, _ in found[:-1]) else []
 
 
-def _below(pou: XmlNode) -> Iterator[XmlNode]:
-    for each in pou.all("Pou"):
-        yield each
-        yield from _below(each)
-
-
-def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
-    """An element that is no loop."""
+def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> bool:
+    """An element that is no loop; False if it is not understood."""
     source = text_of(element)
     if element.tag in ("mjoint", "mlin"):
         parts = [element.child(tag) for tag in MOTION_PARTS]
@@ -296,22 +371,28 @@ def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
     elif element.tag == "wait":
         condition = element.text_of("condition")
         builder.add(syntax.Waiting(place, "condition", expression(condition), condition))
-        if (timeout_flag := element.text_of("var")) and element.text_of("timeout"):  # whether it came in time
-            builder.add(syntax.Assign(place, expression(timeout_flag), syntax.Opaque(source), source))
+        element.child("timeout")
+        if flag := element.text_of("var"):  # whether it came in time
+            builder.add(syntax.Assign(place, expression(flag), syntax.Opaque(source), source))
     elif element.tag == "end_pro":
         builder.add(syntax.Halt(place))
     elif element.tag == "dwell":
         builder.add(syntax.Waiting(place, "seconds", expression(element.text_of("expr")), source))
     elif element.tag == "rem":
         builder.remark(place, element.text_of("text"))
+        element.pass_over()
     elif element.tag == "call" and (routine := element.child("subroutine")) is not None:
         name = routine.text_of("name")
-        given_arguments: tuple[syntax.Expression, ...] = ()
-        for arguments in routine.all("args"):
-            given_arguments = tuple(expression(each.text) for each in arguments.all("arg") if each.text)
+        arguments = routine.child("args")
+        texts = [] if arguments is None else [each.text for each in arguments.all("arg")]
+        while texts and not texts[-1]:
+            texts.pop()
+        given_arguments = tuple(expression(each) if each else None for each in texts)
         builder.add(syntax.Doing(place, syntax.Invocation(name, given_arguments), source))
     else:
         builder.unknown(place, source)
+        return False
+    return True
 
 
 def text_of(element: XmlNode) -> str:

@@ -361,11 +361,13 @@ def compute(study: Study, name: str) -> model.VisionResults:
         limits = (limits_of(robot, motions), study.seed)
         planned = _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(entry, places[entry.name], plan, error) for entry, plan, error in planned)
-    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects)
+    shapes = _shapes(robot, objects, motions)
+    near = shapes.near if shapes else ()
+    judged = Verdict[Found]("fail", doubt) if doubt else _verdict(calibration, objects, near)
     bodies = bodies_of(robot, scene)
     summary = model.VisionSummary(
-        verdict=judged.without(bodies.unexamined).resting_on(_shapes(robot, objects, motions)),
-        figures=_figures(calibration, objects),
+        verdict=judged.without(bodies.unexamined).resting_on(shapes),
+        figures=_figures(calibration, objects, near),
         title=task_file.title,
         scene=title,
         least_success=settings.least_success,
@@ -548,7 +550,10 @@ def _grasp(chosen: ChosenGrasp) -> model.GraspResult:
     )
 
 
-def _verdict(calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...]) -> Verdict[Found]:
+def _verdict(
+    calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
+) -> Verdict[Found]:
+    """``near``: objects whose grasps come within the margin of assumed shapes, which are not counted as grasped."""
     if unmet := unmet_expectations(objects):
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
@@ -556,19 +561,21 @@ def _verdict(calibration: model.CalibrationResult, objects: tuple[model.ObjectRe
     left_out = (*calibration.left_out, *(each.sample for each in calibration.boardless))
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
-    counts = model.GraspCounts(
-        len(asked), len(asked) - len(missed), missed, left_out, worst, shown, calibration.simulated
-    )
+    assumed = tuple(each.name for each in asked if each.name in near)
+    sound = len(asked) - len(missed) - len(assumed)
+    counts = model.GraspCounts(len(asked), sound, missed, left_out, worst, shown, calibration.simulated, assumed)
     if asked and len(missed) == len(asked):
         return Verdict("fail", counts)
     return Verdict("caution" if missed or calibration.warnings else "pass", counts)
 
 
-def _figures(calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...]) -> tuple[Figure, ...]:
+def _figures(
+    calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
+) -> tuple[Figure, ...]:
     asked = [each for each in objects if each.expect in (None, "grasped")]
     least = min((each.grasp.probability for each in asked if each.grasp), default=None)
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
-    grasped = sum(each.grasp is not None for each in asked)
+    grasped = sum(each.grasp is not None and each.name not in near for each in asked)
     return (
         Figure("samples_used", calibration.used, "", of=calibration.samples),
         Figure("position_half_width", max(calibration.hand_eye.half_width_mm), "mm"),

@@ -79,7 +79,8 @@ class GraspCounts:
 
     Attributes
     ----------
-    objects, grasped : of those that are asked for
+    objects, grasped : of those that are asked for, and that can be grasped at all distances that are required
+    assumed : those that are clear by less than the margin of assumed shapes, and so not settled
     left_out : samples that the calibration does not rest on
     point_mm : 95 % of errors at the worst grasp stay below; None where nothing is grasped
     simulated : whether no camera took the samples
@@ -92,6 +93,7 @@ class GraspCounts:
     point_mm: float | None
     demonstrations: tuple[Demonstration, ...]
     simulated: bool
+    assumed: tuple[str, ...] = ()
     code: Literal["grasp_counts"] = "grasp_counts"
 
 
