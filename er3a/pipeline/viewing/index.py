@@ -598,7 +598,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "can": what_it_can_do(by_status),
         "answers": [*_answers(heads, robot)],
         "runs": [
-            _run(stage, stored[stage].results, heads.get("workspace"))
+            _run(stage, stored[stage].results, box=_puts_box(heads))
             for stage in RUNS
             if stage in stored and heads[stage].status != "not_computed"
         ],
@@ -656,10 +656,9 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
         box = box_text(workspace)
         if box and any(each.subject == "tool" for each in workspace.not_examined):
             box = joined([box, tr("The tool point is the flange's centre: no tool is given.")], " ")
-        if box and {*RUNS} & heads.keys():
-            box = joined(
-                [box, tr("Paths and programs are checked without it: add it to the scene, and run again.")], " "
-            )
+        if _puts_box(heads) and {*RUNS} & heads.keys():
+            said = tr("Paths and programs are checked without box and stand: add both to the scene, and run again.")
+            box = joined([box, said], " ")
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
@@ -668,10 +667,16 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
         yield tr("Void"), void_text(workspace), f"workspace.html{place}"
 
 
-def _run(stage: str, results: TrajectoryResults | ProgramsResults, workspace: Head | None) -> dict[str, Any]:
+def _puts_box(heads: Mapping[str, Head]) -> bool:
+    """Whether a place for the study's box is named, of which paths and programs know nothing."""
+    placement = getattr(heads["workspace"].summary, "placement", None) if "workspace" in heads else None
+    return bool(getattr(placement, "named_places", ()))
+
+
+def _run(stage: str, results: TrajectoryResults | ProgramsResults, *, box: bool) -> dict[str, Any]:
     """How many paths or programs there are, which may be run as they are, and why the others may not.
 
-    ``workspace``: where a box is put that they know nothing of.
+    ``box``: whether one is to be put into the cell, which they know nothing of.
     """
     followed: Sequence[ProgramSummary | PathSummary]
     if isinstance(results, ProgramsResults):
@@ -680,10 +685,8 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults, workspace: He
         followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
     faulty = {fault.name for fault in faults}
     sound = [each.name for each in followed if each.name not in faulty]
-    box = [tr("the tray or box")] if workspace and box_text(workspace.summary) else []
-    open_ = joined(
-        [*(left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS), *box]
-    )
+    left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
+    open_ = joined([*left_out, tr("the tray or box and its stand") if box else ""])
     return {
         "stage": stage,
         "count": len(followed) + lost,
