@@ -152,8 +152,8 @@ TEXTS = texts(
         "payload.bounded": "At most {kg:.3g} kg on the paths that may be run, by torques on {path}.",
         "payload.partly": "Not counted, because not known: {what}.",
         "payload.unknown": "None may be assumed. To know it, ask the manufacturer for: {what}.",
-        "payload.not_examined": "Whether the motors carry a load was not examined.",
-        "payload.rated": "Its file gives a rated payload of {kg:.3g} kg.",
+        "payload.not_examined": "None may be assumed: whether the motors carry a load was not examined.",
+        "payload.rated": "Its file gives a rated payload of {kg:.3g} kg, which nothing here confirms.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why})",
     }
 )
@@ -168,7 +168,7 @@ def payload_text(summary: Summary | None, robot: Robot) -> str:
     bounds = [
         (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
     ]
-    wanted = ("masses", "peak", "rated")
+    wanted = ("payload", "masses", "peak", "rated")
     missing = [say(each) for each in getattr(summary, "unknown", ()) if each.what in wanted]
     if bounds:
         value, path = min(bounds, key=lambda bound: bound[0])

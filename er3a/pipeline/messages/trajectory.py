@@ -130,6 +130,7 @@ TEXTS = texts(
             "The last point computed before anything is wrong is at t = {t:.4g} s, the tool at x, y, z = {xyz} mm: end "
             "it there, or move the path"
         ),
+        "advice.no_part": "No part of it may be run as it is.",
         "advice.end": "End it there, with the tool at x, y, z = {xyz} mm.",
         "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
         "advice.end#assumed": (

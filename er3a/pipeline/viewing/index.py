@@ -598,7 +598,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "can": what_it_can_do(by_status),
         "answers": [*_answers(heads, robot)],
         "runs": [
-            _run(stage, stored[stage].results)
+            _run(stage, stored[stage].results, box=_puts_box(heads))
             for stage in RUNS
             if stage in stored and heads[stage].status != "not_computed"
         ],
@@ -625,11 +625,14 @@ def _proposed(finding: object) -> dict[str, str]:
     if not isinstance(finding, LeftOpen) or finding.next_measurement is None:
         return {}
     proposal, entry = finding.next_measurement, finding.next_measurement.entry
-    seen = N_("If so, {entry} is right; if not, its sign is wrong.")
+    seen = N_("If so, {entry} is right; if not, turn its sign in the robot's file, and run again.")
     settles = seen if proposal.code == "look_at_motion" else N_("It settles {entry}.")
     step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]))]
-    if others := len({*finding.unbounded} - {entry}):
-        step.append(tr("Other entries that rest on one source, each with its own check: {others}.", others=others))
+    joints = [part for part in finding.parts if part.part in ("limits", "speeds")]
+    left = {*finding.unbounded, *(name for part in finding.parts if part not in joints for name in part.open)} - {entry}
+    if left:
+        step.append(tr("Then these, each with its own check: {entries}.", entries=shortened(sorted(left))))
+    step += [page.whole_sentence(say(part)) for part in joints if part.settled < part.entries]
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
@@ -653,6 +656,9 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
         box = box_text(workspace)
         if box and any(each.subject == "tool" for each in workspace.not_examined):
             box = joined([box, tr("The tool point is the flange's centre: no tool is given.")], " ")
+        if _puts_box(heads) and {*RUNS} & heads.keys():
+            said = tr("Paths and programs are checked without box and stand: add both to the scene, and run again.")
+            box = joined([box, said], " ")
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
@@ -661,8 +667,17 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
         yield tr("Void"), void_text(workspace), f"workspace.html{place}"
 
 
-def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
-    """How many paths or programs there are, which may be run as they are, and why the others may not."""
+def _puts_box(heads: Mapping[str, Head]) -> bool:
+    """Whether a place for the study's box is named, of which paths and programs know nothing."""
+    placement = getattr(heads["workspace"].summary, "placement", None) if "workspace" in heads else None
+    return bool(getattr(placement, "named_places", ()))
+
+
+def _run(stage: str, results: TrajectoryResults | ProgramsResults, *, box: bool) -> dict[str, Any]:
+    """How many paths or programs there are, which may be run as they are, and why the others may not.
+
+    ``box``: whether one is to be put into the cell, which they know nothing of.
+    """
     followed: Sequence[ProgramSummary | PathSummary]
     if isinstance(results, ProgramsResults):
         followed, lost, faults = results.summary.programs, 0, program_faults(results)
@@ -670,7 +685,8 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, 
         followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
     faulty = {fault.name for fault in faults}
     sound = [each.name for each in followed if each.name not in faulty]
-    open_ = joined([left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS])
+    left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
+    open_ = joined([*left_out, tr("the tray or box and its stand") if box else ""])
     return {
         "stage": stage,
         "count": len(followed) + lost,

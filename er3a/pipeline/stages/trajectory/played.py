@@ -132,8 +132,9 @@ def _to_do(path: PathSummary, rows: PathChecks, summary: TrajectorySummary) -> t
         return remedy(near), None
     last = last_sound(path, rows)
     if last is None:
-        todo = advice(path)
-        return sentence("finding", finding=todo) if todo else "", None
+        todo = [sentence("finding", finding=each) for each in (advice(path),) if each]
+        no_part = [sentence("advice.no_part")] if WEIGHTS[path.verdict] == "fail" else []
+        return joined([*todo, *no_part], " "), None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 3))
     end = end_text(path, last[1], assumed=summary.verdict.shapes is not None)
     return end, (name, address_of("trajectory", path.name, last[0], path.name))
