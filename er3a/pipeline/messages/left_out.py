@@ -53,7 +53,7 @@ TEXTS = texts(
         "left_out.rotor_inertias": "what rotors add to the torques: their inertias are not known",
         "left_out.friction": "what friction adds to the torques: it is not known",
         "left_out.wrist_limits": "payload, moments and inertias that the wrist allows, where no document gives them",
-        "left_out.load": "tool and payload: the study gives no mass for them",
+        "left_out.load": "tool and payload: the study doesn't give their masses, or not all of them",
         "left_out.paths_not_run": "paths that may not be run as they are: motors and limits don't count them",
         "left_out.torque_peaks": "torques of paths between the times computed, at least {amount:,.0f} of each",
         "left_out.program_torques": "torques of programs that are not among the paths",
@@ -92,6 +92,10 @@ TEXTS = texts(
         "left_out.the_arm_itself": "how the arm at hand differs from its table; a calibration measures that",
         "left_out.uncertain_solutions": "whether the solutions found are all",
         "left_out.advice": "what would help at targets without a solution",
+        "left_out.orientations": (
+            "how the tool is turned at these targets: the arm's joints set only part of it, and leave it up to "
+            "{amount:.1f}° off"
+        ),
         "left_out.rules": "rules of the mix for which the robot's file has no data",
         "left_out.ways_between": "motions from one target, or path, to the next",
         "left_out.colliding_reach": (
@@ -112,6 +116,9 @@ TEXTS = texts(
             "points and directions between those asked, at {amount:,.0f} places for the box that pass by samples only"
         ),
         "left_out.between_places": "places for the box between grid points {amount:.0f} mm apart",
+        "left_out.box_directions": (
+            "directions of the box's cone: the arm's joints don't set them all, and those that they don't are not asked"
+        ),
         "left_out.placed_box": "collisions with the box where it is placed",
     }
 )

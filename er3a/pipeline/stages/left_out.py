@@ -28,7 +28,10 @@ def left_out_of_collisions(
     """
 
     def pairs(state: PairState) -> tuple[str, ...]:
-        return tuple(f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state)
+        also = state == "joined"  # bodies of links that meet elsewhere
+        return tuple(
+            f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state or (also and row.left_out)
+        )
 
     robot, carries = bodies.robot, bool(scene and scene.carried)
     shapes, rules = arm_shapes(robot), scene.pair_rules if scene else ()
