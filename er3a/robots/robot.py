@@ -106,7 +106,7 @@ def _keep_shape(shape: Envelope | ConvexPiece, size: Literal["radius", "margin"]
 class Visual(ByValue):
     """How a link looks: points (k, 3), m, in the frame as of :class:`Envelope`, and triangles (f, 3) of them.
 
-    Only pictures use it: nothing is measured with it.
+    Pictures use it, and what asks whether a link reaches out of its shapes.
     """
 
     link: int

@@ -15,7 +15,7 @@ from er3a.collision.along import bodies_of
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.collision.scene import Scene, Sphere
-from er3a.collision.shapes import arm_shapes, link_frames
+from er3a.collision.shapes import arm_shapes, has_bare_tool, link_frames
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
@@ -55,7 +55,7 @@ from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
 from er3a.references.rows import GROUPS
-from er3a.robots.robot import Envelope, PairRule, Robot
+from er3a.robots.robot import Envelope, PairRule, Robot, Visual
 
 ROBOT = "er3a_c60"
 
@@ -399,6 +399,22 @@ def test_orientations_that_an_arm_of_few_joints_leaves_off_are_named():
     assert found == LeftOut("orientations", ("tilted",), pytest.approx(30))
     assert list(orientations_off(scara, targets, asked[:1], q[:1])) == []
     assert "orientations" in NEVER_A_PASS
+
+
+@pytest.mark.parametrize(
+    ("link", "farthest", "reaches_out"), [(5, 0.05, False), (5, 0.12, True), (2, 0.07, False), (2, 0.08, True)]
+)
+def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reaches_out):
+    """Link 5 has none, and lies in the end of link 4, 44 mm thick about its axis; link 2 is 54 mm thick."""
+    tip = Visual(link, np.array([[0, 0, farthest], [0.01, 0, 0], [0, 0.01, 0]]), np.array([[0, 1, 2]]))
+    robot = load_robot(ROBOT)
+    seen = robot.replace(visuals=(tip,))
+    assert (link in arm_shapes(seen).uncovered) == reaches_out
+    assert not arm_shapes(robot).uncovered
+    guessed = seen.replace(envelopes=(), sources={})
+    assert (link in arm_shapes(guessed).uncovered) == reaches_out
+    assert not has_bare_tool(robot)
+    assert has_bare_tool(robot.replace(flange=transform(np.array([0, 0, 0.1]), np.zeros(3))))
 
 
 @pytest.mark.long

@@ -15,7 +15,9 @@ TEXTS = texts(
         ),
         "no_pass": "Not examined, and therefore no pass: {missed}.",
         "left_out.bare_links": "what links hit to which no shape is given, and which lie within those of others",
-        "left_out.uncovered_links": "what links hit to which no shape is given, and which reach out of all others'",
+        "left_out.uncovered_links": (
+            "what links hit that reach out of all shapes: they have none, or look larger than those that are checked"
+        ),
         "left_out.bare_tool": (
             "what the tool hits: its point lies outside the last link's shapes, and the scene gives it none"
         ),
