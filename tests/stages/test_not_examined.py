@@ -401,6 +401,18 @@ def test_orientations_that_an_arm_of_few_joints_leaves_off_are_named():
     assert "orientations" in NEVER_A_PASS
 
 
+def test_what_the_robots_file_allows_and_where_the_base_stands_is_named():
+    """Link 6 hits the base in some poses; links 1 and 2 overlap always. A ball about the base's axis misplaces it."""
+    rules = tuple(PairRule(*pair, "allow", "A test") for pair in (("base", "link_6"), ("link_1", "link_2")))
+    robot = load_robot(ROBOT).replace(pair_rules=rules)
+    places = ((0, 0, 0.1), (0.09, 0, 0.1), (0.4, 0, 0.1))
+    balls = [Sphere(name, transform(np.array(p), np.zeros(3)), 0.05) for name, p in zip("abc", places)]
+    scene = Scene("Balls", tuple(balls))
+    found = {each.subject: each.names for each in left_out_of_collisions(bodies_of(robot, scene), scene)}
+    assert (found["allowed_contacts"], found["allowed_pairs"]) == (("base/link_6",), ("link_1/link_2",))
+    assert (found["base_inside"], found["base_contacts"]) == (("a",), ("b",))
+
+
 @pytest.mark.parametrize(
     ("link", "farthest", "reaches_out"), [(5, 0.05, False), (5, 0.12, True), (2, 0.07, False), (2, 0.08, True)]
 )

@@ -21,11 +21,13 @@ TEXTS = texts(
         "left_out.bare_tool": (
             "what the tool hits: its point lies outside the last link's shapes, and the scene gives it none"
         ),
-        "left_out.allowed_contacts": "collisions that the scene's file allows",
+        "left_out.allowed_contacts": "collisions that the scene's or the robot's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
-        "left_out.allowed_pairs": "collisions of pairs that the robot's file allows",
+        "left_out.allowed_pairs": (
+            "collisions of pairs that the robot's file allows: none was seen, or they overlap always"
+        ),
         "left_out.joined_pairs": (
             "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
         ),
@@ -118,6 +120,8 @@ TEXTS = texts(
             "points and directions between those asked, at {amount:,.0f} places for the box that pass by samples only"
         ),
         "left_out.between_places": "places for the box between grid points {amount:.0f} mm apart",
+        "left_out.base_contacts": "whether the base is mounted where it overlaps these solids, as is taken for granted",
+        "left_out.base_inside": "collisions of the base, whose axis lies in these solids: scene or base is misplaced",
         "left_out.box_directions": (
             "directions of the box's cone: the arm's joints don't set them all, and those that they don't are not asked"
         ),
