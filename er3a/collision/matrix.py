@@ -571,7 +571,8 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     found: dict[str, BaseContact] = {}
     for a, b in pairs:
         distance, deep = pair_distance(w, shape, a, b, np.empty((ROOM, 3)), np.empty((2, 3)))
-        inside = bool(deep) or distance + bodies[a].radius + bodies[b].radius < -INSIDE
+        margin = bodies[b].radius if len(bodies[b].points) > 1 else 0.0  # a ball's radius is none
+        inside = bool(deep) or distance + bodies[a].radius + margin < -INSIDE
         contact = BaseContact(bodies[b].name, -float(distance), inside)
         before = found.get(contact.solid)
         if distance < 0 and (before is None or (contact.inside, contact.depth) > (before.inside, before.depth)):
