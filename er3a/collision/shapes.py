@@ -69,7 +69,7 @@ def arm_shapes(robot: Robot) -> ArmShapes:
     if not given:
         capsules = default_envelopes(robot)
     source = robot.sources.get("envelopes")
-    shaped = {shape.link for shape in (*capsules, *pieces)}
+    shaped = {capsule.link for capsule in capsules} | {piece.link for piece in pieces}
     bare = tuple(link for link in range(robot.rows + 1) if given and link not in shaped)
     grade = source.grade if given and source else "inferred"
     shapes = ArmShapes(capsules, pieces, given, grade, bare)
