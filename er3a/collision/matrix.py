@@ -25,7 +25,8 @@ harmless:
 - *meets*: a joint vector in which they overlap was found, and one in which they don't: watched;
 - *undecided*: none of this within the number of boxes: watched.
 
-What a person decided (``Robot.pair_rules``) goes first: *allowed* pairs are not looked at, *watched* ones as a whole.
+What a person decided (``Robot.pair_rules``) goes first: *allowed* pairs are not looked at (only whether there is
+something to be seen, which no verdict passes without), *watched* ones as a whole.
 """
 
 from __future__ import annotations
@@ -256,12 +257,20 @@ def matrix_of(
     for names, bodies in by_names.items():
         rule = decided.get(frozenset(names))
         if rule:
-            found = [JudgedPair("allowed")] if rule.rule == "allow" else [JudgedPair("watched", tuple(bodies))]
+            found = [_allowed(robot, bodies)] if rule.rule == "allow" else [JudgedPair("watched", tuple(bodies))]
         else:
             found = _together(robot, judged_pairs(robot, bodies, boxes), boxes)
         rows.append(_row(*names, found, rule.reason if rule else ""))
         watched += [(pair, each.state == "joined") for each in found for pair in each.bodies]
     return CollisionMatrix(tuple(rows), tuple(pair for pair, _ in watched), tuple(joined for _, joined in watched))
+
+
+def _allowed(robot: Robot, pairs: Sequence[tuple[Body, Body]]) -> JudgedPair:
+    """An allowed pair, with a joint vector in which its bodies overlap, if in another they don't."""
+    meet = _overlap(robot, pairs).any(axis=1)
+    hidden = meet.any() and not meet.all()
+    q = quasi_random_points(robot.lower, robot.upper, TRIED)
+    return JudgedPair("allowed", witness=q[meet.argmax()] if hidden else None)
 
 
 def judged_pairs(robot: Robot, pairs: Sequence[tuple[Body, Body]], boxes: int = BOXES) -> list[JudgedPair]:
@@ -562,7 +571,8 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     found: dict[str, BaseContact] = {}
     for a, b in pairs:
         distance, deep = pair_distance(w, shape, a, b, np.empty((ROOM, 3)), np.empty((2, 3)))
-        inside = bool(deep) or distance + bodies[a].radius + bodies[b].radius < -INSIDE
+        margin = bodies[b].radius if len(bodies[b].points) > 1 else 0.0  # a ball's radius is none
+        inside = bool(deep) or distance + bodies[a].radius + margin < -INSIDE
         contact = BaseContact(bodies[b].name, -float(distance), inside)
         before = found.get(contact.solid)
         if distance < 0 and (before is None or (contact.inside, contact.depth) > (before.inside, before.depth)):

@@ -5,7 +5,8 @@ shape gives them all: a link without one has none. Links are often left without 
 neighbours cover them (frames in a wrist, rings between two housings), and a capsule guessed along the table's lengths
 lies inside what the file draws around the next joint, so that the two would overlap in every pose. Which links have
 none is said (``ArmShapes.bare``), because nothing that they hit is seen; those whose lengths reach out of their
-neighbours' shapes are no frames in a wrist, and no verdict passes without them (``ArmShapes.uncovered``).
+neighbours' shapes are no frames in a wrist, and no verdict passes without them (``ArmShapes.uncovered``). Nor does one
+where a link looks larger than its shapes: its visual mesh reaches out of them and of its neighbours' by ``VISIBLE``.
 
 The guess puts a capsule around each straight piece of a link, along its joint's axis and across to the next. Its
 radius is a share of the arm's size (the sum of all link lengths): 5.5 % at the shoulder, falling to 3 % at the wrist,
@@ -15,7 +16,7 @@ which is about how thick small industrial arms are: an estimate. The column belo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from er3a.robots.robot import ConvexPiece, Envelope, Grade, Robot, derived
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
 SHORTEST = 1e-6
 LINE_POINTS, TOUCH = 25, 1e-3  # points along a piece of a link, and m, by which they may stand out
+VISIBLE = 0.02  # m, by which what a link looks like may stand out: covers and cables do
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,8 @@ class ArmShapes:
     grade : how far they can be relied on: as the file grades them, ``inferred`` if it doesn't or if they are guessed
     bare : numbers of links from 0 on that a file which gives shapes gives none; () for guessed shapes, which leave out
         only links without length
-    uncovered : of these, those that reach out of the shapes of the links beside them, along the table's lengths
+    uncovered : of these, those that reach out of the shapes of the links beside them, along the table's lengths; and
+        links whose visual meshes reach out of all shapes
     """
 
     capsules: tuple[Envelope, ...]
@@ -62,38 +65,48 @@ class ArmShapes:
 @derived
 def arm_shapes(robot: Robot) -> ArmShapes:
     """The shapes that an arm has, for whatever asks for its shapes (see the module's text)."""
-    if not (robot.envelopes or robot.hulls):
-        return ArmShapes(default_envelopes(robot), (), False, "inferred", ())
+    capsules, pieces, given = robot.envelopes, robot.hulls, bool(robot.envelopes or robot.hulls)
+    if not given:
+        capsules = default_envelopes(robot)
     source = robot.sources.get("envelopes")
-    shaped = {capsule.link for capsule in robot.envelopes} | {piece.link for piece in robot.hulls}
-    bare = tuple(link for link in range(robot.rows + 1) if link not in shaped)
-    grade = source.grade if source else "inferred"
-    return ArmShapes(robot.envelopes, robot.hulls, True, grade, bare, tuple(k for k in bare if _uncovered(robot, k)))
+    shaped = {capsule.link for capsule in capsules} | {piece.link for piece in pieces}
+    bare = tuple(link for link in range(robot.rows + 1) if given and link not in shaped)
+    grade = source.grade if given and source else "inferred"
+    shapes = ArmShapes(capsules, pieces, given, grade, bare)
+    return replace(shapes, uncovered=tuple(k for k in range(robot.rows + 1) if _uncovered(robot, shapes, k)))
 
 
-def _uncovered(robot: Robot, link: int) -> bool:
-    """Whether points of a link, along its lengths in the table, lie outside the shapes of its two neighbours."""
+def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> bool:
+    """Whether points of a link lie outside its shapes and those of its two neighbours: of what it looks like, and,
+    where it has no shape, along its lengths in the table."""
+    beside, none = {link - 1, link, link + 1}, np.empty((0, 3))
+    seen = np.concatenate([none, *(visual.points for visual in robot.visuals if visual.link == link)])
     lines = [np.linspace(c.start, c.end, LINE_POINTS) for c in default_envelopes(robot) if c.link == link]
-    return _outside(robot, np.concatenate([np.empty((0, 3)), *lines]), link, {link - 1, link + 1})
+    along = np.concatenate([none, *(lines if link in shapes.bare else [])])
+    return _outside(robot, shapes, along, link, beside) or _outside(robot, shapes, seen, link, beside, VISIBLE)
 
 
 def has_bare_tool(robot: Robot) -> bool:
-    """Whether a tool's point lies outside the shapes that the arm's file gives the last link: the tool has none.
+    """Whether a tool's point, or the flange, lies outside the shapes that the arm's file gives the last link: the tool
+    has none.
 
     What is inside another link's shape at some joint values is not inside it at others.
     """
-    if not arm_shapes(robot).given or not robot.tool[:3, 3].any():
+    shapes = arm_shapes(robot)
+    if not shapes.given or not (robot.tool[:3, 3].any() or robot.flange[:3, 3].any()):
         return False
     T, last = frames(robot, np.zeros(robot.joints)), robot.rows
     point = (np.linalg.inv(T[last - 1]) @ T[last])[None, :3, 3]
-    return _outside(robot, point, last, {last})
+    return _outside(robot, shapes, point, last, {last})
 
 
-def _outside(robot: Robot, points: Reals, link: int, beside: set[int]) -> bool:
-    """Whether points (n, 3) of a link, m, lie outside the shapes of some links.
+def _outside(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int], by: float = TOUCH) -> bool:
+    """Whether points (n, 3) of a link, m, lie outside the shapes of some links, by more than a distance (m).
 
     They are looked at in one pose: a joint between two links turns about the line on which they meet.
     """
+    if not len(points):
+        return False
     T = link_frames(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))
 
     def placed(points: Reals, k: int) -> Reals:
@@ -102,13 +115,13 @@ def _outside(robot: Robot, points: Reals, link: int, beside: set[int]) -> bool:
 
     points = placed(points, link)
     outside = np.full(len(points), np.inf)
-    shapes = [(c.link, np.array([c.start, c.end]), c.radius) for c in robot.envelopes if c.link in beside]
-    shapes += [(h.link, np.array(h.points), h.margin) for h in robot.hulls if h.link in beside]
-    for k, corners, radius in shapes:
+    hulls = [(c.link, np.array([c.start, c.end]), c.radius) for c in shapes.capsules if c.link in beside]
+    hulls += [(h.link, np.array(h.points), h.margin) for h in shapes.pieces if h.link in beside]
+    for k, corners, radius in hulls:
         distance = np.empty(len(points))
         distances_from_hull(points, placed(corners, k), distance)
         outside = np.minimum(outside, distance - radius)
-    return bool((outside > TOUCH).any())
+    return bool((outside > by).any())
 
 
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:

@@ -135,9 +135,9 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
     found: list[MassFinding] = []
     for link in range(robot.rows + 1):
         body = robot.masses.body(link)
-        if body is None or (body.mass == 0 and not any(body.inertia)):
+        if body is None or not has_mass(body):
             rotor = moved_by_one and link > 0 and armature[link - 1] > 0
-            carries = any(_counts(robot.masses.body(k)) for k in range(link + 1, robot.rows + 1))
+            carries = any(has_mass(robot.masses.body(k)) for k in range(link + 1, robot.rows + 1))
             found += [MissingLink(link, not rotor and not carries)] if link else []
         elif problem := no_body(body):
             found.append(ImpossibleInertia(link, problem))
@@ -150,7 +150,8 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
     return (*found, *_against_weight(robot, any(isinstance(each, MissingLink) for each in found)))
 
 
-def _counts(body: MassBody | None) -> bool:
+def has_mass(body: MassBody | None) -> bool:
+    """Whether a body adds anything to torques."""
     return body is not None and (body.mass > 0 or any(body.inertia))
 
 

@@ -490,7 +490,8 @@ class Envelopes(Sourced):
 
 
 class LinkVisual(StrictModel):
-    """Triangles that pictures show link ``link`` by, in the frame of its joint; nothing is measured with them.
+    """Triangles that pictures show link ``link`` by, in the frame of its joint. They say too whether it reaches out of
+    its shapes.
 
     In base64, as ``er3a import-urdf`` writes them: ``points_mm`` x, y, z of each corner as 32-bit floats, ``faces``
     three corners (from 0) of each triangle as 16-bit integers, both little-endian.

@@ -184,12 +184,16 @@ LeftOutSubject = Literal[
     "arm_errors",
     "objects_out_of_view",
     "hidden_voids",
+    "orientations",
+    "box_directions",
+    "base_contacts",
+    "base_inside",
 ]
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
     (
         *("obstacles", "uncovered_links", "bare_tool", "allowed_contacts", "program_rest", "given_rates"),
-        *("arm_errors", "objects_out_of_view", "hidden_voids"),
+        *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside"),
     )
 )
 """What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""

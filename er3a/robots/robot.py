@@ -19,7 +19,7 @@ from typing import Any, Concatenate, Literal, ParamSpec, TypeVar, get_args
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, ReadOnly, Sheet, shortly
-from er3a.errors import InputWarning, RobotError, ShapeError
+from er3a.errors import InputWarning, PoseError, RobotError, ShapeError
 from er3a.geometry.transforms import rot_x, rot_y, rpy_of, translation
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.robots.masses import Masses
@@ -56,6 +56,9 @@ class Envelope:
     end: tuple[float, float, float]
     radius: float
 
+    def __post_init__(self) -> None:
+        _keep_shape(self, "radius", start=self.start, end=self.end)
+
 
 @dataclass(frozen=True)
 class CombinedLimit:
@@ -81,12 +84,29 @@ class ConvexPiece:
     points: tuple[tuple[float, float, float], ...]
     margin: float
 
+    def __post_init__(self) -> None:
+        _keep_shape(self, "margin", points=self.points)
+
+
+def _keep_shape(shape: Envelope | ConvexPiece, size: Literal["radius", "margin"], **points: Any) -> None:
+    """Keep a shape's points (..., 3) and size as floats; one with numbers that no shape can have is refused."""
+    arrays = {key: as_floats(value, key) for key, value in points.items()}
+    for key, array in arrays.items():
+        if array.shape[-1:] != (3,) or not np.isfinite(array).all():
+            raise PoseError(f"{key} of a shape of link {shape.link} must be points of three finite numbers")
+        whole = tuple(map(tuple, array.tolist())) if array.ndim > 1 else tuple(array.tolist())
+        object.__setattr__(shape, key, whole)
+    value = float(getattr(shape, size))
+    if shape.link < 0 or not (np.isfinite(value) and value >= 0):
+        raise PoseError(f"a shape of link {shape.link} has a {size} of {value:g} m; link and {size} must be 0 or more")
+    object.__setattr__(shape, size, value)
+
 
 @dataclass(frozen=True, eq=False)
 class Visual(ByValue):
     """How a link looks: points (k, 3), m, in the frame as of :class:`Envelope`, and triangles (f, 3) of them.
 
-    Only pictures use it: nothing is measured with it.
+    Pictures use it, and what asks whether a link reaches out of its shapes.
     """
 
     link: int
@@ -208,6 +228,9 @@ class Robot(ByValue, Displayed):
             raise RobotError(self.name, f"direction of joint {wrong[0] + 1} is {value:g}; expected 1 or -1")
         if (endless := np.flatnonzero(self.continuous & self.slides)).size:
             raise RobotError(self.name, f"joint {endless[0] + 1} slides and is continuous; give it limits")
+        for link in {capsule.link for capsule in self.envelopes} | {piece.link for piece in self.hulls}:
+            if link > rows:
+                raise RobotError(self.name, f"a shape belongs to link {link}; the arm has links 0 to {rows}")
         for limit in self.combined:
             if len(limit.factors) != joints:
                 raise ShapeError("combined", (len(limit.factors),), f"({joints},)")

@@ -16,19 +16,23 @@ import er3a
 import er3a.pipeline.messages.dynamics
 from er3a.dynamics.plausibility import MissingLink
 from er3a.errors import InputError
-from er3a.files.robot_file import WristLoadGroup, check_masses
+from er3a.files.robot_file import Placement, WristLoadGroup, check_masses
+from er3a.files.robot_library import LoadFields
 from er3a.pipeline.messages import dynamics
 from er3a.pipeline.messages.say import listed, say
 from er3a.pipeline.results import Stored, read_results
 from er3a.pipeline.stages import run
+from er3a.pipeline.stages.dynamics.compute import PathTorques, open_of_load, unknowns, verdict_of
 from er3a.pipeline.stages.dynamics.model import (
     RESULTS,
     AllWithin,
+    DataOpen,
     DynamicsResults,
     Marginal,
     NoData,
     NoLimits,
     Overload,
+    TorqueRows,
     Use,
 )
 from er3a.pipeline.stages.dynamics.record import record
@@ -169,6 +173,39 @@ def test_within_the_limits_it_fits(full):
     assert motor.motor_torque == pytest.approx(motor.peak / 100)
     assert motor.motor_rpm == pytest.approx(motor.speed / 360 * 60 * 100)
     assert motor.inertia_ratio == pytest.approx(motor.inertia_high / 0.05)
+
+
+def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_path):
+    study, body = full[0], {"mass_kg": 0.5, "centre_mm": [0, 0, 50]}
+    entry = study.robots["er3a_c60"]
+    tool = Placement(xyz_mm=[0, 0, 120], rpy_deg=[0, 0, 0])
+    whole, point, none = (LoadFields(**CLAIM, body=each) for each in (LOAD, body, body | {"mass_kg": 0}))
+    for more, needs in (
+        ({"payload": None}, ("load",)),
+        ({"payload": None, "tool_load": whole}, ("carried",)),
+        ({"payload": point}, ("load_inertia",)),
+        ({"tool": tool}, ("tool",)),
+        ({"tool": tool, "tool_load": none}, ()),
+        ({"payload": none, "tool_load": whole}, ()),
+    ):
+        other = study.model_copy(update={"robots": {"er3a_c60": entry.model_copy(update=more)}})
+        assert open_of_load(other, "er3a_c60") == needs
+    robot = study.robot("er3a_c60")
+    assert unknowns(robot, ()) == ()
+    nothing = replace(robot.masses.body(3), mass=0.0, inertia=(0.0,) * 6)
+    links = tuple(replace(each, body=nothing) if each.link == 3 else each for each in robot.masses.links)
+    without = robot.replace(masses=replace(robot.masses, links=links))
+    assert unknowns(without, ("load",)) == (DataOpen("masses", (3,)), DataOpen("load"))
+
+
+def test_limits_that_no_path_was_held_against_are_no_pass(full):
+    summary = full[1].results.summary
+    shown = [
+        PathTorques(replace(each, counts=False), False, TorqueRows.empty(), None, np.empty((6, 2)), None)
+        for each in summary.paths
+    ]
+    verdict = verdict_of(shown, summary.holding, summary.uses, (), (), summary.masses)
+    assert (verdict.status, verdict.finding.not_run) == ("caution", tuple(each.name for each in summary.paths))
 
 
 def test_paths_that_may_not_be_run_count_for_nothing(full, tmp_path):

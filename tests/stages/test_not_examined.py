@@ -12,10 +12,12 @@ import pytest
 import yaml
 
 from er3a.collision.along import bodies_of
+from er3a.collision.matrix import collision_matrix
 from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.collision.scene import Scene, Sphere
-from er3a.collision.shapes import arm_shapes, link_frames
+from er3a.collision.shapes import arm_shapes, has_bare_tool, link_frames
 from er3a.files.robot_library import load_robot
+from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import LEAST_SINGULAR_VALUE
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
@@ -33,6 +35,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.inverse.compute import compute as inverse
+from er3a.pipeline.stages.inverse.compute import orientations_off
 from er3a.pipeline.stages.left_out import left_out_of_collisions
 from er3a.pipeline.stages.programs.compute import compute as programs
 from er3a.pipeline.stages.registry import STAGES
@@ -52,7 +55,7 @@ from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
 from er3a.references.rows import GROUPS
-from er3a.robots.robot import Envelope, PairRule
+from er3a.robots.robot import Envelope, PairRule, Robot, Visual
 
 ROBOT = "er3a_c60"
 
@@ -372,6 +375,58 @@ def test_a_link_without_shape_is_covered_by_its_neighbours_or_named(link, reache
     fewer = robot.replace(envelopes=tuple(each for each in robot.envelopes if each.link != link))
     assert link in arm_shapes(fewer).bare
     assert (link in arm_shapes(fewer).uncovered) == reaches_out
+
+
+def test_bodies_that_a_joint_holds_are_named_where_others_of_their_links_meet():
+    arm = Robot.from_dh([0.3], [0.0], [0.0])
+    shapes = (Envelope(0, (0, 0, -0.1), (0, 0, 0), 0.05), Envelope(0, (0.25, 0, 0), (0.25, 0, 0), 0.02))
+    arm = arm.replace(envelopes=(*shapes, Envelope(1, (0, 0, 0), (0.3, 0, 0), 0.05)))
+    (row,) = collision_matrix(arm).rows
+    assert (row.state, row.left_out > 0) == ("meets", True)
+    found = {each.subject: each.names for each in left_out_of_collisions(bodies_of(arm, None), None)}
+    assert found["joined_pairs"] == ("base/link_1",)
+
+
+def test_orientations_that_an_arm_of_few_joints_leaves_off_are_named():
+    """A SCARA leaves the tilt of its tool; its own poses it keeps."""
+    scara = Robot.from_dh([0.3, 0.25, 0, 0], [0, np.pi, 0, 0], [0.35, 0, 0, 0], sliding=[False, False, True, False])
+    q = np.array([[0.3, 0.5, 0.1, 0.2], [0.5, -0.5, 0.05, 0.0]])
+    T = forward(scara, q)
+    tilted = T[1] @ transform(np.zeros(3), np.array([np.radians(30), 0, 0]))
+    targets = {name: SimpleNamespace(T=pose) for name, pose in (("own", T[0]), ("tilted", tilted))}
+    asked = [SimpleNamespace(name=name) for name in targets]
+    (found,) = orientations_off(scara, targets, asked, q)
+    assert found == LeftOut("orientations", ("tilted",), pytest.approx(30))
+    assert list(orientations_off(scara, targets, asked[:1], q[:1])) == []
+    assert "orientations" in NEVER_A_PASS
+
+
+def test_what_the_robots_file_allows_and_where_the_base_stands_is_named():
+    """Link 6 hits the base in some poses; links 1 and 2 overlap always. A ball about the base's axis misplaces it."""
+    rules = tuple(PairRule(*pair, "allow", "A test") for pair in (("base", "link_6"), ("link_1", "link_2")))
+    robot = load_robot(ROBOT).replace(pair_rules=rules)
+    places = ((0, 0, 0.1), (0.09, 0, 0.1), (0.4, 0, 0.1))
+    balls = [Sphere(name, transform(np.array(p), np.zeros(3)), 0.05) for name, p in zip("abc", places)]
+    scene = Scene("Balls", tuple(balls))
+    found = {each.subject: each.names for each in left_out_of_collisions(bodies_of(robot, scene), scene)}
+    assert (found["allowed_contacts"], found["allowed_pairs"]) == (("base/link_6",), ("link_1/link_2",))
+    assert (found["base_inside"], found["base_contacts"]) == (("a",), ("b",))
+
+
+@pytest.mark.parametrize(
+    ("link", "farthest", "reaches_out"), [(5, 0.05, False), (5, 0.12, True), (2, 0.07, False), (2, 0.08, True)]
+)
+def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reaches_out):
+    """Link 5 has none, and lies in the end of link 4, 44 mm thick about its axis; link 2 is 54 mm thick."""
+    tip = Visual(link, np.array([[0, 0, farthest], [0.01, 0, 0], [0, 0.01, 0]]), np.array([[0, 1, 2]]))
+    robot = load_robot(ROBOT)
+    seen = robot.replace(visuals=(tip,))
+    assert (link in arm_shapes(seen).uncovered) == reaches_out
+    assert not arm_shapes(robot).uncovered
+    guessed = seen.replace(envelopes=(), sources={})
+    assert (link in arm_shapes(guessed).uncovered) == reaches_out
+    assert not has_bare_tool(robot)
+    assert has_bare_tool(robot.replace(flange=transform(np.array([0, 0, 0.1]), np.zeros(3))))
 
 
 @pytest.mark.long

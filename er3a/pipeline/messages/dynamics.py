@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-import er3a.pipeline.messages.left_out
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
 from er3a.dynamics.plausibility import (
     ImpossibleInertia,
 )
 from er3a.pipeline.messages.language import N_
+from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics.model import (
@@ -46,7 +46,11 @@ NEEDS: dict[Need, str] = {
     "wrist_inertia": N_("allowed inertias at the wrist"),
     "payload": N_("rated payload"),
     "load": N_("mass, centre and inertia of tool and payload"),
+    "tool": N_("mass of the tool"),
+    "carried": N_("mass of what the tool carries"),
+    "load_inertia": N_("inertia of tool or payload"),
 }
+names_in_words("load", "dynamics.need", NEEDS)
 FIGURES = {
     "paths": N_("Paths that count"),
     "mass": N_("Mass of the links"),

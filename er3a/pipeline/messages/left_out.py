@@ -15,15 +15,19 @@ TEXTS = texts(
         ),
         "no_pass": "Not examined, and therefore no pass: {missed}.",
         "left_out.bare_links": "what links hit to which no shape is given, and which lie within those of others",
-        "left_out.uncovered_links": "what links hit to which no shape is given, and which reach out of all others'",
+        "left_out.uncovered_links": (
+            "what links hit that reach out of all shapes: they have none, or look larger than those that are checked"
+        ),
         "left_out.bare_tool": (
             "what the tool hits: its point lies outside the last link's shapes, and the scene gives it none"
         ),
-        "left_out.allowed_contacts": "collisions that the scene's file allows",
+        "left_out.allowed_contacts": "collisions that the scene's or the robot's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
         "left_out.objects_out_of_view": "whether the camera can have seen objects that lie out of its stated view",
         "left_out.unexamined_pairs": "collisions of pairs whose shapes can't be right",
-        "left_out.allowed_pairs": "collisions of pairs that the robot's file allows",
+        "left_out.allowed_pairs": (
+            "collisions of pairs that the robot's file allows: none was seen, or they overlap always"
+        ),
         "left_out.joined_pairs": (
             "overlaps of these links where they meet at a joint, and how near they come; the rest of them is examined"
         ),
@@ -53,7 +57,7 @@ TEXTS = texts(
         "left_out.rotor_inertias": "what rotors add to the torques: their inertias are not known",
         "left_out.friction": "what friction adds to the torques: it is not known",
         "left_out.wrist_limits": "payload, moments and inertias that the wrist allows, where no document gives them",
-        "left_out.load": "tool and payload: the study gives no mass for them",
+        "left_out.load": "tool and payload: the study doesn't give their masses, or not all of them",
         "left_out.paths_not_run": "paths that may not be run as they are: motors and limits don't count them",
         "left_out.torque_peaks": "torques of paths between the times computed, at least {amount:,.0f} of each",
         "left_out.program_torques": "torques of programs that are not among the paths",
@@ -92,6 +96,10 @@ TEXTS = texts(
         "left_out.the_arm_itself": "how the arm at hand differs from its table; a calibration measures that",
         "left_out.uncertain_solutions": "whether the solutions found are all",
         "left_out.advice": "what would help at targets without a solution",
+        "left_out.orientations": (
+            "how the tool is turned at these targets: the arm's joints set only part of it, and leave it up to "
+            "{amount:.1f}° off"
+        ),
         "left_out.rules": "rules of the mix for which the robot's file has no data",
         "left_out.ways_between": "motions from one target, or path, to the next",
         "left_out.colliding_reach": (
@@ -112,6 +120,11 @@ TEXTS = texts(
             "points and directions between those asked, at {amount:,.0f} places for the box that pass by samples only"
         ),
         "left_out.between_places": "places for the box between grid points {amount:.0f} mm apart",
+        "left_out.base_contacts": "whether the base is mounted where it overlaps these solids, as is taken for granted",
+        "left_out.base_inside": "collisions of the base, whose axis lies in these solids: scene or base is misplaced",
+        "left_out.box_directions": (
+            "directions of the box's cone: the arm's joints don't set them all, and those that they don't are not asked"
+        ),
         "left_out.placed_box": "collisions with the box where it is placed",
     }
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.matrix import PairState
+from er3a.collision.matrix import PairState, base_contacts
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, has_bare_tool
@@ -28,20 +28,28 @@ def left_out_of_collisions(
     """
 
     def pairs(state: PairState) -> tuple[str, ...]:
-        return tuple(f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state)
+        also = state == "joined"  # bodies of links that meet elsewhere
+        return tuple(
+            f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state or (also and row.left_out)
+        )
 
     robot, carries = bodies.robot, bool(scene and scene.carried)
     shapes, rules = arm_shapes(robot), scene.pair_rules if scene else ()
     solids = {solid.name for solid in scene.solids} if scene else set()
     by_scene = {frozenset((each.first, each.second)): f"{each.first}/{each.second}" for each in rules}
     bare = dict.fromkeys(name or "tool" for name, arm in (("", robot), *arms) if not carries and has_bare_tool(arm))
+    allowed = [name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene]
+    hidden = {f"{row.first}/{row.second}" for row in bodies.matrix if row.witness is not None}
+    contacts = base_contacts(robot, scene)
     found: list[tuple[LeftOutSubject, tuple[str, ...]]] = [
+        ("base_inside", tuple(each.solid for each in contacts if each.inside)),
+        ("base_contacts", tuple(each.solid for each in contacts if not each.inside)),
         ("uncovered_links", tuple(link_label(link) for link in shapes.uncovered)),
-        ("allowed_contacts", tuple(by_scene.values())),
+        ("allowed_contacts", (*by_scene.values(), *(name for name in allowed if name in hidden))),
         ("bare_tool", tuple(bare)),
         ("bare_links", tuple(link_label(link) for link in shapes.bare if link not in shapes.uncovered)),
         ("unexamined_pairs", tuple(pair.label for pair in bodies.unexamined)),
-        ("allowed_pairs", tuple(name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene)),
+        ("allowed_pairs", tuple(name for name in allowed if name not in hidden)),
         ("joined_pairs", pairs("joined")),
     ]
     listed = [LeftOut(subject, names) for subject, names in found if names]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import get_args
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
-from er3a.dynamics.plausibility import MassFinding, MissingLink, mass_findings
+from er3a.dynamics.plausibility import MassFinding, MissingLink, has_mass, mass_findings
 from er3a.dynamics.torque_timing import fastest_under_torques
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import load_of
@@ -64,10 +65,10 @@ def drive_uses(
     return tuple(found)
 
 
-def unknowns(robot: Robot, load: Load | None) -> tuple[model.DataOpen, ...]:
-    """What the files leave open, with links or joints."""
+def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[model.DataOpen, ...]:
+    """What the files leave open, with links or joints; ``of_load``: what the study does."""
     drives, wrist, joints = drives_of(robot), robot.masses.wrist, range(1, robot.joints + 1)
-    links = tuple(link for link in range(1, robot.rows + 1) if robot.masses.body(link) is None)
+    links = tuple(link for link in range(1, robot.rows + 1) if not has_mass(robot.masses.body(link)))
     open_joints: dict[model.Need, tuple[int, ...]] = {
         "masses": links,
         "peak": _open(drives.peak),
@@ -88,7 +89,22 @@ def unknowns(robot: Robot, load: Load | None) -> tuple[model.DataOpen, ...]:
         ("wrist_inertia", last - {joint for joint, _ in (wrist.inertia if wrist else ())}),
     )
     found += [model.DataOpen(what, tuple(sorted(missing))) for what, missing in asked if missing]
-    return (*found, model.DataOpen("load")) if load is None else tuple(found)
+    return (*found, *map(model.DataOpen, of_load))
+
+
+def open_of_load(study: Study, name: str) -> tuple[model.Need, ...]:
+    """What the study does not say of tool and payload; a mass of 0 says that there is none."""
+    entry, loads = study.entry(name), study.loads(name)
+    if not loads:
+        return ("load",)
+    has_tool = not np.array_equal(study.robot(name).tool, np.eye(4))
+    points = any(each.body and each.body.mass_kg and not any(each.body.inertia_kg_m2) for each in loads)
+    asked: dict[model.LoadPart, bool] = {
+        "tool": has_tool and not entry.tool_load,
+        "carried": not entry.payload,
+        "load_inertia": points,
+    }
+    return tuple(part for part, is_open in asked.items() if is_open)
 
 
 def _open(values: np.ndarray) -> tuple[int, ...]:
@@ -122,7 +138,11 @@ def verdict_of(
     beyond = sum(use.ratio > 1 for use in uses)
     unsettled = sum(use.ratio <= 1 and use.upper > use.allowed for use in uses)
     needs = tuple(each.what for each in unknown)
-    not_run = (*skipped, *(path.summary.name for path in paths if path.asked and not path.summary.counts))
+    nothing_runs = not any(path.summary.counts for path in paths)
+    not_run = (
+        *skipped,
+        *(path.summary.name for path in paths if (path.asked or nothing_runs) and not path.summary.counts),
+    )
     guessed = masses is not None and masses.grade == "inferred"
     open_ = unsettled or doubts or needs or not_run or guessed
     kind = model.Overload if beyond else model.Marginal if open_ else model.AllWithin
@@ -446,7 +466,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     )
     uses = tuple(sorted(uses, key=lambda use: -use.ratio))
     findings = mass_findings(robot) if moving else ()
-    unknown = unknowns(robot, load)
+    unknown = unknowns(robot, open_of_load(study, name))
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = model.DynamicsSummary(
@@ -534,7 +554,10 @@ def _left_out(
         "load": "load",
     }
     names: dict[LeftOutSubject, set[int]] = {}
+    parts = [each.what for each in unknown if each.what in get_args(model.LoadPart)]
     for each in unknown:
+        if each.what in parts:
+            continue
         everything = range(1, (robot.rows if each.what == "masses" else robot.joints) + 1)
         whole = each.what in ("load", "payload")
         names.setdefault(subjects[each.what], set()).update(() if whole else each.numbers or everything)
@@ -542,6 +565,8 @@ def _left_out(
         LeftOut(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
         for subject, numbers in names.items()
     ]
+    if parts:
+        found.append(LeftOut("load", tuple(parts)))
     if open_loads := [f"{path.name}: {path.program_load_open}" for path in paths if path.program_load_open]:
         found.append(LeftOut("program_loads", tuple(open_loads)))
     if not_run := (*skipped, *(path.name for path in paths if not path.counts)):

@@ -26,7 +26,11 @@ TORQUE, FORCE = get_args(Unit)
 EITHER = N_("N m or N")
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 Quantity = Literal["peak", "rms", "holding"] | WristQuantity
-Need = Literal["masses", "peak", "rated", "armature", "friction", "wrist_moment", "wrist_inertia", "payload", "load"]
+LoadPart = Literal["tool", "carried", "load_inertia"]
+Need = (
+    Literal["masses", "peak", "rated", "armature", "friction", "wrist_moment", "wrist_inertia", "payload", "load"]
+    | LoadPart
+)
 
 
 @dataclass(frozen=True)

@@ -303,6 +303,8 @@ def _left_out(
         if placement.fitting > placement.fitting_proven:
             yield LeftOut("sampled_places", amount=placement.fitting - placement.fitting_proven)
         yield LeftOut("between_places", amount=1000 * max(placement.spacing_m))
+        if found.asked != "directions":
+            yield LeftOut("box_directions")
         yield LeftOut("placed_box")
 
 
