@@ -135,17 +135,19 @@ class _Flags(Flags):
     """What kernels are compiled with; numba compares it 30 000 times for a hundred kernels, 22 properties each time."""
 
     __slots__ = ()
-    _HASH = hash(Flags())  # of the names alone
+    _HASH = hash(Flags())  # type: ignore[no-untyped-call]  # of the names alone
 
     def __hash__(self) -> int:
         return self._HASH
 
     def __eq__(self, other: object) -> bool:
-        return (isinstance(other, _Flags) and self._values == other._values) or bool(super().__eq__(other))
+        same = isinstance(other, _Flags) and self._values == other._values
+        return same or bool(super().__eq__(other))  # type: ignore[no-untyped-call]
 
 
 class _Kernel(CPUDispatcher):
     _cache: Any
+    _compiler: Any
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
