@@ -17,7 +17,10 @@ import fcntl
 import gc
 import hashlib
 import os
+import pickle
 import re
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -33,6 +36,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.compiler import Flags
 from numba.core.registry import CPUDispatcher
 
 from er3a.errors import Er3aError
@@ -97,6 +101,27 @@ def _counted() -> Iterator[None]:
             _waited.seconds += time.monotonic() - start
 
 
+@contextmanager
+def compiling_beside(kernel: Callable[..., Any], work: Callable[..., object], *given: object) -> Iterator[None]:
+    """Unless a kernel is compiled already, another process does ``work(*given)`` meanwhile, for all that it compiles.
+
+    It ends with the block. What it compiles, this process waits for, or loads.
+    """
+    cache, other = getattr(kernel, "_cache", None), None
+    if isinstance(cache, _KernelCache) and not any(Path(cache.cache_path).glob(f"{kernel.__name__}-*.nbi")):
+        words = [sys.executable, "-c", "import pickle, sys; work, given = pickle.load(sys.stdin.buffer); work(*given)"]
+        other = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        assert other.stdin is not None
+        with suppress(BrokenPipeError), other.stdin as told:
+            told.write(pickle.dumps((work, given)))
+    try:
+        yield
+    finally:
+        if other is not None:
+            other.kill()
+            other.wait()
+
+
 def _compiled(function: Function, kind: type[_Kernel], **wrappers: bool) -> Function:
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return function
@@ -106,8 +131,27 @@ def _compiled(function: Function, kind: type[_Kernel], **wrappers: bool) -> Func
     return cast(Function, dispatcher)
 
 
+class _Flags(Flags):
+    """What kernels are compiled with; numba compares it 30 000 times for a hundred kernels, 22 properties each time."""
+
+    __slots__ = ()
+    _HASH = hash(Flags())  # type: ignore[no-untyped-call]  # of the names alone
+
+    def __hash__(self) -> int:
+        return self._HASH
+
+    def __eq__(self, other: object) -> bool:
+        same = isinstance(other, _Flags) and self._values == other._values
+        return same or bool(super().__eq__(other))  # type: ignore[no-untyped-call]
+
+
 class _Kernel(CPUDispatcher):
     _cache: Any
+    _compiler: Any
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._compiler._customize_flags = _Flags
 
     def compile(self, sig: Any) -> Any:
         with _counted(), _alone(self._cache, self.py_func.__qualname__):

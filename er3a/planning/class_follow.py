@@ -36,7 +36,7 @@ from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver, checked_parameters, class_rows
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Integers, Reals, copy_values
 from er3a.numerics.jit import kernel
 from er3a.planning.motion_faults import limit_intervals
 from er3a.planning.moves import ToolPath
@@ -232,7 +232,7 @@ def _ranges(
     last, step = np.empty(joints), np.empty(joints)
     for law in range(shape[0]):
         for slot in range(slots):
-            last[:] = near
+            copy_values(near, last)
             for k in range(poses):
                 row = q[k, place[k, law], slot]
                 if np.isnan(row[0]):
@@ -473,5 +473,5 @@ def _tracked(rows: Reals, turns: tuple[Reals, Reals], start: Reals, q: Reals) ->
                     q[i, j] = last[j] + step[j]
         if nearest > WIDE:
             return i, reached
-        last[:] = q[i]
+        copy_values(q[i], last)
     return rows.shape[0], True

@@ -327,7 +327,7 @@ class ZonePatch:
         n = q.shape[1]
         open_ = np.full(n, np.inf), np.zeros(n)
         turned = float(np.linalg.norm(self.turns, axis=1).sum())
-        near = _Near.of(self.arm, q[0]) if np.isfinite(q).all() and turned <= MOST_TURN else None
+        near = NearJoints.of(self.arm, q[0]) if np.isfinite(q).all() and turned <= MOST_TURN else None
         if near is None:
             return open_
         edges = at[1:] - at[0]
@@ -360,7 +360,7 @@ class ZonePatch:
 
 
 @dataclass(frozen=True, eq=False)
-class _Near:
+class NearJoints:
     """The scaled Jacobian J0 near solved joints.
 
     Attributes
@@ -379,7 +379,7 @@ class _Near:
     length: float
 
     @classmethod
-    def of(cls, arm: Robot, q: Reals) -> _Near | None:
+    def of(cls, arm: Robot, q: Reals) -> NearJoints | None:
         """At joints (n,) in rad; None where J0 has no inverse to speak of."""
         n, length = len(q), characteristic_length(arm)
         (b,), (reach,) = inverse_and_reach(arm, q[None], length)

@@ -293,16 +293,17 @@ def _misses(x_0: float, y_0: float, x_1: float, y_1: float, w: float, h: float) 
 
 
 @inner_kernel
-def _winds(arm: GeneralArm, cell: Cell, across: float, up: float, memory: Memory) -> bool:
-    """Whether the parallelogram of so much (m) about ``memory.v`` winds around a rectangle; keeps its corners."""
+def _winds(arm: GeneralArm, cell: Cell, scale: float, memory: Memory) -> bool:
+    """Whether the parallelogram about ``memory.v``, so many times a rectangle, winds around it; keeps its corners."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
+    w, h = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
     corners, n, m = memory.points.shape[0], arm.drive.shape[0], memory.v.shape[0]
     memory.ends[0], memory.ends[1] = own_range(arm, memory.v)
     turn_x, turn_y = (-1.0, 1.0, 1.0, -1.0, -1.0), (-1.0, -1.0, 1.0, 1.0, -1.0)
     for c in range(corners):
         edge, share = c // _PER_EDGE, (c % _PER_EDGE) / _PER_EDGE
-        s_0 = across * (turn_x[edge] + share * (turn_x[edge + 1] - turn_x[edge]))
-        s_1 = up * (turn_y[edge] + share * (turn_y[edge + 1] - turn_y[edge]))
+        s_0 = scale * w * (turn_x[edge] + share * (turn_x[edge + 1] - turn_x[edge]))
+        s_1 = scale * h * (turn_y[edge] + share * (turn_y[edge + 1] - turn_y[edge]))
         v = memory.weights  # of no more use here
         for j in range(m):
             moved = memory.v[j] + s_0 * memory.directions[0, j] + s_1 * memory.directions[1, j]
@@ -316,7 +317,7 @@ def _winds(arm: GeneralArm, cell: Cell, across: float, up: float, memory: Memory
         memory.flat[c, 0], memory.flat[c, 1] = x, y
         memory.points[c, 0], memory.points[c, 1] = _radius(arm, x, y) - rho, height - z
     safe = 64.0 * ROUND_OFF * (1.0 + cell[1] + arm.bar + abs(z))
-    w, h = 0.5 * (cell[1] - cell[0]) + safe, 0.5 * (cell[3] - cell[2]) + safe
+    w, h = w + safe, h + safe
     winding = 0
     for c in range(corners):
         e = (c + 1) % corners
@@ -379,8 +380,7 @@ def _try(
 ) -> int:
     """Fill a ring from ``memory.v``; returns the count of what is left open."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
-    half_rho, half_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
-    if not _approach(arm, rho, z, 0.1 * min(half_rho, half_z), hold, memory):
+    if not _approach(arm, rho, z, 0.05 * min(cell[1] - cell[0], cell[3] - cell[2]), hold, memory):
         return count
     _values(arm, memory.v, memory.theta)
     x, y, _ = point_of(arm, memory.theta, memory.radii)
@@ -391,7 +391,7 @@ def _try(
     if not arm.full_turn and not meets(arcs, count, a + azimuth, b + azimuth):
         return count
     for scale in (1.25, 1.7, 2.5):
-        if not _winds(arm, cell, scale * half_rho, scale * half_z, memory):
+        if not _winds(arm, cell, scale, memory):
             continue
         if arm.full_turn:
             keep(arm, known, memory.v, rho, z, azimuth)

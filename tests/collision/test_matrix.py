@@ -278,6 +278,16 @@ def test_boxes_of_a_wrist_are_held_by_their_joints_also_across_two_of_them():
     assert bodies.free(np.zeros((1, 3))).all()
 
 
+def test_what_is_left_out_at_a_joint_does_not_grow_with_the_far_end_of_a_link():
+    """A funnel, 4 cm wide at its joint and 70 cm at its far end."""
+    corners = [(x * half, y * half, z) for half, z in ((0.02, -0.02), (0.35, 0.9)) for x in (-1, 1) for y in (-1, 1)]
+    post = box_around(0, (-0.04, -0.04, -0.3), (0.04, 0.04, 0.05))
+    robot = made_of([("R", 0, 0, 0, -180, 180)]).replace(hulls=(post, ConvexPiece(1, tuple(corners), 0.0)))
+    row = rows_of(robot)["base", "link_1"]
+    assert row.state == "joined"
+    assert row.left_out < 0.3
+
+
 def test_neighbours_with_little_play_are_joined_though_they_are_apart_in_some_poses():
     """A square bar that turns beside a wall: its corners enter the wall, its sides are a little away from it."""
     wall = box_around(0, (-0.1, 0.02, -0.1), (0.1, 0.06, 0.1))

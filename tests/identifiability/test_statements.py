@@ -10,6 +10,7 @@ import er3a.pipeline.messages.validation  # noqa: F401
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.reactions import bases_of, count_checks
+from er3a.identifiability.requirements import peak
 from er3a.identifiability.statements import inconsistent_with_own_text, not_the_robot_described
 from er3a.pipeline.messages.say import say
 from er3a.references.reference import Document, Documents
@@ -72,3 +73,11 @@ def test_the_shipped_robots_are_themselves(name):
     robot, references = load_robot(name), load_references(name)
     assert not_the_robot_described(robot, references) is None
     assert inconsistent_with_own_text(robot, references) is None
+
+
+def test_a_peak_inside_the_limits_is_found_from_each_of_their_corners():
+    lower, upper, top = np.array([-1.0, -2.0, 0.0]), np.array([1.0, 0.5, 2.0]), np.array([0.3, -0.4, 1.1])
+    for corner in np.stack(np.meshgrid(*zip(lower, upper)), axis=-1).reshape(-1, 3):
+        at, value = peak(lambda q: 3.0 - ((q - top) ** 2).sum(axis=1), lower, upper, corner[None])
+        np.testing.assert_allclose(at, top, atol=1e-4)
+        assert value == pytest.approx(3.0)

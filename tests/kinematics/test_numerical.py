@@ -118,6 +118,18 @@ def test_results_do_not_depend_on_threads_and_follow_the_seed(robot, random):
     assert not np.array_equal(one.q, solve(robot, T, seed=6).q)
 
 
+@pytest.mark.parametrize("respect_limits", [True, False])
+def test_a_mirrored_arm_comes_to_mirrored_joints(random, respect_limits):
+    """Step by step: none is cut where its mirror image is not."""
+    robot, mirror = make_arm(), np.diag([1.0, -1.0, 1.0, 1.0])
+    mirrored = robot.replace(alpha=-robot.alpha)
+    T, q0 = forward(robot, joints_at_random(robot, random, 64)), joints_at_random(robot, random, 64)
+    found = solve(robot, T, q0=q0, restarts=0, respect_limits=respect_limits)
+    other = solve(mirrored, mirror @ T @ mirror, q0=-q0, restarts=0, respect_limits=respect_limits)
+    np.testing.assert_array_equal(other.q, -found.q)
+    assert 0.1 < found.solved.mean() < 1
+
+
 def test_random_starts_are_uniform():
     draws = np.array([[uniform(3, n, s, j) for j in range(6)] for n in range(40) for s in range(1, 20)])
     assert abs(draws.mean() - 0.5) < 0.02

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Plane, Scene
 from er3a.files.robot_library import load_robot
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.program_check.program_check_findings import ZoneCollides, ZoneNotSettled
-from er3a.program_check.step_checks import WHOLE, bend_of_line, pair_levers, patch_of, zone_clearance
+from er3a.program_check.step_checks import WHOLE, NearJoints, bend_of_line, pair_levers, patch_of, zone_clearance
 
 ROBOT = load_robot("er3a_c60")
 FLOOR = Scene("floor", (Plane("floor", np.array([0.0, 0.0, 1.0]), 0.1),))
@@ -158,6 +158,18 @@ def test_joints_bend_within_a_triangle_of_poses_by_no_more_than_is_said():
         tightest = max(tightest, (np.abs(q - flat) / bend).max())
         np.testing.assert_allclose(forward(ROBOT, q), patch.poses(shares @ WHOLE), atol=1e-9)
     assert tightest > 0.05  # and the bound is no wild guess
+
+
+def test_no_column_of_the_jacobian_gets_longer_than_is_said():
+    rng, tightest = np.random.default_rng(10), 0.0
+    for q in joints(rng, 40):
+        near, moved = NearJoints.of(ROBOT, q), rng.uniform(0, 0.15, 6)
+        J = jacobian(ROBOT, q + moved * rng.choice([-1, 1], (100, 6)))
+        J[:, :3] /= near.length
+        share = (np.linalg.norm(J, axis=1) / near.column(moved)[0]).max()
+        assert share <= 1
+        tightest = max(tightest, share)
+    assert tightest > 0.7  # and the bound is no wild guess
 
 
 def test_a_corner_through_a_singular_pose_is_not_settled():

@@ -62,9 +62,11 @@ def check_program(
     as_json: AsJson = False,
 ):
     """Check what programs make an arm do, motion by motion: file:line: level: message [code]."""
+    from er3a.collision.distances import search_boxes
     from er3a.files.program_file import load_programs
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
+    from er3a.numerics.jit import compiling_beside
     from er3a.pipeline.program_reports import (
         checked_file,
         cycle_line,
@@ -87,8 +89,9 @@ def check_program(
         scene=load_scene(scene) if scene else None,
         most_motions=most_motions,
     )
+    first_compiled = compiling_beside(search_boxes, checked_file, files[0], arm, replace(options, measures=False))
     budget = TimeBudget(seconds, len(files))
-    with shown_work("reading") as at:
+    with shown_work("reading") as at, first_compiled:
         checked = [checked_file(file, arm, replace(options, keep_on=_until(budget, file, at))) for file in files]
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
