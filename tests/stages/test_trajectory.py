@@ -346,15 +346,18 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
 @pytest.mark.parametrize(
     ("status", "told"),
     [
-        ("caution", "Validation leaves part"),
+        ("fail", "Never use this table"),
         ("pass", None),
     ],
 )
-def test_the_page_says_first_what_validation_came_to(study, stored, tmp_path, status, told):
+def test_the_page_says_first_what_validation_came_to_and_hands_out_no_program_of_a_contradicted_table(
+    study, stored, tmp_path, status, told
+):
     report(study, replace(stored["er3_600"], rests_on={"validation": status}), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     body = page[page.index("<body") :]
     assert ('class="caveat ' in body[: body.index('class="verdict')]) == bool(told)
+    assert ("data-packed=" in body, "No program is handed out" in body) == (status == "pass", status == "fail")
     if told:
         assert body.index(told) < body.index('class="verdict') < body.index("safe")
 

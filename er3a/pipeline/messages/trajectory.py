@@ -102,7 +102,7 @@ TEXTS = texts(
         "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
         "path.singular": "{type} singularity",
-        "path.too_fast_until": "{cause} at worst, until t = {end:.4g} s",
+        "path.too_fast_until": "{cause} (the worst, up to t = {end:.4g} s)",
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
