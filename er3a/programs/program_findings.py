@@ -116,6 +116,15 @@ class SpeedsCut:
 
 
 @dataclass(frozen=True)
+class SpeedsOfAssumed:
+    """Speeds were written as a share of a joint speed that is assumed, because the robot's greatest is not known."""
+
+    motions: int
+    assumed_deg_s: float = 100.0
+    code: Literal["written_speeds_of_assumed"] = "written_speeds_of_assumed"
+
+
+@dataclass(frozen=True)
 class HalfTurnsSplit:
     """Lines with a turn by 180 deg were written as two halves, so that the sense of the turn is fixed."""
 
@@ -180,6 +189,7 @@ WriteFinding = (
     | SplinesAsLines
     | SpeedsEstimated
     | SpeedsCut
+    | SpeedsOfAssumed
     | HalfTurnsSplit
     | TargetsLeftOut
     | ToolNotGiven

@@ -462,6 +462,17 @@ class Writer(ABC):
         text = getattr(motion.target, "text", "") or "a target that needs the arm's table"
         self.comment(f"left out: {motion.form or motion.kind} {text}")
 
+    def share(self, ready: ReadyMotion) -> float | None:
+        """The speed of a joint motion as a share of the maximum, 1 at most; None if the program's is not known."""
+        share, speed = share_of_max(ready, self.robot), ready.motion.speed
+        if share is None or speed is None:
+            return None
+        self.count["cut"] += share > 1 + 1e-9
+        self.count["of assumed"] += speed.unit != "share" and (
+            self.robot is None or bool(np.isnan(self.robot.speed).any())
+        )
+        return min(share, 1.0)
+
     def name_tool(self, name: str) -> None:
         """A tool that is known by its name alone."""
         if name not in self.tools:
@@ -524,6 +535,7 @@ COUNTED = {
     "splines": program_findings.SplinesAsLines,
     "estimated": program_findings.SpeedsEstimated,
     "cut": program_findings.SpeedsCut,
+    "of assumed": program_findings.SpeedsOfAssumed,
     "left out": program_findings.TargetsLeftOut,
     "rounded": program_findings.ValuesRounded,
     "foreign": program_findings.NotTranslated,
@@ -542,7 +554,11 @@ def head_line(finding: program_findings.WriteFinding) -> str:
         case program_findings.SpeedsEstimated(motions=count):
             return f"{count} duration(s) as speeds: the controller's ramps decide the time"
         case program_findings.SpeedsCut(motions=count):
-            return f"{count} speed(s) above the joints' greatest, which was taken"
+            return f"{count} speed(s) above 100 %, which was taken"
+        case program_findings.SpeedsOfAssumed(motions=count, assumed_deg_s=assumed):
+            return (
+                f"{count} speed(s) in % of an assumed {assumed:g} deg/s, which may be far from the controller's 100 %"
+            )
         case program_findings.HalfTurnsSplit(lines=count):
             return f"{count} line(s) that turn the tool by 180 deg in two halves, to fix the sense"
         case program_findings.TargetsLeftOut(motions=count):
@@ -595,7 +611,9 @@ def principal_axes(load: MassBody) -> tuple[Reals, Reals]:
 
 
 LOAD_DIGITS = 9  # of masses in kg, centres in m, moments in kg m^2
-ASSUMED_JOINT_SPEED = math.radians(100.0)  # rad/s, of a joint whose greatest speed no table gives
+ASSUMED_JOINT_SPEED = math.radians(
+    program_findings.SpeedsOfAssumed.assumed_deg_s
+)  # rad/s, of a joint whose greatest speed no table gives
 
 
 def joint_speeds(robot: Robot | None, joints: int) -> Reals:

@@ -119,6 +119,14 @@ def test_it_plays_to_the_end_and_stops(page):
     assert told(page) == "It bows."
 
 
+def test_it_plays_no_further_than_the_address_says(page):
+    page.get(f"{page.current_url}?play=bow&t=1.7&until=1.9")
+    button = page.find_element(By.CSS_SELECTOR, ".player .play")
+    button.click()
+    until(page, lambda: button.text == "Play")
+    assert clock(page).startswith("t = 1.900 s")
+
+
 JOINTS = """return [...document.querySelectorAll(".player .joints dl > div")].map((cell) => {
   return [cell.querySelector(".value").innerText, cell.querySelector(".room").innerText, cell.className];
 })"""

@@ -27,6 +27,7 @@ from er3a.programs.program_findings import (
     NotTranslated,
     SpeedsCut,
     SpeedsEstimated,
+    SpeedsOfAssumed,
     TargetsLeftOut,
     ToolNotGiven,
     ValuesRounded,
@@ -216,12 +217,12 @@ def test_what_a_language_has_no_equal_for_is_said_in_the_head():
     )
     listing = Listing("mixed", moves, language="rpl")
     written = write_program(listing, "krl", WriteOptions(ROBOT))
-    assert written.findings == (ZonesDropped(1), SpeedsEstimated(1), SpeedsCut(1), NotTranslated(1))
+    assert written.findings == (ZonesDropped(1), SpeedsEstimated(1), SpeedsCut(1), SpeedsOfAssumed(1), NotTranslated(1))
     head = written.files[".src"].split("BAS(")[0]
-    for words in ("zone(s)", "duration(s)", "above the joints' greatest", "other language"):
+    for words in ("zone(s)", "duration(s)", "above 100 %, which", "an assumed 100 deg/s", "other language"):
         assert words in head
     rpl = write_program(Listing("mixed", moves[1:2]), "rpl", WriteOptions(ROBOT, start=a))
-    assert {type(each) for each in rpl.findings} == {SpeedsEstimated, ValuesRounded}
+    assert {type(each) for each in rpl.findings} == {SpeedsEstimated, SpeedsOfAssumed, ValuesRounded}
     narrow = ArmMotion("joint", JointTarget(a), speed=Rate(0.5, "share"), zone=Zone("distance", 0.0))
     rapid = write_program(Listing("narrow", (narrow,)), "rapid", WriteOptions(ROBOT))
     assert (rapid.findings, ",vmax,fine," in rapid.files[".mod"]) == ((ZonesDropped(1),), True)

@@ -123,6 +123,9 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
         assert f'id="{place}"' in html
         assert float(t) <= max(motion.take(motion.program == name).t_s, default=0.0) + 1e-9  # as it is rounded
         assert each.to_do
+        program = next(own for own in stored["er3a_c60"].results.summary.programs if own.name == name)
+        moments = [own.program_s for own in program.findings if own.level in ("caution", "fail") and own.program_s]
+        assert float(t) == round(min(moments, default=0.0), 9)  # the earliest
     assert "Go there by a joint move to (" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 

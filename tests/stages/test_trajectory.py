@@ -170,7 +170,7 @@ def test_a_path_that_leaves_the_reach_is_given_a_point_that_is_reached(study, re
     """As it is printed: before the first fault, on the path, and the arm has joint angles for it."""
     robot, path = study.robot("er3a_c60"), by_name(results["er3a_c60"])["line_out"]
     (fault,) = (each for each in faults(results["er3a_c60"]) if each.name == "line_out")
-    t = float(re.search("&t=(.*?)#", fault.instead[1])[1])
+    t = float(re.search(r"&t=(.*?)&until=\1#", fault.instead[1])[1])
     xyz = [float(value) for value in re.search(r"x, y, z = (.*?) mm", fault.to_do)[1].split(", ")]
     assert 0 < t <= min(part.t0_s for part in (*path.too_fast, *path.unreachable))
     assert xyz[1:] == [0.0, 400.0]
@@ -346,15 +346,18 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
 @pytest.mark.parametrize(
     ("status", "told"),
     [
-        ("caution", "Validation leaves part"),
+        ("fail", "Never use this table"),
         ("pass", None),
     ],
 )
-def test_the_page_says_first_what_validation_came_to(study, stored, tmp_path, status, told):
+def test_the_page_says_first_what_validation_came_to_and_hands_out_no_program_of_a_contradicted_table(
+    study, stored, tmp_path, status, told
+):
     report(study, replace(stored["er3_600"], rests_on={"validation": status}), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     body = page[page.index("<body") :]
     assert ('class="caveat ' in body[: body.index('class="verdict')]) == bool(told)
+    assert ("data-packed=" in body, "No program is handed out" in body) == (status == "pass", status == "fail")
     if told:
         assert body.index(told) < body.index('class="verdict') < body.index("safe")
 

@@ -18,7 +18,7 @@ from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
 from er3a.pipeline.stages.trajectory.model import Singularity
-from er3a.pipeline.stages.trajectory.played import faults, last_sound
+from er3a.pipeline.stages.trajectory.played import advised, faults, last_sound
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
 from er3a.pipeline.viewing.index import write_index
@@ -150,6 +150,11 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     early = replace(path, singularities=(crossed,))
     assert 0.4 < last_sound(early, rows)[0] < 0.5
     assert "keeps" not in advice(early, last_sound(early, rows))
+    assert 0.2 < last_sound(path, replace(rows, near_singular=rows.t_s > 0.3))[0] <= 0.3
+    near = replace(rows, near_singular=rows.t_s >= 0)
+    assert last_sound(path, near) is None
+    assert "end the path there" not in advised(path, near)
+    assert "near-singular from the start on" in advised(path, near)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
     assert [t for t, _ in first_faults(several)] == [0.5, 0.7, path.collisions[0].t0_s]

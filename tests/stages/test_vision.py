@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import re
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -101,6 +104,10 @@ def test_page_and_recording_are_written(study, folders, tmp_path, name):
         run.show(verb, "vision", study, name, folders[name], tmp_path / verb)
     page = (tmp_path / "report").read_text(encoding="utf-8")
     assert "T_flange_board" in page or "T_base_board" in page
+    packed = re.findall(r'href="data:text/plain;base64,([^"]+)" download="grasp_\w+\.(?:src|script|pgm|XPL|csv)"', page)
+    heads = [base64.b64decode(text).decode() for text in packed]
+    assert len(heads) >= 5 * (name == "er3a_c60")
+    assert all("The camera is simulated" in head and "may carry the object was not examined" in head for head in heads)
     assert (tmp_path / "record").stat().st_size > 10_000
 
 

@@ -85,7 +85,7 @@ TEXTS = texts(
         "left_out.loose_references": (
             "references whose source leaves so much open that a value taken at random would pass as often as not"
         ),
-        "left_out.table_entries": "entries of the table that independent references don't settle",
+        "left_out.table_entries": "entries of the table that independent references don't settle, signs included",
         "left_out.diagnosis": "which entry is wrong: diagnosis is for arms whose joints all turn",
         "left_out.more_faults": "tables with more wrong entries than one or two",
         "left_out.calibration": "corrections of the table: the positions of these reference sets are not enough",

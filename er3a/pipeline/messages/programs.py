@@ -287,8 +287,13 @@ TEXTS = texts(
         ),
         "written_speeds_cut": Plural(
             "motions",
-            "{count} speed above the joints' limit written as that limit",
-            "{count} speeds above the joints' limit written as that limit",
+            "{count} speed above 100 % written as 100 %",
+            "{count} speeds above 100 % written as 100 %",
+        ),
+        "written_speeds_of_assumed": Plural(
+            "motions",
+            "{count} speed in % of an assumed {assumed_deg_s:g} deg/s: the controller's 100 % may be far faster",
+            "{count} speeds in % of an assumed {assumed_deg_s:g} deg/s: the controller's 100 % may be far faster",
         ),
         "written_half_turns_split": Plural(
             "lines",

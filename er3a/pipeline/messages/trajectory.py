@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.pairs import LinkAndSolid
+from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.messages.language import N_, with_unit
@@ -64,6 +64,8 @@ MOST_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
+MOMENT = 0.001  # s
+FULL_SPEED = 0.995  # of a joint's limit, which rounds to 100 %
 WHOLE = 10.0  # from which on numbers are rounded to whole ones
 IF_ASSUMED = "_if_assumed"  # ends the codes of faults against assumed limits
 PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
@@ -100,6 +102,7 @@ TEXTS = texts(
         "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
         "path.singular": "{type} singularity",
+        "path.too_fast_until": "{cause} (the worst, up to t = {end:.4g} s)",
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
@@ -130,15 +133,18 @@ TEXTS = texts(
             "The last point computed before anything is wrong is at t = {t:.4g} s, the tool at x, y, z = {xyz} mm: end "
             "it there, or move the path"
         ),
-        "advice.no_part": "No part of it may be run as it is.",
+        "advice.no_part": "No part of it may be run as it is",
         "advice.end": "End it there, with the tool at x, y, z = {xyz} mm.",
         "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
         "advice.end#assumed": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear, as the shapes are assumed."
+            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, which may be "
+            "wrong by {wrong:g} mm."
         ),
         "advice.chosen": "{way}: {tool}, and {time}",
         "advice.chosen#clear": "{way}: {tool}, {time}, and the arm keeps {clearance:.1f} mm of clearance",
+        "advice.near": "The arm is near-singular from the start on, so no part of it is advised",
         "advice.region": "It still passes near the singular pose",
+        "advice.full_speed": "A joint moves at its full speed: begin slowly",
         "advice.limits#both": (
             "It takes up to {speed:.0f} % of the joints' speeds and {acceleration:.0f} % of their accelerations, which "
             "are both assumed"
@@ -331,7 +337,7 @@ def first_faults(path: PathSummary) -> list[tuple[float, str]]:
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
     kinds: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions, *fast]
     firsts = [min(each, key=lambda part: part.t0_s) for each in kinds if each]
-    found = [(part.t0_s, say_first(part.cause)) for part in firsts]
+    found = [(part.t0_s, _until_when(part) if part in path.too_fast else say_first(part.cause)) for part in firsts]
     edge = min((part.t0_s for part in path.unreachable), default=math.inf) - AT_EDGE
     events = [] if path.in_joint_space else [each for each in path.singularities if each.crossing and each.t_s < edge]
     found += [(event.t_s, sentence("path.singular", type=event_word(event))) for event in events[:1]]
@@ -340,6 +346,12 @@ def first_faults(path: PathSummary) -> list[tuple[float, str]]:
     if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
         found.append((open_.t0_s, cause_text(path, open_)))
     return sorted(found)
+
+
+def _until_when(part: Stretch[RateCause]) -> str:
+    """What is too fast, and until when where that is not but a moment: its figure is the greatest of the stretch."""
+    lasts = part.t1_s - part.t0_s >= MOMENT
+    return sentence("path.too_fast_until", cause=say(part.cause), end=part.t1_s) if lasts else say(part.cause)
 
 
 def advice(
@@ -375,14 +387,14 @@ def _until(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> 
     return _clear(path)
 
 
-def end_text(path: PathSummary, xyz_mm: tuple[float, ...], *, assumed: bool) -> str:
-    """That a path may be run to a point of it (mm), and by how much it is clear up to there, if that was measured.
-
-    ``assumed``: whether the arm's shapes are, for which the margin is kept.
-    """
+def end_text(path: PathSummary, xyz_mm: tuple[float, ...], assumed: ShapesAssumed | None) -> str:
+    """That a path may be run to a point of it (mm), and by how much it is clear up to there, if that was measured; of
+    ``assumed`` shapes by how much these may be wrong."""
     if path.clear_until:
-        form = "advice.end#assumed" if assumed else "advice.end#clear"
-        return sentence(form, xyz=_numbers(xyz_mm, 1), margin=path.clear_until.margin_mm)
+        parts = {"xyz": _numbers(xyz_mm, 1), "margin": path.clear_until.margin_mm}
+        if assumed:
+            return sentence("advice.end#assumed", wrong=assumed.margin_mm, **parts)
+        return sentence("advice.end#clear", **parts)
     return sentence("advice.end", xyz=_numbers(xyz_mm, 1))
 
 
@@ -452,7 +464,8 @@ def repair_text(path: PathSummary, limits: LimitsUsed | None = None) -> str:
     )
     passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
     near = sentence("advice.region") if passes else ""
-    return joined([chosen, near, _of_limits(motion, limits) if limits else ""], ". ")
+    full = sentence("advice.full_speed") if (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED else ""
+    return joined([chosen, near, _of_limits(motion, limits) if limits else "", full], ". ")
 
 
 def _of_limits(motion: StrategyMotion, limits: LimitsUsed) -> str:

@@ -57,9 +57,10 @@ class Fault:
     instead: tuple[str, str] | None = None
 
 
-def address_of(page: str, motion: str, t: float, place: str) -> str:
-    """The address of a place on a page, whose player then shows time ``t`` (s) of a motion."""
-    return f"{page}.html?{urlencode({'play': motion, 't': round(t, 9)})}#{place}"
+def address_of(page: str, motion: str, t: float, place: str, until: float | None = None) -> str:
+    """The address of a place on a page, whose player then shows time ``t`` (s) of a motion, and plays it ``until``."""
+    end = {} if until is None else {"until": round(until, 9)}
+    return f"{page}.html?{urlencode({'play': motion, 't': round(t, 9), **end})}#{place}"
 
 
 @dataclass(frozen=True, eq=False)

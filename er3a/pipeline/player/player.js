@@ -2,7 +2,7 @@
  * Plays motions of an arm on a page: a time bar, play and step, events, and a cursor in every plot over time.
  *
  * Joint values come with the page; what lies between two of them is on a line. Any element of the page may have `data-play="MOTION"` and `data-t="SECONDS"`: it then leads to that moment, and is marked as `now` from
- * `data-from` to it; `?play=MOTION&t=SECONDS` in the page's address does the same. A plot is a figure with `data-panels`, a list of `[left, bottom, right, top, t0, t1, MOTION]` in
+ * `data-from` to it; `?play=MOTION&t=SECONDS` in the page's address does the same, and playing ends there with `&until=SECONDS`. A plot is a figure with `data-panels`, a list of `[left, bottom, right, top, t0, t1, MOTION]` in
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
@@ -48,6 +48,12 @@ function prepared(motion) {
 
 const start = () => motion.times[0];
 const end = () => motion.times.at(-1);
+const asked = new URLSearchParams(location.search);
+/** Where playing ends: where the page's address says so, unless the reader is beyond that. */
+function playedUntil() {
+  const until = motion.name === asked.get("play") ? Number(asked.get("until") ?? NaN) : NaN;
+  return t <= until ? until : end();
+}
 const fixed = (value, digits = 3) => value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 
 /** Shows a moment of a motion; `name` is that of the motion, null for the one that is shown. */
@@ -58,7 +64,7 @@ export function goTo(name, time) {
 }
 
 function play(on) {
-  if (on && t >= end()) t = start();
+  if (on && t >= playedUntil()) t = start();
   playing = on;
   place.toggleAttribute("data-playing", on);
   if (!on) dispatchEvent(new Event("player-rests"));
@@ -75,10 +81,11 @@ function refresh() {
 function frame(now) {
   awaited = false;
   if (playing) {
+    const until = playedUntil();
     t += ((now - last) / 1000) * Number(part("speed").value) * (motion.rate ?? 1);
     last = now;
-    if (t >= end()) {
-      t = end();
+    if (t >= until) {
+      t = until;
       play(false);
     }
   }
@@ -255,7 +262,6 @@ addEventListener("resize", refresh);
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
 choose(decodeURIComponent(location.hash.slice(1)));
-const asked = new URLSearchParams(location.search);
 if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
   goTo(asked.get("play"), Number(asked.get("t")));
   dock();

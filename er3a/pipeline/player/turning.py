@@ -26,6 +26,7 @@ from er3a.pipeline.viewing.palette import MUTED
 _HERE = Path(__file__).parent
 STEPS = 65_535  # that the box around everything is divided into
 SHADES = 64
+DARKEST = 0.33  # of a scale of colours, which is still seen on a dark page
 WORDS = {
     "picture": N_("Drag or use the arrow keys to turn the picture, + and − to zoom."),
     "shown": N_("shown"),
@@ -133,10 +134,12 @@ def turning_figure(
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     low[2] = min(low[2], 0.0)
     low, high = low - 50.0, high + 50.0
+    back = -1 if scale and scale.colours.endswith("_r") else 1
+    shades = colormaps[scale.colours.removesuffix("_r")](np.linspace(DARKEST, 1, SHADES))[::back] if scale else ()
     data = {
         "box": [low.tolist(), high.tolist()],
         "azimuth": float(np.radians(azimuth_deg)),
-        "palette": [to_hex(colour) for colour in colormaps[scale.colours](np.linspace(0, 1, SHADES))] if scale else [],
+        "palette": [to_hex(colour) for colour in shades],
         "first": first,
         "groups": [
             {"name": name, "layers": [_layer(layer, low, high) for layer in layers]} for name, layers in groups.items()

@@ -303,7 +303,9 @@ def write_panel(
     robot_pages : those that stand beside it; none outside of a study
     first_caveat : what to know of its table, if anything
     """
-    panel = panel_data(robot, near) | {
+    own = panel_data(robot, near)
+    panel = own | {
+        "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
         "scene": scene_data(scene.solids if scene else ()),
         "carried": scene_data(scene.carried if scene else ()),
         "floor": floor_of(scene),

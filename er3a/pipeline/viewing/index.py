@@ -151,7 +151,7 @@ def key_figures(folder: Path, stages: Sequence[str]) -> dict[tuple[str, str, str
             if figure.part and value is not None:  # the whole differs from robot to robot
                 found[title, figure.label, ""] = f"{number(value)} {unit}"
             else:
-                found[title, figure.label, unit] = float(f"{value:.4g}") if isinstance(value, float) else value
+                found[title, figure.label, unit] = float(f"{value:.6g}") if isinstance(value, float) else value
     return found
 
 

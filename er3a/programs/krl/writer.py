@@ -122,16 +122,14 @@ class KrlWriter(writing.Writer):
 
     def _joint_speed(self, ready: writing.ReadyMotion) -> None:
         speed = ready.motion.speed
-        share = writing.share_of_max(ready, self.robot)
+        share = self.share(ready)
         if speed is None or (share is None and speed.unit == "share"):
             return
         if speed.unit != "share":
             self.count["estimated"] += 1
         if share is None:
             return
-        if share > 1 + 1e-9:
-            self.count["cut"] += 1
-        self.set_once("vel", f"BAS(#VEL_PTP,{writing.short(min(max(share, 0.001), 1) * 100, 3)})")
+        self.set_once("vel", f"BAS(#VEL_PTP,{writing.short(max(share, 0.001) * 100, 3)})")
 
     def _zone(self, motion: instructions.ArmMotion) -> str:
         zone = motion.zone

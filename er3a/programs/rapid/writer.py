@@ -150,14 +150,13 @@ class RapidWriter(writing.Writer):
             return (
                 f"[{writing.short(along)},{writing.short(turn)},{data_types.SLIDE_SPEED:g},{data_types.AXIS_SPEED:g}]"
             )
-        share = writing.share_of_max(ready, self.robot)
+        share = self.share(ready)
         if speed.unit != "share":
             self.count["estimated"] += 1
         if share is None:
             self.set_once("vel", "VelSet 100,5000;")
             return "v100"
-        self.count["cut"] += share > 1 + 1e-9
-        self.set_once("vel", f"VelSet {writing.short(min(max(share, 0.001), 1) * 100, 3)},5000;")
+        self.set_once("vel", f"VelSet {writing.short(max(share, 0.001) * 100, 3)},5000;")
         return "vmax"
 
     def _zone(self, motion: instructions.ArmMotion) -> str:

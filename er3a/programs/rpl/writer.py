@@ -17,7 +17,7 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone, chords, numbers_of
 from er3a.programs.rpl.dialect import SPEED, ZONE
-from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, fixed, share_of_max, short, tool_speed
+from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, fixed, short, tool_speed
 
 DIGITS = 6
 PERCENTS = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 70, 75, 80, 90, 100)
@@ -153,14 +153,13 @@ class RplWriter(Writer):
         if speed is not None and self.own and SPEED.match(speed.text):
             return speed.text
         joint = ready.motion.kind == "joint"
-        value = share_of_max(ready, self.robot) if joint else tool_speed(ready)
+        value = self.share(ready) if joint else tool_speed(ready)
         if value is None or speed is None:
             self.count["estimated"] += speed is not None
             return USUAL_JOINT if joint else USUAL_LINE
         self.count["estimated"] += speed.unit == "s"
         if joint:
-            self.count["cut"] += value > 1 + 1e-9
-            return f"v{self._rounded(min(value, 1.0) * 100, PERCENTS)}perc"
+            return f"v{self._rounded(value * 100, PERCENTS)}perc"
         return f"v{self._rounded(value * 1000, SPEEDS_MM_S)}"
 
     def _rounded(self, value: float, names: tuple[int, ...]) -> int:

@@ -370,14 +370,14 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
     rules = list(dict.fromkeys(results.rankings.rule))
-    correction = _correction(robot, stored)
+    correction, contradicted = _correction(robot, stored), stored.rests_on.get("validation") == "fail"
     render_stage(
         study,
         stored,
         output,
         nearest_rule=tr(NEAREST_RULE),
         overview=[_overview_row(target) for target in chosen],
-        sections=[_section(robot, target, results, rules, correction) for target in chosen],
+        sections=[_section(robot, target, results, rules, correction, contradicted) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
@@ -404,13 +404,16 @@ class Correction:
 
 
 def _correction(robot: Robot, stored: Stored[model.InverseResults]) -> Correction | None:
-    """What validation's diagnosis says of the table; None if it was not computed, or names no single fault."""
+    """What validation's diagnosis says of the table; None if it was not computed, names no single fault, or documents
+    describe another arm."""
     folder = stored.folder.parent / "validation" if stored.folder else None
     if folder is None or not is_computed(folder):
         return None
     stage = STAGES["validation"]
     import_module(stage.messages)
-    for found in getattr(read_stage(folder, stage).results.summary, "diagnoses", ()):
+    summary = read_stage(folder, stage).results.summary
+    beyond = any(each.another_arm for each in getattr(summary, "sets", ()))
+    for found in () if beyond else getattr(summary, "diagnoses", ()):
         if found.corrected and len(faults := found.hypotheses[0].faults) == 1:
             return Correction(say(faults[0]), robot.replace(**vars(found.corrected)))
     return None
@@ -438,9 +441,11 @@ def _section(
     results: model.InverseResults,
     rules: list[str],
     correction: Correction | None,
+    contradicted: bool,
 ) -> TargetSection:
     rows = results.solutions.take(results.solutions.target == target.name)
     branches = best_of_branches(rows)
+    own = [tr("Evidence contradicts this table: move nothing because of what it says here.")] if target.advice else []
     return TargetSection(
         target=target,
         picture=overlay(robot, target, branches),
@@ -448,7 +453,7 @@ def _section(
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
         reason=say(target.reason),
-        advice=[*_after_correction(target, correction), *listed(target.advice)],
+        advice=[*_after_correction(target, correction), *(own if contradicted else listed(target.advice))],
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if isinstance(target.method, ClosedForm) else say(target.method),
         families=_self_motions(robot, target.families),

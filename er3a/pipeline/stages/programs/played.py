@@ -49,35 +49,39 @@ def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
 
 
 def faults(results: ProgramsResults) -> list[Fault]:
-    """The programs that may not be run as they are, the worst first."""
+    """The programs that may not be run as they are, the worst first: of each the first finding, and the first of the
+    gravest level."""
     found = []
     for program in worst_first(results.summary.programs):
-        worst = worst_finding(program)
-        if worst is None or program.outcome == "pass":
+        wrong = sorted((each for each in program.findings if WEIGHTS[each.level] != "plain"), key=moment_of)
+        if not wrong or program.outcome == "pass":
             continue
-        own = worst in of_line(program, worst.line)
+        first, worst = wrong[0], min(wrong, key=lambda each: -RANKS[each.level])
+        told = [first] if worst.level == first.level else [first, worst]
+        own = first in of_line(program, first.line)
+        later = [tr("{where}: {text}", where=_where(program, each), text=say_first(each.finding)) for each in told[1:]]
         found.append(
             Fault(
                 program.name,
                 own_title(program.title),
-                WEIGHTS[worst.level],
+                WEIGHTS[program.outcome],
                 outcome_word(program.outcome),
                 program.expect == program.outcome,
-                _where(worst, own),
-                say_first(worst.finding),
-                "".join(remedies_of(program, worst)[:1]),
-                address_of("programs", program.name, worst.program_s or 0.0, line_id(program.name, worst.line * own)),
+                _where(program, first),
+                joined([say_first(first.finding), *later]),
+                " ".join(dict.fromkeys(text for each in told for text in remedies_of(program, each)[:1])),
+                address_of("programs", program.name, first.program_s or 0.0, line_id(program.name, first.line * own)),
             )
         )
     return found
 
 
-def _where(found: FindingAt, own: bool) -> str:
-    """The line of a finding, with its file if it is not the program's ``own``, and the player's time."""
+def _where(program: ProgramSummary, found: FindingAt) -> str:
+    """The line of a finding, with its file if it is not the program's own, and the player's time."""
     if not found.line:
         return ""
     line = tr("line {line}", line=found.line)
-    if not own:
+    if found not in of_line(program, found.line):
         return joined([found.file, line], ", ")
     return line if found.program_s is None else joined([line, tr("{time} s", time=fixed(found.program_s, 2))], ", ")
 
@@ -97,9 +101,9 @@ def weight(each: FindingAt) -> tuple[int, float]:
     return -RANKS[each.level], when(each)
 
 
-def worst_finding(program: ProgramSummary) -> FindingAt | None:
-    """The first of the findings that weigh most; None where nothing was found."""
-    return min(program.findings, key=weight, default=None)
+def moment_of(each: FindingAt) -> tuple[float, int]:
+    """By which findings stand in the order of what is carried out: the player's time, then their line."""
+    return np.inf if each.program_s is None else each.program_s, each.line
 
 
 def remedies_of(program: ProgramSummary, found: FindingAt) -> list[str]:

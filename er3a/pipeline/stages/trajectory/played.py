@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.trajectory.model import (
     BodiesOverlap,
+    LimitsUsed,
     PathChecks,
     PathSummary,
     Singularity,
@@ -132,12 +134,23 @@ def _to_do(path: PathSummary, rows: PathChecks, summary: TrajectorySummary) -> t
         return remedy(near), None
     last = last_sound(path, rows)
     if last is None:
-        todo = [sentence("finding", finding=each) for each in (advice(path),) if each]
-        no_part = [sentence("advice.no_part")] if WEIGHTS[path.verdict] == "fail" else []
-        return joined([*todo, *no_part], " "), None
+        todo = advised(path, rows)
+        return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last[0], 3))
-    end = end_text(path, last[1], assumed=summary.verdict.shapes is not None)
-    return end, (name, address_of("trajectory", path.name, last[0], path.name))
+    end = end_text(path, last[1], summary.verdict.shapes)
+    return end, (name, address_of("trajectory", path.name, last[0], path.name, last[0]))
+
+
+def advised(path: PathSummary, rows: PathChecks, limits: LimitsUsed | None = None) -> str | None:
+    """What to do about a path; None where nothing is to be done. ``rows``, ``limits``: of the path, of the joints."""
+    sound = last_sound(path, rows)
+    text = advice(path if sound else replace(path, clear_until=None), sound, limits)
+    if text is None or path.chosen:
+        return text
+    if not path.in_joint_space and len(rows) and rows.near_singular[0]:
+        return joined([text, sentence("advice.near")], ". ")
+    no_part = sound is None and WEIGHTS[path.verdict] == "fail"
+    return joined([text, sentence("advice.no_part")], ". ") if no_part else text
 
 
 def repaired(path: PathSummary) -> str:
@@ -146,7 +159,8 @@ def repaired(path: PathSummary) -> str:
 
 
 def last_sound(path: PathSummary, rows: PathChecks) -> tuple[float, tuple[float, ...]] | None:
-    """Time (s) and place (mm) of the last point (of ``rows``, or where the margin is kept) before anything is wrong.
+    """Time (s) and place (mm) of the last point (of ``rows``, or where the margin is kept) before anything is wrong, or
+    a path of the tool is near-singular.
 
     None where something is wrong at once, no point of a path that collides keeps the margin, or none was planned.
     """
@@ -155,6 +169,7 @@ def last_sound(path: PathSummary, rows: PathChecks) -> tuple[float, tuple[float,
         return None
     others = path.unreachable, path.out_of_limits, path.too_fast, path.undecided
     starts = [part.t0_s for stretches in others for part in stretches] + _singular_times(path)
+    starts += [] if path.in_joint_space else rows.t_s[rows.near_singular][:1].tolist()
     if until and until.t_s < min(starts, default=np.inf):
         return until.t_s, until.xyz_mm
     sound = rows.take(rows.reachable & (rows.t_s < min(starts, default=0.0)))
@@ -165,7 +180,8 @@ def shown_verdict(path: PathSummary, near: ClearOfAssumed | None) -> tuple[Weigh
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    return WEIGHTS[path.verdict], outcome_word(path.verdict)
+    collides = outcome_word("collides") if path.collisions and path.verdict != "collides" else ""
+    return WEIGHTS[path.verdict], joined([outcome_word(path.verdict), collides], ", ")
 
 
 def near_assumed(path: PathSummary, summary: TrajectorySummary) -> ClearOfAssumed | None:

@@ -14,7 +14,6 @@ from er3a.pipeline.messages.language import tr
 from er3a.pipeline.messages.programs import remedy
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import (
-    advice,
     cause_text,
     event_distance,
     event_word,
@@ -29,9 +28,9 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.path_figures import PathFigure, clearance_section, in_space
 from er3a.pipeline.stages.trajectory.played import (
+    advised,
     faults,
     kinds,
-    last_sound,
     motions,
     near_assumed,
     shown_verdict,
@@ -43,6 +42,7 @@ from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import packed_text, render_stage
 from er3a.programs.languages import titles_unwritten
+from er3a.programs.program_findings import SpeedsOfAssumed
 from er3a.robots.robot import Robot
 
 DRAWN = 250  # points of a curve
@@ -101,10 +101,12 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     scene = study.scene(stored.robot, stored.stage)
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MOST_DRAWN else DRAWN_OF_MORE
-    paths = worst_first(summary.paths)
+    paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
     for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
-        links = _programs(results.programs.take((results.programs.path == path.name) & (i < count)))
+        links = _programs(
+            results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
+        )
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
         sections.append(_section(path, rows, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
@@ -119,6 +121,8 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         clearance=clearance_section(results, count),
         solids=solid_rows(scene),
         assumed=assumed,
+        assumed_speed=SpeedsOfAssumed.assumed_deg_s,
+        contradicted=contradicted,
         drawn_paths=count,
         turning=in_space(robot, results, paths[:count], scene),
         player=player(robot, motions(robot, results), scene),
@@ -146,7 +150,7 @@ def _section(
         verdict=verdict,
         kind=kind_word(path.kind),
         text=joined([path_text(path), say(near) if near else ""]),
-        advice=advice(path, last_sound(path, rows), summary.joint_limits),
+        advice=advised(path, rows, summary.joint_limits),
         near=joined([say(near), remedy(near).rstrip(".。")], ". ") if near else "",
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),

@@ -280,7 +280,11 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     source = robot.sources.get("dh")
     contradicted = summary.verdict.status == "fail"
     corrected, _ = validation_figures.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
-    text = yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True)) if corrected else ""
+    beyond = any(found.another_arm for found in summary.sets) and not isinstance(
+        summary.verdict.finding, model.DefinedOtherwise
+    )  # no correction makes it the arm that is described
+    file = robot_file(corrected) if corrected and not beyond else None
+    text = yaml_text(file.model_dump(exclude_none=True, exclude_defaults=True)) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
     render_stage(
         study,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -183,11 +183,17 @@ PARTS = {
 }
 
 
+SIMULATED = N_("The camera is simulated: put in the position that a real one measures before you run this.")
+NO_LOAD = N_("Whether the arm may carry the object was not examined.")
+END_OF_HEAD = "from where it waits"
+
+
 def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
     robot = study.robot(name)
+    warnings = [*([SIMULATED] if found and found.simulated else []), NO_LOAD]
     render_stage(
         study,
         stored,
@@ -208,7 +214,8 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
         overview=[_overview(each) for each in summary.objects],
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
-        programs=_programs(results.programs),
+        programs=_programs(results.programs, warnings) if stored.rests_on.get("validation") != "fail" else [],
+        program_warnings=list(map(tr, warnings)),
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
@@ -227,11 +234,12 @@ def _image_folder(study: Study, name: str) -> Path:
     return (head.parent / str(load(HandEyeFile, head).samples)).parent
 
 
-def _programs(rows: model.GraspPrograms) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Of each object its programs: the file's name, and the data address of its text."""
+def _programs(rows: model.GraspPrograms, warnings: Sequence[str]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Of each object its programs: the file's name, and the data address of its text, whose head says the warnings."""
     found: dict[str, list[tuple[str, str]]] = {}
     for target, file, text in zip(rows.target.tolist(), rows.file.tolist(), rows.text.tolist()):
-        found.setdefault(target, []).append((file, text_address(text)))
+        warned = text.replace(END_OF_HEAD, " ".join([END_OF_HEAD + ".", *warnings]), 1)
+        found.setdefault(target, []).append((file, text_address(warned)))
     return list(found.items())
 
 
