@@ -468,7 +468,7 @@ def _counts(verdicts: Sequence[StageVerdict]) -> dict[str, str]:
 SHOWN_FIGURES = 3
 RUNS = {"trajectory": N_("paths"), "programs": N_("programs")}  # stages whose motions may be run or not
 OF_ALL_RUNS = (  # what may turn any of them unsafe
-    *("obstacles", "uncovered_links", "bare_tool", "allowed_contacts", "program_rest", "given_rates"),
+    *("obstacles", "uncovered_links", "bare_tool", "base_inside", "allowed_contacts", "program_rest", "given_rates"),
     *("controller_language", "tool", "carried", "torques"),
 )
 MOST_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
