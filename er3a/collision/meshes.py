@@ -102,12 +102,16 @@ def link_pieces(vertices: Reals, faces: Integers, closed: bool, seed: int) -> Co
 def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Integers]:
     """Vertices and faces of a mesh with at most so many triangles: edges collapse where the surface bends least [1]_.
 
+    Of triangles with both sides (two with the same corners) one is kept: edges of more than two don't collapse.
+
     References
     ----------
     .. [1] M. Garland, P. S. Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH (1997).
     """
     if len(faces) <= most:
         return vertices, faces
+    _, single = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    faces = faces[np.sort(single)]
     library = load_open3d()
     points, corners = library.utility.Vector3dVector(vertices), library.utility.Vector3iVector(faces)
     simple = library.geometry.TriangleMesh(points, corners).simplify_quadric_decimation(most)

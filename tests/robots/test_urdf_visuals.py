@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from er3a.collision.meshes import simplified
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
@@ -51,6 +52,16 @@ def test_links_look_as_their_urdf_says_and_are_checked_by_other_shapes(imported)
     assert box.volume == pytest.approx(np.prod(SIZE))
     assert [each.radius for each in robot.envelopes] == [0.06]
     assert any("base" in note and "visual" in note for note in imported.notes)
+
+
+def test_triangles_that_stand_twice_front_and_back_are_simplified_too():
+    ball = trimesh.creation.icosphere(4, RADIUS)
+    corners = np.array(ball.vertices)
+    points, faces = simplified(corners, np.concatenate([ball.faces, ball.faces[:, ::-1]]), 500)
+    once_points, once = simplified(corners, np.array(ball.faces), 500)
+    assert len(faces) <= 500
+    assert np.array_equal(faces, once)
+    assert np.array_equal(points, once_points)
 
 
 def test_looks_come_back_from_a_robot_file_and_change_no_robot(imported, tmp_path):

@@ -199,6 +199,14 @@ def test_no_place_is_no_error():
     assert context["place_picture"] is None
 
 
+def test_a_box_lower_than_the_layers_of_places_stands_whole_or_is_told_why_not():
+    """On a grid so coarse that its height is less than half a layer."""
+    table = Box("table", transform(np.array([0.4, 0.0, 0.05]), np.zeros(3)), np.array([0.4, 0.4, 0.1]))
+    asked = settings(placement={"box_mm": [100.0, 100.0, 20.0], "cone_deg": 5}, directions=40)
+    (stand,) = tool_capability(load_robot("er3_600"), asked, 0.1, Scene("cell", (table,))).placement.stands
+    assert stand.why_none in (None, "in_the_way", "out_of_reach")
+
+
 def test_a_box_stands_on_a_surface_where_the_arm_leaves_it_room_or_is_told_why_not():
     def block(name: str, size: list[float], x: float, top: float) -> Box:
         return Box(name, transform(np.array([x, 0.0, top - size[2] / 2]), np.zeros(3)), np.array(size))

@@ -316,7 +316,7 @@ def _on_support(
     """
     assert plan.lattice is not None
     layer = lattice_spacing(task.box, plan.lattice)[2]
-    for k in range(round(task.box[2] / layer)):
+    for k in range(max(1, round(task.box[2] / layer))):  # a box lower than half a layer is asked for whole
         left_out = np.array([0.0, 0.0, k * layer])
         part = replace(task, box=task.box - left_out, lowest=support.height + k * layer, support=support)
         found = find_places(
