@@ -31,6 +31,7 @@ from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from tempfile import TemporaryFile
 from typing import Any, TypeVar, cast
 
 import numba
@@ -109,11 +110,13 @@ def compiling_beside(kernel: Callable[..., Any], work: Callable[..., object], *g
     """
     cache, other = getattr(kernel, "_cache", None), None
     if isinstance(cache, _KernelCache) and not any(Path(cache.cache_path).glob(f"{kernel.__name__}-*.nbi")):
-        words = [sys.executable, "-c", "import pickle, sys; work, given = pickle.load(sys.stdin.buffer); work(*given)"]
-        other = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        assert other.stdin is not None
-        with suppress(BrokenPipeError), other.stdin as told:
+        load = "import pickle, sys; work, given = pickle.load(sys.stdin.buffer); work(*given)"
+        words = [sys.executable, "-P", "-c", load]
+        # Where no other process can be had, this one compiles all.
+        with suppress(OSError, TypeError, pickle.PicklingError), TemporaryFile() as told:
             told.write(pickle.dumps((work, given)))
+            told.seek(0)
+            other = subprocess.Popen(words, stdin=told, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield
     finally:

@@ -154,7 +154,7 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     near = replace(rows, near_singular=rows.t_s >= 0)
     assert last_sound(path, near) is None
     assert "end the path there" not in advised(path, near)
-    assert "near-singular from the start on" in advised(path, near)
+    assert "near-singular at the start" in advised(path, near)
     fast = replace(path.collisions[0], t0_s=0.7, cause=TooFastIfAssumed(2, 900.0, 180.0))
     several = replace(early, too_fast=(fast,), avoidance=path.avoidance * 2)
     assert [t for t, _ in first_faults(several)] == [0.5, 0.7, path.collisions[0].t0_s]

@@ -505,8 +505,9 @@ ITEMS = (
         N_("CSV and robot programs"),
         N_("Trajectories are written as CSV or as controller programs (.src, .script)."),
         N_(
-            "The trajectory page has the article's joint move as CSV, KRL and URScript to save. The programs page of "
-            "the real arm checks other programs, and some that are faulty on purpose."
+            "The command writes the article's joint move as KRL (and with other words as CSV or URScript); no page "
+            "hands it out, because evidence contradicts the table. The programs page of the real arm checks other "
+            "programs, and some that are faulty on purpose."
         ),
     ),
     Item(

@@ -142,7 +142,7 @@ TEXTS = texts(
         ),
         "advice.chosen": "{way}: {tool}, and {time}",
         "advice.chosen#clear": "{way}: {tool}, {time}, and the arm keeps {clearance:.1f} mm of clearance",
-        "advice.near": "The arm is near-singular from the start on, so no part of it is advised",
+        "advice.near": "The arm is near-singular at the start, so no part of it is advised",
         "advice.region": "It still passes near the singular pose",
         "advice.full_speed": "A joint moves at its full speed: begin slowly",
         "advice.limits#both": (

@@ -592,6 +592,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "robot": robot,
         "table": table,
         "contradicted": table == "fail" and not same_arm,
+        "may_run": table != "fail",
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
         "instead": {instead: f"#{instead}"} if instead else {},
@@ -657,7 +658,7 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
         if box and any(each.subject == "tool" for each in workspace.not_examined):
             box = joined([box, tr("The tool point is the flange's centre: no tool is given.")], " ")
         if _puts_box(heads) and {*RUNS} & heads.keys():
-            said = tr("Paths and programs are checked without box and stand: add both to the scene, and run again.")
+            said = tr("What is called sound here knows nothing of this box, nor of a stand below it.")
             box = joined([box, said], " ")
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
