@@ -2,6 +2,6 @@
 
 ``calibration_set`` is what was recorded (by ``boards`` from images). ``hand_eye`` calibrates: starts by
 ``classic_methods``, refined by ``likelihood``, with ``table_corrections`` if asked; what speaks against samples stands
-in ``vision_findings``. ``next_view`` and ``point_error`` say what to do with it, ``grasping`` with ``grasp_motion``
-plans.
+in ``vision_findings``, and whether they are of two setups in ``setup_changes``. ``next_view`` and ``point_error`` say
+what to do with it, ``grasping`` with ``grasp_motion`` plans.
 """
