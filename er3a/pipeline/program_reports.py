@@ -434,7 +434,7 @@ def programs_of(
             yield PathProgram(each.name, verdict, None)
             continue
         near = near_assumed_shapes(robot, each.name, min_clearance(along), 1000 * ASSUMED_MARGIN)
-        files, findings = written(robot, each.motion, verdict, language, near)
+        files, findings = written(robot, each.motion, verdict, language, near, task.limits.speed)
         name = program_name(each.name, LONGEST_NAME)
         yield PathProgram(
             each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, each.left_out

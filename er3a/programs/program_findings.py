@@ -117,10 +117,10 @@ class SpeedsCut:
 
 @dataclass(frozen=True)
 class SpeedsOfAssumed:
-    """Speeds were written as a share of a joint speed that is assumed, because the robot's greatest is not known."""
+    """Speeds written as shares of a joint's greatest, or shares as speeds, where that is ``assumed`` (with units)."""
 
     motions: int
-    assumed_deg_s: float = 100.0
+    assumed: str
     code: Literal["written_speeds_of_assumed"] = "written_speeds_of_assumed"
 
 

@@ -348,6 +348,7 @@ class WriteOptions(ByValue):
     start : (n,), rad, where the arm is before the first motion
     notes : findings of those who made the sequence, to be said in the head
     head : further lines of the head
+    assumed_speed : (n,), rad/s or m/s, of joints whose greatest speed the robot's table does not give
     """
 
     robot: Robot | None = None
@@ -355,6 +356,7 @@ class WriteOptions(ByValue):
     arc_deviation: float = ARC_DEVIATION
     notes: tuple[program_findings.WriteFinding, ...] = ()
     head: tuple[str, ...] = ()
+    assumed_speed: Reals | None = None
 
 
 class Writer(ABC):
@@ -379,6 +381,7 @@ class Writer(ABC):
         self.resolver = Resolver(options.robot, options.start)
         self.name = program_name(listing.name, self.longest_name)
         self.count: Counter[str] = Counter()
+        self.assumed: set[str] = set()
         self.tools: list[str] = []
         self.lines: list[str] = []
         self.settings: dict[str, str] = {}
@@ -464,14 +467,52 @@ class Writer(ABC):
 
     def share(self, ready: ReadyMotion) -> float | None:
         """The speed of a joint motion as a share of the maximum, 1 at most; None if the program's is not known."""
-        share, speed = share_of_max(ready, self.robot), ready.motion.speed
-        if share is None or speed is None:
+        share = self._share_asked(ready)
+        if share is None:
             return None
         self.count["cut"] += share > 1 + 1e-9
-        self.count["of assumed"] += speed.unit != "share" and (
-            self.robot is None or bool(np.isnan(self.robot.speed).any())
-        )
         return min(share, 1.0)
+
+    def _share_asked(self, ready: ReadyMotion) -> float | None:
+        speed = ready.motion.speed
+        if speed is None or speed.unit == "share":
+            return None if speed is None else speed.value
+        moved = _moved(ready)
+        if speed.unit == "rad/s":
+            return speed.value / self._greatest_speed(0 if moved is None else int(np.argmax(moved)))
+        seconds = duration(ready)
+        if seconds is None or moved is None or not (seconds > 0 and moved.any()):
+            return None
+        lead = int(np.argmax(moved / [self._speed_of(j)[0] for j in range(len(moved))]))
+        return float(moved[lead] / self._greatest_speed(lead) / seconds)
+
+    def leading_joint_speed(self, ready: ReadyMotion) -> float | None:
+        """The speed of a joint motion as that of the joint that moves most, rad/s."""
+        speed = ready.motion.speed
+        if speed is None or speed.unit not in ("share", "rad/s"):
+            return None
+        if speed.unit == "rad/s":
+            return speed.value
+        moved = _moved(ready)
+        return speed.value * self._greatest_speed(0 if moved is None else int(np.argmax(moved)))
+
+    def _speed_of(self, joint: int) -> tuple[float, str]:
+        """A joint's greatest speed, rad/s or m/s, and as a text with its unit where it is assumed."""
+        robot, given = self.robot, self.options.assumed_speed
+        if robot is not None and not np.isnan(robot.speed[joint]):
+            return float(robot.speed[joint]), ""
+        slides = robot is not None and bool(robot.slides[joint])
+        usual = ASSUMED_SLIDE_SPEED if slides else ASSUMED_JOINT_SPEED
+        speed = usual if given is None else float(given[joint])
+        return speed, f"{1000 * speed:g} mm/s" if slides else f"{math.degrees(speed):g} deg/s"
+
+    def _greatest_speed(self, joint: int) -> float:
+        """What decides a motion's speed; counted where it is assumed."""
+        speed, assumed = self._speed_of(joint)
+        if assumed:
+            self.count["of assumed"] += 1
+            self.assumed.add(assumed)
+        return speed
 
     def name_tool(self, name: str) -> None:
         """A tool that is known by its name alone."""
@@ -527,6 +568,8 @@ class Writer(ABC):
         if count["arcs"]:
             found.append(program_findings.ArcsSplit(count["arcs"], count["chords"], self.options.arc_deviation))
         found += [make(count[key]) for key, make in COUNTED.items() if count[key]]
+        if count["of assumed"]:
+            found.append(program_findings.SpeedsOfAssumed(count["of assumed"], ", ".join(sorted(self.assumed))))
         return (*found, *map(program_findings.ToolNotGiven, self.tools))
 
 
@@ -535,7 +578,6 @@ COUNTED = {
     "splines": program_findings.SplinesAsLines,
     "estimated": program_findings.SpeedsEstimated,
     "cut": program_findings.SpeedsCut,
-    "of assumed": program_findings.SpeedsOfAssumed,
     "left out": program_findings.TargetsLeftOut,
     "rounded": program_findings.ValuesRounded,
     "foreign": program_findings.NotTranslated,
@@ -555,10 +597,8 @@ def head_line(finding: program_findings.WriteFinding) -> str:
             return f"{count} duration(s) as speeds: the controller's ramps decide the time"
         case program_findings.SpeedsCut(motions=count):
             return f"{count} speed(s) above 100 %, which was taken"
-        case program_findings.SpeedsOfAssumed(motions=count, assumed_deg_s=assumed):
-            return (
-                f"{count} speed(s) in % of an assumed {assumed:g} deg/s, which may be far from the controller's 100 %"
-            )
+        case program_findings.SpeedsOfAssumed(motions=count, assumed=assumed):
+            return f"{count} speed(s) with an assumed {assumed} as 100 %, which may be far from the controller's 100 %"
         case program_findings.HalfTurnsSplit(lines=count):
             return f"{count} line(s) that turn the tool by 180 deg in two halves, to fix the sense"
         case program_findings.TargetsLeftOut(motions=count):
@@ -611,46 +651,7 @@ def principal_axes(load: MassBody) -> tuple[Reals, Reals]:
 
 
 LOAD_DIGITS = 9  # of masses in kg, centres in m, moments in kg m^2
-ASSUMED_JOINT_SPEED = math.radians(
-    program_findings.SpeedsOfAssumed.assumed_deg_s
-)  # rad/s, of a joint whose greatest speed no table gives
-
-
-def joint_speeds(robot: Robot | None, joints: int) -> Reals:
-    """Maximum speeds (n,) of the joints, rad/s."""
-    if robot is None:
-        return np.full(joints, ASSUMED_JOINT_SPEED)
-    return np.where(np.isnan(robot.speed), ASSUMED_JOINT_SPEED, robot.speed)
-
-
-def share_of_max(ready: ReadyMotion, robot: Robot | None) -> float | None:
-    """The speed of a joint motion as a share of the maximum; None if the program's is not known."""
-    speed = ready.motion.speed
-    if speed is None:
-        return None
-    if speed.unit == "share":
-        return speed.value
-    moved = _moved(ready)
-    greatest = joint_speeds(robot, 1 if moved is None else len(moved))
-    if speed.unit == "rad/s":
-        lead = int(np.argmax(moved)) if moved is not None else 0
-        return float(speed.value / greatest[lead])
-    seconds = duration(ready)
-    if seconds is None or moved is None or not seconds > 0:
-        return None
-    return float((moved / greatest).max() / seconds) or None
-
-
-def leading_joint_speed(ready: ReadyMotion, robot: Robot | None) -> float | None:
-    """The speed of a joint motion as that of the joint that moves most, rad/s."""
-    speed = ready.motion.speed
-    if speed is None or speed.unit not in ("share", "rad/s"):
-        return None
-    if speed.unit == "rad/s":
-        return speed.value
-    moved = _moved(ready)
-    lead = int(np.argmax(moved)) if moved is not None else 0
-    return float(speed.value * joint_speeds(robot, lead + 1)[lead])
+ASSUMED_JOINT_SPEED, ASSUMED_SLIDE_SPEED = math.radians(100), 0.5  # rad/s, m/s, where nobody states a joint's greatest
 
 
 def tool_speed(ready: ReadyMotion) -> float | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -19,6 +21,7 @@ from er3a.planning.commands import (
 from er3a.planning.profiles import Times
 from er3a.programs.from_commands import listing_of
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Output, Pause, PoseTarget, Rate, Remark, Zone
+from er3a.programs.krl.writer import KrlWriter
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import (
@@ -156,7 +159,7 @@ def test_a_loop_for_ever_is_written_read_and_written_again(language, tmp_path):
     execution = read_back(tmp_path, written)
     assert [each.kind for each in execution.endings] == ["repeats"]
     back = execution.listing()
-    assert back.repeats_from == 2
+    assert back.repeats_from == 2 + len(written.findings)  # remarks of the head
     assert len(back.motions) == 4
     assert write_program(back, language, WriteOptions(ROBOT)).files == written.files
 
@@ -217,7 +220,10 @@ def test_what_a_language_has_no_equal_for_is_said_in_the_head():
     )
     listing = Listing("mixed", moves, language="rpl")
     written = write_program(listing, "krl", WriteOptions(ROBOT))
-    assert written.findings == (ZonesDropped(1), SpeedsEstimated(1), SpeedsCut(1), SpeedsOfAssumed(1), NotTranslated(1))
+    assert written.findings == (
+        *(ZonesDropped(1), SpeedsEstimated(1), SpeedsCut(1)),
+        *(NotTranslated(1), SpeedsOfAssumed(1, "100 deg/s")),
+    )
     head = written.files[".src"].split("BAS(")[0]
     for words in ("zone(s)", "duration(s)", "above 100 %, which", "an assumed 100 deg/s", "other language"):
         assert words in head
@@ -226,6 +232,27 @@ def test_what_a_language_has_no_equal_for_is_said_in_the_head():
     narrow = ArmMotion("joint", JointTarget(a), speed=Rate(0.5, "share"), zone=Zone("distance", 0.0))
     rapid = write_program(Listing("narrow", (narrow,)), "rapid", WriteOptions(ROBOT))
     assert (rapid.findings, ",vmax,fine," in rapid.files[".mod"]) == ((ZonesDropped(1),), True)
+
+
+def test_only_an_assumed_speed_that_decides_is_named():
+    """J1 alone moves by 1 rad: in 1 s at 1 / 1.25 of what it can do, whatever the others can."""
+    known = ROBOT.replace(speed=np.array([1.25, *[np.nan] * 5]))
+    turn = ArmMotion("joint", JointTarget(np.eye(6)[0]), speed=Rate(1.0, "s"))
+    first = write_program(Listing("turn", (turn,)), "krl", WriteOptions(known, np.zeros(6)))
+    assert (first.findings, "BAS(#VEL_PTP,80.0)" in first.files[".src"]) == ((SpeedsEstimated(1),), True)
+    own = WriteOptions(ROBOT, np.zeros(6), assumed_speed=np.radians([180, 180, 180, 360, 360, 360]))
+    fast = replace(turn, speed=Rate(1 / np.radians(0.95 * 180), "s"))
+    second = write_program(Listing("turn", (fast,)), "krl", own)
+    assert second.findings == (SpeedsEstimated(1), SpeedsOfAssumed(1, "180 deg/s"))
+    assert "BAS(#VEL_PTP,95.0)" in second.files[".src"]
+    half = Listing("half", (replace(turn, speed=Rate(0.5, "share")),), language="krl")
+    assert write_program(half, "krl", own).findings == ()
+    invented = write_program(half, "urscript", own)
+    assert (invented.findings, "v=1.570796" in invented.files[".script"]) == ((SpeedsOfAssumed(1, "180 deg/s"),), True)
+    slide = KrlWriter(
+        Listing("slide", (turn,)), WriteOptions(ROBOT.replace(sliding=np.arange(6) == 0), np.zeros(6))
+    ).write()
+    assert slide.findings == (SpeedsEstimated(1), SpeedsCut(1), SpeedsOfAssumed(1, "500 mm/s"))
 
 
 def test_a_pose_without_an_arm_is_left_out_where_joints_are_written():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -126,6 +127,12 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
         program = next(own for own in stored["er3a_c60"].results.summary.programs if own.name == name)
         moments = [own.program_s for own in program.findings if own.level in ("caution", "fail") and own.program_s]
         assert float(t) == round(min(moments, default=0.0), 9)  # the earliest
+    summary = stored["er3a_c60"].results.summary
+    program, grave = next((own, each) for own in summary.programs for each in own.findings if each.level == "fail")
+    told = (replace(grave, level="caution", program_s=0.0), replace(grave, line=0, program_s=1.0))
+    nowhere = replace(summary, programs=(replace(program, findings=told),))
+    (fault,) = faults(replace(stored["er3a_c60"].results, summary=nowhere))
+    assert not re.search(r"[;.:。；] *[:：]", fault.what), fault.what
     assert "Go there by a joint move to (" in html
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 

@@ -197,6 +197,7 @@ def test_the_article_table_is_told_apart_with_numbers(summaries):
     claims, real = summary.sets
     assert claims.zero_pose_flange_off_mm == pytest.approx(np.hypot(777.21 - 650, 819.77 + 607.44), abs=1e-6)
     assert real.another_arm
+    assert summary.is_beyond_correction
 
 
 @pytest.mark.long
@@ -617,7 +618,10 @@ def test_any_number_of_conventions_is_no_other_arm(study, tmp_path):
     stored = computed(other, tmp_path / "out")
     found = stored.results.summary.verdict.finding
     assert isinstance(found, DefinedOtherwise)
-    assert not any(each.another_arm for each in stored.results.summary.sets)
+    summary = stored.results.summary
+    assert not any(each.another_arm for each in summary.sets)
+    also = tuple(replace(each, another_arm=True) for each in summary.sets)
+    assert not replace(summary, sets=also).is_beyond_correction
     assert BaseElsewhere((-100.0, 0.0, 330.0), 0.0).kind in {fault.kind for fault in found.diagnosis.faults}
     assert {fault.joint for fault in found.diagnosis.faults if fault.kind == "offset"} >= {2, 3}
     assert "the same arm, defined otherwise" in say(found)

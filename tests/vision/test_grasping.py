@@ -267,7 +267,11 @@ def test_a_start_outside_the_limits_is_named():
 def test_the_written_program_is_the_proven_motion(round_the_post, tmp_path, language):
     """Read back and checked motion by motion, in the same scene."""
     robot, task, plan = round_the_post
-    rows = grasp_programs(robot, "can", BEHIND_THE_POST, plan.chosen, [language])
+    speed = np.full(6, np.pi)
+    rows = grasp_programs(robot, "can", BEHIND_THE_POST, plan.chosen, [language], speed=speed, simulated=True)
+    assert "the camera is simulated" in rows.text[0]
+    assert "object was not examined" in rows.text[0]
+    assert "assumed 100 deg/s" not in rows.text[0]
     files = [tmp_path / name for name in rows.file]
     for file, text in zip(files, rows.text):
         file.write_text(text, encoding="utf-8")

@@ -292,8 +292,8 @@ TEXTS = texts(
         ),
         "written_speeds_of_assumed": Plural(
             "motions",
-            "{count} speed in % of an assumed {assumed_deg_s:g} deg/s: the controller's 100 % may be far faster",
-            "{count} speeds in % of an assumed {assumed_deg_s:g} deg/s: the controller's 100 % may be far faster",
+            "{count} speed written with an assumed {assumed} as 100 %: the controller's 100 % may be far from that",
+            "{count} speeds written with an assumed {assumed} as 100 %: the controller's 100 % may be far from that",
         ),
         "written_half_turns_split": Plural(
             "lines",

@@ -122,7 +122,7 @@ class UrScriptWriter(writing.Writer):
         speed = motion.speed
         if speed is not None and speed.unit == "s" and form in ("movej", "movel") and speed.value > 0:
             return f", a={writing.short(a)}, t={writing.short(speed.value)}"
-        v = writing.leading_joint_speed(ready, self.robot) if joint else writing.tool_speed(ready)
+        v = self.leading_joint_speed(ready) if joint else writing.tool_speed(ready)
         if v is None and joint and (seconds := writing.duration(ready)) is not None:
             return f", a={writing.short(a)}, t={writing.short(seconds)}"
         if speed is not None and speed.unit == "s":

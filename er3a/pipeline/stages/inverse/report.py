@@ -412,7 +412,7 @@ def _correction(robot: Robot, stored: Stored[model.InverseResults]) -> Correctio
     stage = STAGES["validation"]
     import_module(stage.messages)
     summary = read_stage(folder, stage).results.summary
-    beyond = any(each.another_arm for each in getattr(summary, "sets", ()))
+    beyond = getattr(summary, "is_beyond_correction", False)
     for found in () if beyond else getattr(summary, "diagnoses", ()):
         if found.corrected and len(faults := found.hypotheses[0].faults) == 1:
             return Correction(say(faults[0]), robot.replace(**vars(found.corrected)))

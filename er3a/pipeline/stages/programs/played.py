@@ -59,7 +59,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
         first, worst = wrong[0], min(wrong, key=lambda each: -RANKS[each.level])
         told = [first] if worst.level == first.level else [first, worst]
         own = first in of_line(program, first.line)
-        later = [tr("{where}: {text}", where=_where(program, each), text=say_first(each.finding)) for each in told[1:]]
+        later = [_placed(_where(program, each), say_first(each.finding)) for each in told[1:]]
         found.append(
             Fault(
                 program.name,
@@ -74,6 +74,10 @@ def faults(results: ProgramsResults) -> list[Fault]:
             )
         )
     return found
+
+
+def _placed(where: str, text: str) -> str:
+    return tr("{where}: {text}", where=where, text=text) if where else text
 
 
 def _where(program: ProgramSummary, found: FindingAt) -> str:

@@ -403,7 +403,8 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
         close = near_assumed_shapes(robot, each.name, paths[-1].clearance, settings.assumed_margin_mm)
         asked = settings.programs, settings.write_unsafe
-        programs.append(program_files(robot, motion, paths[-1].verdict, *asked, near=close, repaired=repair))
+        verdict, speed = paths[-1].verdict, limits.speed
+        programs.append(program_files(robot, motion, verdict, *asked, near=close, repaired=repair, speed=speed))
     checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
     length = characteristic_length(robot)

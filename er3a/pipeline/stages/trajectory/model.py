@@ -439,6 +439,7 @@ class ProgramFiles(Table):
     language: Texts = column("language of the program, by its name in a study (`trajectory.programs`)")
     file: Texts = column("name of the file")
     text: Texts = column("what the file holds")
+    assumed_speed: Texts = column("greatest joint speeds that are assumed and that its speeds were written with")
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,6 @@ from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import packed_text, render_stage
 from er3a.programs.languages import titles_unwritten
-from er3a.programs.program_findings import SpeedsOfAssumed
 from er3a.robots.robot import Robot
 
 DRAWN = 250  # points of a curve
@@ -65,11 +64,13 @@ class PathDrawing:
 
 @dataclass(frozen=True)
 class ProgramLink:
-    """A program of a path, to save: its file's name, its text by :func:`packed_text`, and whether there is none."""
+    """A program of a path, to save: its file's name, its text by :func:`packed_text`, and whether there is none;
+    the joint speeds that are assumed in it."""
 
     file: str
     packed: str
     empty: bool
+    assumed: str
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         clearance=clearance_section(results, count),
         solids=solid_rows(scene),
         assumed=assumed,
-        assumed_speed=SpeedsOfAssumed.assumed_deg_s,
         contradicted=contradicted,
         drawn_paths=count,
         turning=in_space(robot, results, paths[:count], scene),
@@ -131,8 +131,8 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
 
 
 def _programs(rows: model.ProgramFiles) -> list[ProgramLink]:
-    texts = zip(rows.file.tolist(), rows.text.tolist())
-    return [ProgramLink(file, packed_text(text), not text) for file, text in texts]
+    texts = zip(rows.file.tolist(), rows.text.tolist(), rows.assumed_speed.tolist())
+    return [ProgramLink(file, packed_text(text), not text, assumed) for file, text, assumed in texts]
 
 
 def _section(

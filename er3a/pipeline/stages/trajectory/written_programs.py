@@ -17,7 +17,7 @@ from er3a.planning.profiles import Times
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import not_written, write_program
-from er3a.programs.program_findings import WriteFinding, WrittenNearAssumed, WrittenUnsafe
+from er3a.programs.program_findings import SpeedsOfAssumed, WriteFinding, WrittenNearAssumed, WrittenUnsafe
 from er3a.programs.syntax import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown
@@ -29,9 +29,16 @@ STRAIGHT = 1e-4  # rad or m: by how much joints that move straight between writt
 
 
 def written(
-    robot: Robot, motion: Motion, verdict: PathVerdict, language: LanguageName, near: tuple[WriteFinding, ...] = ()
+    robot: Robot,
+    motion: Motion,
+    verdict: PathVerdict,
+    language: LanguageName,
+    near: tuple[WriteFinding, ...],
+    speed: Reals,
 ) -> tuple[Mapping[str, str], tuple[WriteFinding, ...]]:
     """The files of a path by suffix, and what is to be said of them; ``near`` as of :func:`near_assumed_shapes`.
+
+    ``speed``: (n,), the joints' greatest, rad/s or m/s.
 
     Raises
     ------
@@ -63,7 +70,7 @@ def written(
         ends = None
     load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
     made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends=ends, load=load)
-    options = WriteOptions(robot, start, notes=(*unsafe, *made.findings), head=head)
+    options = WriteOptions(robot, start, notes=(*unsafe, *made.findings), head=head, assumed_speed=speed)
     program = write_program(made.listing, language, options)
     return program.files, program.findings
 
@@ -91,40 +98,51 @@ def program_files(
     *,
     near: tuple[WriteFinding, ...],
     repaired: AvoidanceRows,
+    speed: Reals,
 ) -> ProgramFiles:
     """The path's programs as rows, none where they are refused; with the rows of the motion that repairs it, if any."""
-    rows: list[tuple[str, str, str]] = []
+    rows: list[tuple[str, str, str, str]] = []
     name = program_name(motion.entry.name, LONGEST_NAME)
     allowed = verdict == "safe" or (write_unsafe and np.isfinite(motion.q[0]).all())
     for language in languages if allowed else ():
         if not_written(language, robot):
             continue
-        files, _ = written(robot, motion, verdict, language, near)
-        rows += [(language, name + suffix, text) for suffix, text in files.items()]
+        files, said = written(robot, motion, verdict, language, near, speed)
+        rows += [(language, name + suffix, text, _assumed(said)) for suffix, text in files.items()]
     for language in languages if len(repaired) else ():
         if not not_written(language, robot):
-            files = _repair(robot, motion, repaired, language)
-            rows += [(language, repair_name(motion.entry.name) + suffix, text) for suffix, text in files.items()]
+            files, said = _repair(robot, motion, repaired, language, speed)
+            own = repair_name(motion.entry.name)
+            rows += [(language, own + suffix, text, _assumed(said)) for suffix, text in files.items()]
     return ProgramFiles(
         path=np.full(len(rows), motion.entry.name, object),
         language=np.array([row[0] for row in rows], object),
         file=np.array([row[1] for row in rows], object),
         text=np.array([row[2] for row in rows], object),
+        assumed_speed=np.array([row[3] for row in rows], object),
     )
 
 
-def _repair(robot: Robot, motion: Motion, rows: AvoidanceRows, language: LanguageName) -> Mapping[str, str]:
+def _assumed(findings: tuple[WriteFinding, ...]) -> str:
+    return next((each.assumed for each in findings if isinstance(each, SpeedsOfAssumed)), "")
+
+
+def _repair(
+    robot: Robot, motion: Motion, rows: AvoidanceRows, language: LanguageName, speed: Reals
+) -> tuple[Mapping[str, str], tuple[WriteFinding, ...]]:
     """The motion that repairs a path by suffix: all rows with their times as a table, else as joint moves."""
     comment = f"path {motion.entry.name} for {ascii_text(robot.title)}, repaired: {rows.strategy[0]}"
     q = meant(robot, rows.q_deg)
     if language == "csv":
         poses = np.linalg.inv(robot.base) @ forward(robot, q)
-        return {".csv": write_csv(rows.t_s, rows.q_deg, poses, (HEAD + comment,), joint_columns(robot))}
+        return {".csv": write_csv(rows.t_s, rows.q_deg, poses, (HEAD + comment,), joint_columns(robot))}, ()
     kept = needed_points(q, STRAIGHT)
     command = JointTableCommand(q[kept], Times(rows.t_s[kept], np.arange(len(kept))))
     made = listing_of(command, robot, q[0], repair_name(motion.entry.name), motion.entry.title)
     head = (comment, f"joint moves between points of the checked motion, within {np.degrees(STRAIGHT):.3f} deg of it")
-    return write_program(made.listing, language, WriteOptions(robot, q[0], notes=made.findings, head=head)).files
+    options = WriteOptions(robot, q[0], notes=made.findings, head=head, assumed_speed=speed)
+    program = write_program(made.listing, language, options)
+    return program.files, program.findings
 
 
 def needed_points(q: Reals, tolerance: float) -> Integers:

@@ -647,6 +647,12 @@ class ValidationSummary(Summary):
     counts: CheckCounts
     evidence: TableEvidence | None
 
+    @property
+    def is_beyond_correction(self) -> bool:
+        """Whether documents describe another arm, which no correction of the table makes it."""
+        same = isinstance(self.verdict.finding, DefinedOtherwise)
+        return not same and any(found.another_arm for found in self.sets)
+
 
 @dataclass(frozen=True, eq=False)
 class Checks(Table):

@@ -280,10 +280,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     source = robot.sources.get("dh")
     contradicted = summary.verdict.status == "fail"
     corrected, _ = validation_figures.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
-    beyond = any(found.another_arm for found in summary.sets) and not isinstance(
-        summary.verdict.finding, model.DefinedOtherwise
-    )  # no correction makes it the arm that is described
-    file = robot_file(corrected) if corrected and not beyond else None
+    file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = yaml_text(file.model_dump(exclude_none=True, exclude_defaults=True)) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
     render_stage(

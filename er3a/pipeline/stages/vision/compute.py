@@ -117,15 +117,28 @@ def _held(task: MapTask, tools: Reals) -> tuple[Reals, Flags]:
 LONGEST_NAME = 24
 GRIPPER_S = 1.0
 CLOSE = "close the gripper here"  # in a controller's file, which is plain ASCII
+SIMULATED = "the camera is simulated: put in the position that a real one measures before you run this"
+NO_LOAD = "whether the arm may carry the object was not examined"
 CSV_POINTS = 41
 
 
 def grasp_programs(
-    robot: Robot, name: str, home: Reals, chosen: ChosenGrasp, languages: Sequence[LanguageName]
+    robot: Robot,
+    name: str,
+    home: Reals,
+    chosen: ChosenGrasp,
+    languages: Sequence[LanguageName],
+    *,
+    speed: Reals,
+    simulated: bool,
 ) -> model.GraspPrograms:
-    """A grasp in each language that has this arm's joints."""
+    """A grasp in each language that has this arm's joints.
+
+    ``speed`` : (n,), the joints' greatest, rad/s or m/s; ``simulated``: whether the camera is.
+    """
     own = program_name(f"grasp_{name}", LONGEST_NAME)
-    head = f"grasp {ascii_text(chosen.grasp)} of {ascii_text(name)} by {ascii_text(robot.title)}, from where it waits"
+    what = f"grasp {ascii_text(chosen.grasp)} of {ascii_text(name)} by {ascii_text(robot.title)}, from where it waits"
+    head = (what, *([SIMULATED] if simulated else []), NO_LOAD)
     rows: list[tuple[str, str, str]] = []
     for language in languages:
         if not_written(language, robot):
@@ -133,7 +146,7 @@ def grasp_programs(
         if language == "csv":
             files = {".csv": _programs_table(robot, chosen, head)}
         else:
-            options = WriteOptions(robot, home, head=(head,))
+            options = WriteOptions(robot, home, head=head, assumed_speed=speed)
             files = dict(write_program(_listing(robot, own, home, chosen), language, options).files)
         rows += [(language, own + suffix, text) for suffix, text in files.items()]
     return model.GraspPrograms(
@@ -167,7 +180,7 @@ def _listing(robot: Robot, name: str, home: Reals, chosen: ChosenGrasp) -> instr
     return instructions.Listing(name, tuple(found))
 
 
-def _programs_table(robot: Robot, chosen: ChosenGrasp, head: str) -> str:
+def _programs_table(robot: Robot, chosen: ChosenGrasp, head: tuple[str, ...]) -> str:
     """The motion over time, at rest where the gripper closes."""
     times, rows, now = [np.zeros(1)], [chosen.legs[0].joints(np.zeros(1))], 0.0
     for leg, next_leg in zip(chosen.legs, (*chosen.legs[1:], None)):
@@ -181,7 +194,8 @@ def _programs_table(robot: Robot, chosen: ChosenGrasp, head: str) -> str:
             rows.append(q[-1:])
     joints = np.concatenate(rows)
     poses = np.linalg.inv(robot.base) @ forward(robot, joints)
-    return write_csv(np.concatenate(times), shown(robot, joints), poses, (HEAD + head,), joint_columns(robot))
+    comments = tuple(HEAD + line for line in head)
+    return write_csv(np.concatenate(times), shown(robot, joints), poses, comments, joint_columns(robot))
 
 
 def _closes(before: GraspLeg, behind: GraspLeg) -> bool:
@@ -398,7 +412,15 @@ def compute(study: Study, name: str) -> model.VisionResults:
         error_map(found, map_task),
         model.PathRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
         model.GraspPrograms.stacked(
-            grasp_programs(robot, entry.name, np.radians(task_file.home_deg), plan.chosen, motions.programs)
+            grasp_programs(
+                robot,
+                entry.name,
+                map_task.home,
+                plan.chosen,
+                motions.programs,
+                speed=limits_of(robot, motions).speed,
+                simulated=head.simulated,
+            )
             for entry, plan, _ in planned
             if plan.chosen
         ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -185,7 +185,6 @@ PARTS = {
 
 SIMULATED = N_("The camera is simulated: put in the position that a real one measures before you run this.")
 NO_LOAD = N_("Whether the arm may carry the object was not examined.")
-END_OF_HEAD = "from where it waits"
 
 
 def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> None:
@@ -193,7 +192,6 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
     robot = study.robot(name)
-    warnings = [*([SIMULATED] if found and found.simulated else []), NO_LOAD]
     render_stage(
         study,
         stored,
@@ -214,8 +212,8 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         map=map_picture(results.error_map, summary.objects) if len(results.error_map) else None,
         overview=[_overview(each) for each in summary.objects],
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
-        programs=_programs(results.programs, warnings) if stored.rests_on.get("validation") != "fail" else [],
-        program_warnings=list(map(tr, warnings)),
+        programs=_programs(results.programs) if stored.rests_on.get("validation") != "fail" else [],
+        program_warnings=[*([tr(SIMULATED)] if found and found.simulated else []), tr(NO_LOAD)],
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
@@ -234,12 +232,11 @@ def _image_folder(study: Study, name: str) -> Path:
     return (head.parent / str(load(HandEyeFile, head).samples)).parent
 
 
-def _programs(rows: model.GraspPrograms, warnings: Sequence[str]) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Of each object its programs: the file's name, and the data address of its text, whose head says the warnings."""
+def _programs(rows: model.GraspPrograms) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Of each object its programs: the file's name, and the data address of its text."""
     found: dict[str, list[tuple[str, str]]] = {}
     for target, file, text in zip(rows.target.tolist(), rows.file.tolist(), rows.text.tolist()):
-        warned = text.replace(END_OF_HEAD, " ".join([END_OF_HEAD + ".", *warnings]), 1)
-        found.setdefault(target, []).append((file, text_address(warned)))
+        found.setdefault(target, []).append((file, text_address(text)))
     return list(found.items())
 
 
