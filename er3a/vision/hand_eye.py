@@ -193,7 +193,10 @@ def _near(flange: Reals, i: int, distance: float, turn: float) -> Flags:
 
 def _places(flange: Reals) -> int:
     """At how many places the flange stood: errors of the arm, and most of the board's, are one at each."""
-    return sum(not _near(flange, i, PLACE_M, PLACE_RAD).any() for i in range(len(flange)))
+    near = np.zeros((len(flange), len(flange)), bool)
+    for i in range(1, len(flange)):
+        near[i, :i] = _near(flange, i, PLACE_M, PLACE_RAD)
+    return int(scipy.sparse.csgraph.connected_components(near, directed=False)[0])
 
 
 def repeated_poses(samples: calibration_set.CalibrationSet) -> tuple[vision_findings.RepeatedPose, ...]:
@@ -481,7 +484,8 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     """
     _check_determined(samples)
     angles = check_angles(samples)
-    used = angles.used & ~_copies(samples)
+    once = ~_copies(samples)
+    used = angles.used & once
     suspects: list[vision_findings.Suspect] = list(angles.found)
     greatest, apart = _check_determined(samples.take(used))
     refined = _fitted(samples.take(used))
@@ -496,7 +500,7 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     warnings += _warnings(kept, refined, greatest, apart, directions)
     share = _places(kept.flange) / len(kept)  # samples at one place count as one
     others = [each.code for each in vision_findings.grave_warnings(warnings) if each.code != "unexplained_residuals"]
-    if not others and share > MOSTLY_APART and (step := moved_between(samples, used, refined)):
+    if not others and share > MOSTLY_APART and (step := moved_between(samples.take(once), used[once], refined)):
         warnings.append(step)
     covariance = refined.covariance / share + _shared_covariance(kept, refined)
     half_width = scipy.special.stdtrit(refined.freedom * share, (1 + SURE) / 2) * np.sqrt(np.diag(covariance))

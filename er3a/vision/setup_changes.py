@@ -21,6 +21,7 @@ from er3a.vision.vision_findings import MovedBetween
 CHANCE = 1e-4  # of sound sets in which a step is found
 LEAST_BLOCK = 2  # samples on either side of a step
 EXPLAINED = 3.0  # standard deviations
+SOLVABLE = 1e8  # condition of a step's equations, beyond which the samples on one side of it don't determine it
 PARTS = {"camera": slice(0, 6), "board": slice(6, 12)}
 
 
@@ -47,8 +48,11 @@ def _of_used(samples: CalibrationSet, refined: Refined) -> MovedBetween | None:
             for each in (np.einsum("nki,nk->ni", own, r), own.mT @ own, own.mT @ J)
         ]
         right, square, crossed = from_here
-        step = -np.linalg.solve(square - crossed @ inverse @ crossed.mT, right[..., None])[..., 0]
-        drop = np.clip(-(step * right).sum(axis=1), 0, squares)
+        reduced = square - crossed @ inverse @ crossed.mT
+        step = -(np.linalg.pinv(reduced, hermitian=True) @ right[..., None])[..., 0]
+        drop = -(step * right).sum(axis=1)
+        determined = (np.linalg.cond(reduced) < SOLVABLE) & (drop <= squares)
+        drop = np.where(determined, np.maximum(drop, 0), 0)
         scale = np.maximum((squares - drop) / free, 0.0 if samples.camera_covariance is None else 1.0)
         chance = scipy.special.fdtrc(6, free, drop / 6 / np.maximum(scale, 1e-300)) * 2 * len(drop)
         at = int(chance.argmin())
@@ -63,12 +67,19 @@ def _of_left_out(samples: CalibrationSet, used: Flags, refined: Refined) -> Move
         return None
     left = samples.take(out)
     sigma = np.repeat(refined.deviations, 3)
+
+    def explained(X: Reals, Y: Reals) -> bool:
+        squares = (residuals(left.hand, left.target, X, Y)[0] / sigma) ** 2
+        return float(np.sqrt(squares.mean())) < EXPLAINED
+
+    if explained(refined.X, refined.Y):
+        return None
     poses = {
         "camera": (mean_pose(inverted(left.hand) @ refined.Y @ inverted(left.target)), refined.Y),
         "board": (refined.X, mean_pose(left.hand @ refined.X @ left.target)),
     }
     for what, (X, Y) in poses.items():
-        if np.sqrt(((residuals(left.hand, left.target, X, Y)[0] / sigma) ** 2).mean()) < EXPLAINED:
+        if explained(X, Y):
             step = step_between(refined.X, X) if what == "camera" else step_between(refined.Y, Y)
             return _finding(samples.names[int(out[0]) if last else int(out[-1]) + 1], what, step, 0.0)
     return None

@@ -195,7 +195,7 @@ CalibrationWarning = (
 
 
 MUCH_SCATTER = 3.0
-_GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, *get_args(OtherReading))
+_GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, MovedBetween, *get_args(OtherReading))
 
 
 def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationWarning, ...]:

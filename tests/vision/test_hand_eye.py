@@ -204,6 +204,24 @@ def test_copies_of_samples_narrow_no_interval():
     assert sum(isinstance(each, RepeatedPose) for each in found.suspects) == 12
 
 
+def test_a_pose_written_again_at_the_end_is_no_other_setup():
+    samples = a_set("eye_in_hand", 4, 12)
+    samples.flange[9:], samples.target[9:] = samples.flange[8], samples.target[8]
+    assert not any(isinstance(each, MovedBetween) for each in calibrate_hand_eye(samples).warnings)
+
+
+def test_places_are_the_same_in_any_order():
+    """A chain of small steps, each near the next: one place, whichever comes first."""
+    chain = a_set("eye_in_hand", 6, 8)
+    for k in (6, 7):
+        chain.flange[k] = chain.flange[5]
+        chain.flange[k, :3, 3] += [0, 0, 0.0009 * (k - 5)]
+    widths = [
+        calibrate_hand_eye(chain.take(order)).half_width for order in (np.arange(8), np.array([5, 7, 6, 0, 1, 2, 3, 4]))
+    ]
+    np.testing.assert_allclose(*widths, rtol=1e-6)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("setup", SETUPS)
 def test_directions_say_what_is_excluded_and_what_can_not_be_told(setup):
