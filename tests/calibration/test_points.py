@@ -301,7 +301,7 @@ def test_a_calibration_that_says_what_no_arm_has_is_refused(tmp_path, change, fi
     record = bare_record(robot)
     file.write_text(json.dumps(record), encoding="utf-8")
     q = np.full(6, 0.3)
-    x = row_values(robot, q[None])[0]
+    x = row_values(robot, q[None])[0].copy()
     x[1] += 1e-3 * np.sin(x[1]) + 2e-3 * np.cos(x[1])
     right = er3a.forward(robot.replace(d=robot.d + 0.002 * (np.arange(6) == 0), coupling=None), x)
     np.testing.assert_allclose(er3a.load_calibration(file, robot).forward(q), right, atol=1e-12)
