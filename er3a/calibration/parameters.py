@@ -88,6 +88,13 @@ def placements_of(names: Sequence[PlacementName]) -> tuple[Parameter, ...]:
     return tuple(Parameter(column, 0) for column in columns)
 
 
+def all_parameters(robot: Robot) -> tuple[Parameter, ...]:
+    """Every number that a calibration can correct of the robot."""
+    joints = range(1, robot.rows + 1)
+    table = (Parameter(column, j) for column in ("a", "alpha", "beta", "d", "offset") for j in joints)
+    return (*table, *placements_of(("base", "tool")))
+
+
 def parallel_pairs(robot: Robot) -> list[tuple[int, tuple[int, int]]]:
     """Rows whose alpha stands between two parallel joint axes (within 1 deg), each with the two joints."""
     shift = 1 if robot.convention == "modified" else 0
@@ -118,12 +125,13 @@ def placed(parameters: Sequence[Parameter], amounts: Reals) -> tuple[Reals, Real
 
 
 WIDEST = 0.05
-"""Rad, and lengths in sizes of the arm: a table that is off by more is another arm's."""
+"""Rad, and in sizes of the arm, its lengths and strokes: a table that is off by more is another arm's."""
 
 
 def settles(robot: Robot, unit: Literal["mm", "deg"], half_width: float) -> bool:
     """Whether half of a 95 % interval, mm or deg, is less than what the table of an arm could be wrong by."""
-    size_mm = 1000 * float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
+    strokes = (robot.upper - robot.lower)[robot.slides]
+    size_mm = 1000 * float(np.abs(robot.a).sum() + np.abs(robot.d).sum() + strokes.sum())
     return half_width <= WIDEST * (size_mm if unit == "mm" else float(np.degrees(1)))
 
 

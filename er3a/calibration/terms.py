@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -84,6 +84,24 @@ def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTe
         and (kind != "weight" or any(each.link >= row for each in robot.masses.links))
         and (kind not in ("once", "twice") or not robot.sliding[row - 1])
     )
+
+
+def terms_of(robot: Robot) -> tuple[JointTerm, ...]:
+    """All that can be told of the robot's joints."""
+    turning = np.flatnonzero(~robot.sliding) + 1
+    return (*candidates(robot), *(JointTerm("ripple", int(row), turns) for row in turning for turns in RIPPLES))
+
+
+def starting_table(robot: Robot) -> dict[str, Any]:
+    """All that a model takes of the robot that it started from, as plain numbers: m, rad; of each body its link, mass
+    (kg) and centre (m)."""
+    names = ("a", "alpha", "beta", "d", "direction", "offset", "sliding", "base", "flange", "tool")
+    return {
+        "convention": robot.convention,
+        **{name: getattr(robot, name).tolist() for name in names},
+        "coupling": (np.eye(robot.rows) if robot.coupling is None else robot.coupling).tolist(),
+        "masses": [[each.link, each.body.mass, *each.body.centre] for each in robot.masses.links],
+    }
 
 
 def effects(robot: Robot, row_values: Reals, points: Reals) -> Reals:

@@ -18,8 +18,8 @@ from er3a.calibration import calibrate as calibration
 from er3a.calibration.calibrate import Calibration
 from er3a.calibration.observations import PLACEMENTS, Measurement, TouchKind, check_poses
 from er3a.calibration.outcomes import FixedName
-from er3a.calibration.parameters import Parameter, corrected
-from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm
+from er3a.calibration.parameters import all_parameters, corrected
+from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, starting_table, terms_of
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
@@ -34,7 +34,8 @@ from er3a.references.reference import Document, Documents, Reference, ReferenceS
 from er3a.robots.robot import MOST_JOINTS, Robot, Source
 
 _NUMBER = CsvColumn(float)
-NOMINAL = 1e-9  # mm, deg
+SAME = 1e-9  # m, rad, kg
+WRITE_CALIBRATION = "Write one: er3a calibrate ROBOT MEASUREMENTS.csv --json > FILE.json"
 JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 
 
@@ -266,20 +267,41 @@ def load_calibration(path: str | Path, robot: Robot) -> CorrectedModel:
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
         own = record["beyond"] or {"entries": record["entries"], "terms": record["ratios"]}
-        names = [re.fullmatch(r"(\D+)(\d*)", each["name"]) for each in own["entries"]]
-        kept = [Parameter(name[1], int(name[2] or 0)) for name in names if name]
-        corrections = [(float(each["nominal"]), float(each["correction"])) for each in own["entries"]]
-        terms = tuple(JointTerm(each["kind"], each["joint"], each["turns"], each["by"]) for each in own["terms"])
-        coefficients = np.array([value for each in own["terms"] for value in each["coefficients"]], dtype=float) / 1000
-    except (OSError, ValueError, KeyError, TypeError):
-        remedy = "Write one: er3a calibrate ROBOT MEASUREMENTS.csv --json > FILE.json"
-        raise InputError(path, None, "is no file with a calibration", remedy) from None
-    for entry, (nominal, _) in zip(kept, corrections):
-        if entry.joint > robot.rows or abs(entry.nominal(robot) - nominal) > NOMINAL:
-            problem = f"{entry.name} was {nominal:g} {entry.unit} where the calibration started, unlike {robot.name}'s"
-            raise InputError(path, "entries", problem, "Give the robot that was calibrated, not the corrected one")
-    amounts = np.array([correction / entry.in_unit for entry, (_, correction) in zip(kept, corrections)])
-    return CorrectedModel(corrected(robot, kept, amounts), JointErrors(robot, terms, coefficients))
+        weighs = any(each["kind"] == "weight" for each in own["terms"])
+        for name, value in starting_table(robot).items():
+            then = record["start"][name]
+            if (name != "masses" or weighs) and then != value and not _are_near(then, value):
+                problem = f"the calibration did not start from {robot.name}'s {name}"
+                remedy = "Give the robot that was calibrated, not the corrected one"
+                raise InputError(path, f"start, {name}", problem, remedy)
+        by_name = {each.name: each for each in all_parameters(robot)}
+        kept = [_known(path, "entries", by_name, each["name"]) for each in own["entries"]]
+        amounts = np.array([float(each["correction"]) for each in own["entries"]]) / [each.in_unit for each in kept]
+        by_term = {each: each for each in terms_of(robot)}
+        stated = [JointTerm(each["kind"], each["joint"], each["turns"], each["by"]) for each in own["terms"]]
+        terms = tuple(_known(path, "terms", by_term, each) for each in stated)
+        coefficients = [[float(value) / 1000 for value in each["coefficients"]] for each in own["terms"]]
+        for term, values in zip(terms, coefficients, strict=True):
+            if len(values) != term.count:
+                problem = f"{len(values)} coefficients of '{term.kind}' of joint {term.joint}, which has {term.count}"
+                raise InputError(path, "terms", problem, WRITE_CALIBRATION)
+        errors = JointErrors(robot, terms, np.concatenate([np.empty(0), *coefficients]))
+        if not (np.isfinite(amounts).all() and np.isfinite(errors.coefficients).all()):
+            raise InputError(path, None, "a correction or coefficient is not finite", WRITE_CALIBRATION)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        raise InputError(path, None, "is no file with a calibration", WRITE_CALIBRATION) from None
+    return CorrectedModel(corrected(robot, kept, amounts), errors)
+
+
+def _are_near(first: Any, second: Any) -> bool:
+    shapes = np.shape(first), np.shape(second)
+    return shapes[0] == shapes[1] != () and np.allclose(first, second, rtol=0, atol=SAME)
+
+
+def _known(path: str | Path, where: str, known: dict[Any, Any], wanted: object) -> Any:
+    if wanted not in known:
+        raise InputError(path, where, f"the robot has no {wanted}", WRITE_CALIBRATION)
+    return known[wanted]
 
 
 def _both(first: Robot, second: Robot, name: str) -> tuple[Reals, Reals]:

@@ -465,7 +465,7 @@ class ProgramMemory:
                 return syntax.Unclear("a root") if isinstance(power, complex) else power
             if sign not in ARITHMETIC:
                 return syntax.Unclear(f"... {sign} ...")
-            if sign in ("%", "MOD") and min(a, b) < 0:
+            if sign in ("%", "MOD") and min(a, b) < 0 and a % b:
                 return syntax.Unclear(f"{a:g} {sign} {b:g}, of which no source tells the sign")
             found = ARITHMETIC[sign](a, b)
         except (ZeroDivisionError, OverflowError, ValueError):

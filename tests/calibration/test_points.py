@@ -17,9 +17,9 @@ import er3a
 from er3a.calibration.fit import Fit, covariance_by_poses
 from er3a.calibration.observations import Measurement, PointObservations
 from er3a.calibration.outcomes import CalibrationError, NotToldApart
-from er3a.calibration.parameters import coupled
+from er3a.calibration.parameters import coupled, settles
 from er3a.calibration.plan import plan
-from er3a.calibration.terms import JointErrors, JointTerm, candidates
+from er3a.calibration.terms import JointErrors, JointTerm, candidates, starting_table
 from er3a.dynamics.arm_model import arm_model
 from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
@@ -270,10 +270,68 @@ def test_the_command_tells_positions_held_back(tmp_path):
         said = np.array([each[name] for each in found["held_back"]["rows"]])
         assert 1000 * T[:, :3, 3] == pytest.approx(said, abs=1e-6)
     assert model.distances_mm(rows).max() == found["held_back"]["worst_mm"]
-    with pytest.raises(InputError, match="tool_x was 0 mm where the calibration started"):
+    with pytest.raises(InputError, match="start, a: the calibration did not start from mine's a"):
         er3a.load_calibration(record, mine)
     with pytest.raises(InputError, match="is no file with a calibration"):
         er3a.load_calibration(tmp_path / "mine.yaml", robot)
+
+
+def bare_record(robot: er3a.Robot) -> dict:
+    term = {"kind": "once", "joint": 2, "turns": 0, "by": 0, "coefficients": [1.0, 2.0]}
+    entry = {"name": "d1", "nominal": 1000 * robot.d[0], "correction": 2.0}
+    return {"start": starting_table(robot), "entries": [entry], "ratios": [term], "beyond": None}
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (lambda found: found["entries"].insert(0, {"name": "foo1", "correction": 0.1}), "entries"),
+        (lambda found: found["entries"].insert(0, {"name": "1d", "correction": 0.1}), "entries"),
+        (lambda found: found["entries"][0].update(name="d7"), "entries"),
+        (lambda found: found["entries"][0].update(correction=np.nan), "not finite"),
+        (lambda found: found["ratios"][0].update(joint=7), "terms"),
+        (lambda found: found["ratios"][0].update(kind="coupling", by=7, coefficients=[1.0]), "terms"),
+        (lambda found: found["ratios"][0].update(kind="play"), "terms"),
+        (lambda found: found["ratios"][0].update(coefficients=[1.0]), "terms"),
+        (lambda found: found.pop("start"), "is no file with a calibration"),
+    ],
+)
+def test_a_calibration_that_says_what_no_arm_has_is_refused(tmp_path, change, field):
+    robot, file = load_robot("er3_600"), tmp_path / "mine.json"
+    record = bare_record(robot)
+    file.write_text(json.dumps(record), encoding="utf-8")
+    q = np.full(6, 0.3)
+    x = row_values(robot, q[None])[0].copy()
+    x[1] += 1e-3 * np.sin(x[1]) + 2e-3 * np.cos(x[1])
+    right = er3a.forward(robot.replace(d=robot.d + 0.002 * (np.arange(6) == 0), coupling=None), x)
+    np.testing.assert_allclose(er3a.load_calibration(file, robot).forward(q), right, atol=1e-12)
+    change(record)
+    file.write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(InputError, match=field):
+        er3a.load_calibration(file, robot)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("base", translation(0, 0, 0.1)),
+        ("alpha", np.full(6, 0.1)),
+        ("direction", -np.ones(6)),
+        ("coupling", 2 * np.eye(6)),
+        ("convention", "modified"),
+    ],
+)
+def test_a_calibration_of_another_table_is_refused(tmp_path, name, value):
+    robot, file = load_robot("er3_600"), tmp_path / "mine.json"
+    file.write_text(json.dumps(bare_record(robot)), encoding="utf-8")
+    with pytest.raises(InputError, match=f"start, {name}"):
+        er3a.load_calibration(file, robot.replace(**{name: value}))
+
+
+def test_an_interval_settles_a_table_whose_lengths_are_all_strokes():
+    arm = gantry().replace(d=np.zeros(4))
+    assert settles(arm, "mm", 1.0)
+    assert not settles(arm, "mm", 400.0)
 
 
 def test_a_worst_position_beyond_all_fitted_poses_is_named():

@@ -708,7 +708,9 @@ def test_a_frame_of_the_cell_is_what_the_program_makes_of_it_or_not_given(tmp_pa
         assert base == pytest.approx(height)
 
 
-@pytest.mark.parametrize(("angle", "degrees"), [("7/2", None), ("8/2", 4), ("7/2.0", 3.5), ("-6/4", None)])
+@pytest.mark.parametrize(
+    ("angle", "degrees"), [("7/2", None), ("8/2", 4), ("7/2.0", 3.5), ("-6/4", None), ("-6 MOD 3", 0)]
+)
 def test_a_quotient_that_no_source_settles_has_no_value(tmp_path, angle, degrees):
     """No document of RPL tells whether two whole numbers have a whole quotient; programs write 100.0."""
     (found,) = motions(tmp_path, f"MJOINT(POINTJ({angle},0,0,0,-70,0), v50perc, fine, tool0);\n", "a.pgm")
@@ -794,6 +796,28 @@ BELOW = f"<Pou><Name>1</Name><Body>{MOVE}</Body></Pou>"
 
 def of_xml(body=MOVE, more="", behind="", declared=""):
     return XML.format(body=body, more=more, behind=behind, declared=declared)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "declared", "named"),
+    [
+        (["i"], ["I"], "", []),
+        (["i", "I"], [], "", ["i, I"]),
+        ([], ["I"], "i", ["i, I"]),
+        (["i"], ["i"], "i", []),
+    ],
+)
+def test_names_that_differ_by_capital_letters_are_compared_where_one_routine_sees_both(
+    tmp_path, first, second, declared, named
+):
+    def variables(names):
+        return "".join(f"<Var><Name>{name}</Name><Type>INT</Type><InitValue>1</InitValue></Var>" for name in names)
+
+    local = "<VarDeclarations><VarLocal>{}</VarLocal></VarDeclarations>"
+    main, other = (local.format(variables(names)) for names in (first, second))
+    routine = f"</Pou><Pou><Name>Other</Name><Type>Subroutine</Type>{other}<Body>{MOVE}</Body>"
+    program = written(tmp_path, of_xml(more=main + routine, declared=variables(declared)), "a.XPL")
+    assert [each.text for each in program.findings if each.code == "program_not_understood"] == named
 
 
 def with_part(part):

@@ -219,7 +219,7 @@ def calibrate(
     if rrd:
         record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
-        options.print_json({"output": str(output) if output else None, **calibration_record(found, others)})
+        options.print_json({"output": str(output) if output else None, **calibration_record(found, arm, others)})
         return
     print(lines_of(found))
     if others:

@@ -9,6 +9,7 @@ from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement
 from er3a.calibration.plan import Plan
 from er3a.calibration.residuals import ResidualStructure
+from er3a.calibration.terms import starting_table
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.diagnosis import level
 from er3a.pipeline.messages.language import N_, as_text, tr
@@ -285,14 +286,16 @@ def _coefficients(term: TermEstimate) -> str:
     return ", ".join(f"{as_text(value, '+.3f')} +- {1.96 * error:.3f}" for value, error in pairs) + " (1/1000)"
 
 
-def calibration_record(found: Calibration, others: Sequence[Measurement] = ()) -> dict[str, object]:
+def calibration_record(found: Calibration, robot: Robot, others: Sequence[Measurement] = ()) -> dict[str, object]:
     """A calibration as plain data, for another program; corrections in mm and deg with half their 95 % interval.
 
     Parameters
     ----------
+    robot : that the calibration started from
     others : positions held back
     """
     return {
+        "start": starting_table(robot),
         "level": found.level,
         "coordinates": found.coordinates,
         "poses": found.poses,

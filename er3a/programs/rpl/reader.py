@@ -185,12 +185,18 @@ def read_rpl(source: ProgramText) -> syntax.Program:
 
 
 def alike(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> Iterator[NotUnderstood]:
-    """Variables whose names differ by capital letters alone: no source tells whether they are one."""
-    first: dict[str, str] = {}
-    for each in (*data, *(operation for routine in routines for operation in routine.code)):
-        name = variable_of(each.target) if isinstance(each, syntax.Assign) else ""
-        if first.setdefault(name.upper(), name) != name:
-            yield NotUnderstood(f"{first[name.upper()]}, {name}", each.place)
+    """Variables that one routine sees, and whose names differ by capital letters alone: no source tells whether they
+    are one."""
+    shared: dict[str, str] = {}
+    parts = [(tuple(data), ()), *((routine.code, routine.parameters) for routine in routines)]
+    for code, parameters in parts:
+        named = [(variable_of(each.target), each) for each in code if isinstance(each, syntax.Assign)]
+        own = {each.name.upper(): each.name for each in parameters}
+        private = {*own.values(), *(name for name, each in named if each.local)}
+        for name, each in named:
+            (own if name in private else shared).setdefault(name.upper(), name)
+            for first in {names.get(name.upper(), name) for names in (own, shared)} - {name}:
+                yield NotUnderstood(f"{first}, {name}", each.place)
 
 
 def _variables(source: ProgramText) -> tuple[list[syntax.Assign], list[ProgramFinding]]:
