@@ -434,7 +434,9 @@ def test_pairs_that_are_left_out_whole_are_not_named_as_joined():
     bodies = bodies_of(arm, None)
     guessed = {f"{row.first}/{row.second}" for row in bodies.matrix if row.state == "guessed" and row.left_out}
     found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies, None)}
-    assert guessed and guessed.isdisjoint(found["joined_pairs"]) and guessed <= {*found["unexamined_pairs"]}
+    assert guessed
+    assert guessed.isdisjoint(found["joined_pairs"])
+    assert guessed <= {*found["unexamined_pairs"]}
 
 
 @pytest.mark.parametrize(
@@ -453,7 +455,8 @@ def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reach
         subjects = {each.subject for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
         assert ("uncovered_links" in subjects) == (arm is seen and reaches_out)
     longer = robot.replace(flange=transform(np.array([0, 0, 0.1]), np.zeros(3)), tool=np.eye(4))
-    assert has_bare_tool(longer) and not has_bare_tool(robot)
+    assert has_bare_tool(longer)
+    assert not has_bare_tool(robot)
     assert LeftOut("bare_tool", ("flange",)) in left_out_of_collisions(longer, bodies_of(longer, None), None)
 
 

@@ -19,8 +19,8 @@ TEXTS = texts(
             "what links hit that reach out of all shapes: they have none, or look larger than those that are checked"
         ),
         "left_out.bare_tool": (
-            "what the tool, or a flange without one, hits: its point lies outside the last link's shapes, and the scene "
-            "gives it none"
+            "what the tool, or a flange without one, hits: its point lies outside the last link's shapes, and the "
+            "scene gives it none"
         ),
         "left_out.allowed_contacts": "collisions that the scene's or the robot's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
