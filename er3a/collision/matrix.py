@@ -546,9 +546,9 @@ INSIDE = 1e-6  # m
 
 @dataclass(frozen=True)
 class BaseContact:
-    """A solid that a body of the base overlaps, by a depth (m; at least that if ``inside``).
+    """A solid that a body of the base touches, by a depth (m; of hulls in solids with faces at least that).
 
-    ``inside``: the body's core, of a capsule its line, is in the solid, so that it is no mere mounting.
+    ``inside``: the body's middle, of a capsule its line, reaches into the solid, so that it is no mere mounting.
     """
 
     solid: str
@@ -557,11 +557,11 @@ class BaseContact:
 
 
 def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
-    """Solids that the base overlaps, the deepest contact with each."""
+    """Solids that the base overlaps or stands on, the deepest contact with each."""
     base = [body for body in arm_bodies(robot) if body.link == BASE]
     solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
-    bodies = [*base, *solids]
-    pairs = list(product(range(len(base)), range(len(base), len(bodies))))
+    bodies = [*base, *map(_middle, base), *solids]
+    pairs = list(product(range(len(base)), range(2 * len(base), len(bodies))))
     if not pairs:
         return ()
     layout = layout_of(robot, bodies, pairs)
@@ -570,11 +570,24 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     shape = (layout.start, layout.kind, layout.radius, layout.disc)
     found: dict[str, BaseContact] = {}
     for a, b in pairs:
-        distance, deep = pair_distance(w, shape, a, b, np.empty((ROOM, 3)), np.empty((2, 3)))
+        room, near = np.empty((ROOM, 3)), np.empty((2, 3))
+        distance, touches = pair_distance(w, shape, a, b, room, near)
+        middle, deep = pair_distance(w, shape, len(base) + a, b, room, near)
         margin = bodies[b].radius if len(bodies[b].points) > 1 else 0.0  # a ball's radius is none
-        inside = bool(deep) or distance + bodies[a].radius + margin < -INSIDE
-        contact = BaseContact(bodies[b].name, -float(distance), inside)
+        inside = bool(deep) or middle + bodies[a].radius + margin < -INSIDE
+        contact = BaseContact(bodies[b].name, 0.0 - float(distance), inside)
         before = found.get(contact.solid)
-        if distance < 0 and (before is None or (contact.inside, contact.depth) > (before.inside, before.depth)):
+        if (touches or distance < 0) and (
+            before is None or (contact.inside, contact.depth) > (before.inside, before.depth)
+        ):
             found[contact.solid] = contact
     return tuple(found.values())
+
+
+def _middle(body: Body) -> Body:
+    """Of a capsule its line; a hull at half its size, about the mean of its six ends."""
+    if len(body.points) <= 2:
+        return body
+    at_end = [np.isclose(body.points, end(body.points, axis=0)) for end in (np.min, np.max)]
+    ends = [body.points[each].mean(axis=0) for each in np.concatenate(at_end, axis=1).T]
+    return replace(body, points=(body.points + np.mean(ends, axis=0)) / 2)

@@ -92,7 +92,7 @@ def checked_file(file: Path, robot: Robot, options: CheckOptions) -> CheckedFile
 
 def missed_collisions(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
     """What a check for collisions leaves out without which nothing passes; ``arms`` with the tools of programs."""
-    left_out = left_out_of_collisions(bodies_of(robot, scene), scene, arms=arms)
+    left_out = left_out_of_collisions(robot, bodies_of(robot, scene), scene, arms=arms)
     return tuple(each for each in left_out if each.subject in NEVER_A_PASS)
 
 

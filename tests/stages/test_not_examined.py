@@ -12,9 +12,9 @@ import pytest
 import yaml
 
 from er3a.collision.along import bodies_of
-from er3a.collision.matrix import collision_matrix
+from er3a.collision.matrix import base_contacts, collision_matrix
 from er3a.collision.pairs import ASSUMED_MARGIN
-from er3a.collision.scene import Scene, Sphere
+from er3a.collision.scene import Box, Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, has_bare_tool, link_frames
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
@@ -55,7 +55,7 @@ from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
 from er3a.references.rows import GROUPS
-from er3a.robots.robot import Envelope, PairRule, Robot, Visual
+from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot, Visual
 
 ROBOT = "er3a_c60"
 
@@ -242,10 +242,10 @@ def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):
         (robot.replace(tool=tool), Scene("a", part), "bare_tool", ("tool",)),
         (aside.replace(envelopes=(*robot.envelopes, ball)), Scene("a", part), "bare_tool", ("tool",)),
     ):
-        found = {each.subject: each.names for each in left_out_of_collisions(bodies_of(arm, scene), scene)}
+        found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies_of(arm, scene), scene)}
         assert found[subject] == names
     held = Scene("a", (), part)
-    assert "bare_tool" not in {each.subject for each in left_out_of_collisions(bodies_of(robot, held), held)}
+    assert "bare_tool" not in {each.subject for each in left_out_of_collisions(robot, bodies_of(robot, held), held)}
 
 
 def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):
@@ -383,7 +383,7 @@ def test_bodies_that_a_joint_holds_are_named_where_others_of_their_links_meet():
     arm = arm.replace(envelopes=(*shapes, Envelope(1, (0, 0, 0), (0.3, 0, 0), 0.05)))
     (row,) = collision_matrix(arm).rows
     assert (row.state, row.left_out > 0) == ("meets", True)
-    found = {each.subject: each.names for each in left_out_of_collisions(bodies_of(arm, None), None)}
+    found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
     assert found["joined_pairs"] == ("base/link_1",)
 
 
@@ -408,9 +408,35 @@ def test_what_the_robots_file_allows_and_where_the_base_stands_is_named():
     places = ((0, 0, 0.1), (0.09, 0, 0.1), (0.4, 0, 0.1))
     balls = [Sphere(name, transform(np.array(p), np.zeros(3)), 0.05) for name, p in zip("abc", places)]
     scene = Scene("Balls", tuple(balls))
-    found = {each.subject: each.names for each in left_out_of_collisions(bodies_of(robot, scene), scene)}
+    found = {each.subject: each.names for each in left_out_of_collisions(robot, bodies_of(robot, scene), scene)}
     assert (found["allowed_contacts"], found["allowed_pairs"]) == (("base/link_6",), ("link_1/link_2",))
     assert (found["base_inside"], found["base_contacts"]) == (("a",), ("b",))
+
+
+@pytest.mark.parametrize("margin", [0.0, 1e-12])
+@pytest.mark.parametrize(("sunk", "inside"), [(0.0, False), (1e-4, False), (0.02, False), (0.3, True)])
+def test_a_base_of_pieces_stands_on_a_box_or_floor_or_lies_in_it(margin, sunk, inside):
+    """A base 0.2 m high, whose underside is exactly at z = 0, on a box and a floor that reach ``sunk`` (m) up."""
+    corners = tuple((x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (0.0, 0.2))
+    robot = load_robot(ROBOT).replace(envelopes=(), hulls=(ConvexPiece(0, corners, margin),))
+    box = Box("box", transform(np.array([0, 0, sunk - 0.5]), np.zeros(3)), (1.0, 1.0, 1.0))
+    contacts = base_contacts(robot, Scene("Mounted", (box, Plane("floor", (0.0, 0.0, 1.0), sunk))))
+    assert {each.solid: each.inside for each in contacts} == dict.fromkeys(
+        ("box", "floor") if sunk or margin else ("box",), inside
+    )
+
+
+def test_pairs_that_are_left_out_whole_are_not_named_as_joined():
+    """Of links without length the guess leaves no room, and the two beside them overlap in many poses."""
+    arm = Robot.from_dh(
+        [0.0, 0.25, 0.0, 0.0, 0.0, 0.0], [1.57, 0.0, 1.57, -1.57, 1.57, 0.0], [0.2, 0, 0, 0.02, 0, 0.05]
+    )
+    bodies = bodies_of(arm, None)
+    guessed = {f"{row.first}/{row.second}" for row in bodies.matrix if row.state == "guessed" and row.left_out}
+    found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies, None)}
+    assert guessed
+    assert guessed.isdisjoint(found["joined_pairs"])
+    assert guessed <= {*found["unexamined_pairs"]}
 
 
 @pytest.mark.parametrize(
@@ -425,8 +451,13 @@ def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reach
     assert not arm_shapes(robot).uncovered
     guessed = seen.replace(envelopes=(), sources={})
     assert (link in arm_shapes(guessed).uncovered) == reaches_out
+    for arm in (robot, seen):  # equal, but for what they look like
+        subjects = {each.subject for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
+        assert ("uncovered_links" in subjects) == (arm is seen and reaches_out)
+    longer = robot.replace(flange=transform(np.array([0, 0, 0.1]), np.zeros(3)), tool=np.eye(4))
+    assert has_bare_tool(longer)
     assert not has_bare_tool(robot)
-    assert has_bare_tool(robot.replace(flange=transform(np.array([0, 0, 0.1]), np.zeros(3))))
+    assert LeftOut("bare_tool", ("flange",)) in left_out_of_collisions(longer, bodies_of(longer, None), None)
 
 
 @pytest.mark.long

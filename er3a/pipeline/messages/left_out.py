@@ -19,7 +19,8 @@ TEXTS = texts(
             "what links hit that reach out of all shapes: they have none, or look larger than those that are checked"
         ),
         "left_out.bare_tool": (
-            "what the tool hits: its point lies outside the last link's shapes, and the scene gives it none"
+            "what the tool, or a flange without one, hits: its point lies outside the last link's shapes, and the "
+            "scene gives it none"
         ),
         "left_out.allowed_contacts": "collisions that the scene's or the robot's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
@@ -120,7 +121,7 @@ TEXTS = texts(
         ),
         "left_out.between_places": "places for the box between grid points {amount:.0f} mm apart",
         "left_out.base_contacts": "whether the base is mounted where it overlaps these solids, as is taken for granted",
-        "left_out.base_inside": "collisions of the base, whose axis lies in these solids: scene or base is misplaced",
+        "left_out.base_inside": "collisions of the base, whose middle lies in these solids: scene or base is misplaced",
         "left_out.box_directions": (
             "directions of the box's cone: the arm's joints don't set them all, and those that they don't are not asked"
         ),

@@ -17,27 +17,34 @@ from er3a.robots.robot import Robot
 
 
 def left_out_of_collisions(
-    bodies: Bodies, scene: Scene | None, tolerance_mm: float | None = None, arms: Iterable[tuple[str, Robot]] = ()
+    robot: Robot,
+    bodies: Bodies,
+    scene: Scene | None,
+    tolerance_mm: float | None = None,
+    arms: Iterable[tuple[str, Robot]] = (),
 ) -> tuple[LeftOut, ...]:
     """What a check for collisions does not see.
 
     Parameters
     ----------
+    robot : that of the bodies, which may be an equal one that looks otherwise
     tolerance_mm : of overlaps that may go unnoticed between points of a motion; None where only points are checked
     arms : the robot with each tool that programs set, by the tool's name
     """
 
     def pairs(state: PairState) -> tuple[str, ...]:
-        also = state == "joined"  # bodies of links that meet elsewhere
+        others = ("meets", "undecided", "watched") if state == "joined" else ()  # some of their bodies are joined
         return tuple(
-            f"{row.first}/{row.second}" for row in bodies.matrix if row.state == state or (also and row.left_out)
+            f"{row.first}/{row.second}"
+            for row in bodies.matrix
+            if row.state == state or (row.left_out and row.state in others)
         )
 
-    robot, carries = bodies.robot, bool(scene and scene.carried)
+    carries, tip = bool(scene and scene.carried), "tool" if robot.tool[:3, 3].any() else "flange"
     shapes, rules = arm_shapes(robot), scene.pair_rules if scene else ()
     solids = {solid.name for solid in scene.solids} if scene else set()
     by_scene = {frozenset((each.first, each.second)): f"{each.first}/{each.second}" for each in rules}
-    bare = dict.fromkeys(name or "tool" for name, arm in (("", robot), *arms) if not carries and has_bare_tool(arm))
+    bare = dict.fromkeys(name or tip for name, arm in (("", robot), *arms) if not carries and has_bare_tool(arm))
     allowed = [name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene]
     hidden = {f"{row.first}/{row.second}" for row in bodies.matrix if row.witness is not None}
     contacts = base_contacts(robot, scene)

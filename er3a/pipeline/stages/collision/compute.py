@@ -167,7 +167,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             not_examined=(
                 *(
                     each
-                    for each in left_out_of_collisions(bodies, scene, settings.penetration_tolerance_mm)
+                    for each in left_out_of_collisions(robot, bodies, scene, settings.penetration_tolerance_mm)
                     if each.subject != "base_inside"  # it fails for that
                 ),
                 LeftOut("joint_vectors", amount=settings.samples),

@@ -96,7 +96,7 @@ class PlacesSummary:
 
 @dataclass(frozen=True)
 class Mounting:
-    """A solid that the base overlaps, which is taken as what it is mounted on; ``inside``: the base's axis is in it."""
+    """A solid that the base overlaps, which is taken as what it is mounted on; ``inside``: its middle is in it."""
 
     solid: str
     depth_mm: float

@@ -286,9 +286,9 @@ def _closest(found: model.Closest) -> list[str]:
 
 def _mounted(solid: str, depth_mm: float, inside: bool) -> str:
     if inside:
-        return tr("The base's axis lies in {own_name}.", own_name=solid)
+        return tr("The base's middle lies in {own_name}.", own_name=solid)
     return tr(
-        "The base overlaps {own_name} by {depth} mm in every pose; this is taken to be its mounting.",
+        "The base overlaps {own_name} by {depth} mm or more in every pose; this is taken to be its mounting.",
         own_name=solid,
         depth=fixed(depth_mm, 1),
     )

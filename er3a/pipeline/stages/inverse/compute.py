@@ -417,7 +417,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
         not_examined=(
             *_left_out(robot, results, many, settings.mix, trips),
             *orientations_off(robot, {target.name: target for target in targets}, asked, chosen),
-            *left_out_of_collisions(bodies_of(robot, scene), scene),
+            *left_out_of_collisions(robot, bodies_of(robot, scene), scene),
             *left_out_without_tool(robot),
         ),
     )

@@ -80,7 +80,9 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
             assumed_speed=tuple(bool(value) for value in ~np.isfinite(robot.speed)),
             programs=tuple(summaries),
             not_examined=(
-                *left_out_of_collisions(bodies_of(robot, scene), scene, 1000 * options.penetration_tolerance, arms),
+                *left_out_of_collisions(
+                    robot, bodies_of(robot, scene), scene, 1000 * options.penetration_tolerance, arms
+                ),
                 *left_out_of_rates(np.isfinite(robot.speed), jerk=False),
                 *_left_out(summaries, unknown_starts),
             ),

@@ -426,7 +426,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         paths=tuple(paths),
         not_followed=tuple(skipped),
         not_examined=(
-            *left_out_of_collisions(surroundings.bodies, scene, settings.penetration_tolerance_mm),
+            *left_out_of_collisions(robot, surroundings.bodies, scene, settings.penetration_tolerance_mm),
             *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
             *_left_out(paths, skipped, only),
             *by_subject(rest),

@@ -389,7 +389,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         objects=objects,
         not_examined=(
             *_left_out(calibration, task_file),
-            *left_out_of_collisions(bodies, scene, 1000 * DEPTH),
+            *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH),
             *left_out_of_rates(np.isfinite(robot.speed), motions.jerk_deg_s3 is not None),
             LeftOut("torques"),
         ),

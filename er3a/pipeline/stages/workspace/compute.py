@@ -265,7 +265,7 @@ def _summary(
         placement=tool.placement,
         not_examined=(
             *_left_out(settings, proven, surface, voids, tool),
-            *left_out_of_collisions(bodies_of(robot, scene), scene),
+            *left_out_of_collisions(robot, bodies_of(robot, scene), scene),
             *left_out_without_tool(robot),
         ),
     )
