@@ -10,7 +10,7 @@ import numpy as np
 
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.language import tr
+from er3a.pipeline.messages.language import tr, with_unit
 from er3a.pipeline.messages.programs import remedy
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.messages.trajectory import (
@@ -131,8 +131,12 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
 
 
 def _programs(rows: model.ProgramFiles) -> list[ProgramLink]:
-    texts = zip(rows.file.tolist(), rows.text.tolist(), rows.assumed_speed.tolist())
-    return [ProgramLink(file, packed_text(text), not text, assumed) for file, text, assumed in texts]
+    speeds = [
+        ", ".join(with_unit(*speed.split(" ", 1)) for speed in text.split(", ") if speed)
+        for text in rows.assumed_speed.tolist()
+    ]
+    texts = zip(rows.file.tolist(), rows.text.tolist(), speeds)
+    return [ProgramLink(file, packed_text(text), not text, speed) for file, text, speed in texts]
 
 
 def _section(

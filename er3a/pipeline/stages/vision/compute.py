@@ -406,23 +406,16 @@ def compute(study: Study, name: str) -> model.VisionResults:
         camera_covariance=np.mean([each.standard_deviation.covariance() for each in task_file.objects], axis=0),
         cells=settings.map_cells,
     )
+    written = partial(
+        grasp_programs, speed=limits_of(robot, motions).speed, languages=motions.programs, simulated=head.simulated
+    )
     return model.VisionResults(
         summary,
         sample_rows(found, len(robot.lower)),
         error_map(found, map_task),
         model.PathRows.stacked(_ways(entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen),
         model.GraspPrograms.stacked(
-            grasp_programs(
-                robot,
-                entry.name,
-                map_task.home,
-                plan.chosen,
-                motions.programs,
-                speed=limits_of(robot, motions).speed,
-                simulated=head.simulated,
-            )
-            for entry, plan, _ in planned
-            if plan.chosen
+            written(robot, entry.name, map_task.home, plan.chosen) for entry, plan, _ in planned if plan.chosen
         ),
         corner_rows(found, images),
     )

@@ -252,7 +252,7 @@ class CalibrationResult:
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """The samples that the calibration does not use: suspects but poses that come again, whose copies count once."""
+        """The samples that the calibration does not use: suspects, but for poses that come again."""
         return tuple(each.sample for each in self.suspects if not isinstance(each, RepeatedPose))
 
 
