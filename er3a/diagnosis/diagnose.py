@@ -114,39 +114,31 @@ def resolution_of(case: Case) -> Resolution:
     lengths = [size * MM for number, size in noticed.items() if size is not None and not number.is_angle]
     angles = [float(np.degrees(size)) for number, size in noticed.items() if size is not None and number.is_angle]
     half_turns = [number for number in entries if number.is_angle and not _missed(case, number, np.array([np.pi]))[0]]
-    joints = range(case.given.direction.shape[-1])
-    reversible = [f"direction{joint + 1}" for joint in joints if not _noticed_reversed(case, joint)]
     return Resolution(
         length_mm=max(lengths, default=None),
         angle_deg=max(angles, default=None),
         half_turns=tuple(number.name for number in half_turns if noticed[number] is not None),
-        unseen=(*(number.name for number, size in noticed.items() if size is None), *reversible),
+        unseen=(*(number.name for number, size in noticed.items() if size is None), *_reversible(case)),
     )
 
 
 def unseen_of(case: Case) -> tuple[str, ...]:
     """Entries that no reference reacts to, whatever their value, and joints that could be reversed."""
+    before = case.difference(case.given)[0]
     entries = [number for number in case.numbers if number.column]
     if not entries:
         rows = range(1, case.given.d.shape[-1] + 1)
         names = [f"{name}{row}" for name in ("a", "alpha", "d", "offset") for row in rows]
     else:
-        names = [number.name for number in entries if _never_missed(case, number)]
-    return (*names, *_reversible(case))
+        sizes = {number: np.array(TRIED_RAD if number.is_angle else TRIED_M) for number in entries}
+        missed = {number: _missed(case, number, np.concatenate([own, -own]), before) for number, own in sizes.items()}
+        names = [number.name for number, own in missed.items() if not own.any()]
+    return (*names, *_reversible(case, before))
 
 
-def _never_missed(case: Case, number: FreeNumber) -> bool:
-    """Whether no change of an entry that a table could have moves what the references say."""
-    sizes = np.array(TRIED_RAD if number.is_angle else TRIED_M)
-    before = case.difference(case.given)[0]
-    tables = case.given[np.zeros(2 * len(sizes), dtype=int)]
-    amounts = np.concatenate([sizes, -sizes])[:, None]
-    changed = case.difference(moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts))
-    return bool((np.abs(changed - before) <= case.uncertainty * MEETS).all())
-
-
-def _reversible(case: Case) -> list[str]:
-    before = case.difference(case.given)[0]
+def _reversible(case: Case, before: Reals | float = 0.0) -> list[str]:
+    """Joints that could be reversed without a difference to references leaving ``before`` by more than their
+    uncertainty."""
     found = []
     for joint in range(case.given.direction.shape[-1]):
         turned = case.given.with_column("direction", [joint], -case.given.direction[:, [joint]])
@@ -163,11 +155,6 @@ def least_noticed(case: Case, number: FreeNumber) -> float | None:
     if not missed.any(axis=1).all():
         return None
     return float(sizes[missed.argmax(axis=1).max()])
-
-
-def _noticed_reversed(case: Case, joint: int) -> bool:
-    turned = case.given.with_column("direction", [joint], -case.given.direction[:, [joint]])
-    return bool((np.abs(case.difference(turned)) > case.uncertainty * MEETS).any())
 
 
 def distinguishability(case: Case, ranking: Ranking) -> float | None:
@@ -208,10 +195,10 @@ def _slopes(case: Case, ranking: Ranking, row: int) -> Reals:
     return slopes
 
 
-def _missed(case: Case, number: FreeNumber, amounts: Reals) -> Flags:
+def _missed(case: Case, number: FreeNumber, amounts: Reals, before: Reals | float = 0.0) -> Flags:
     tables = case.given[np.zeros(len(amounts), dtype=int)]
     changed = moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts[:, None])
-    missed: Flags = np.any(np.abs(case.difference(changed)) > case.uncertainty * MEETS, axis=1)
+    missed: Flags = np.any(np.abs(case.difference(changed) - before) > case.uncertainty * MEETS, axis=1)
     return missed
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -17,23 +17,6 @@ from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Limit, PoseOutside, Side, value_at
 from er3a.references.reference import Reference, expected_of
 
-FaultKind = Literal[
-    "unit",
-    "alpha_sign",
-    "alpha",
-    "swap",
-    "rows",
-    "limits",
-    "shift",
-    "offset",
-    "direction",
-    "convention",
-    "length",
-    "scale",
-    "base",
-    "flange",
-    "ground",
-]
 Misread = Literal["metres_as_millimetres", "millimetres_as_metres", "radians_as_degrees", "degrees_as_radians"]
 Entries = Literal["a", "d", "lengths", "alpha", "offset", "limits", "angles"]
 LimitFault = Literal["crossed", "signs_swapped", "lower_sign", "upper_sign"]
@@ -45,7 +28,6 @@ class WrongUnit(Finding):
 
     entries: Entries
     misread: Misread
-    kind: ClassVar[FaultKind] = "unit"
 
 
 class WrongAlphaSign(Finding):
@@ -54,7 +36,6 @@ class WrongAlphaSign(Finding):
     joint: int
     given_deg: float
     fits_deg: float
-    kind: ClassVar[FaultKind] = "alpha_sign"
 
 
 class WrongAlpha(Finding):
@@ -63,14 +44,12 @@ class WrongAlpha(Finding):
     joint: int
     given_deg: float
     fits_deg: float
-    kind: ClassVar[FaultKind] = "alpha"
 
 
 class SwappedEntries(Finding):
     """a and d are swapped, of one joint or, if None, of all."""
 
     joint: int | None
-    kind: ClassVar[FaultKind] = "swap"
 
 
 class SwappedRows(Finding):
@@ -78,7 +57,6 @@ class SwappedRows(Finding):
 
     first: int
     second: int
-    kind: ClassVar[FaultKind] = "rows"
 
 
 class SwappedLimits(Finding):
@@ -86,7 +64,6 @@ class SwappedLimits(Finding):
 
     first: int
     second: int
-    kind: ClassVar[FaultKind] = "limits"
 
 
 class ShiftedRows(Finding):
@@ -94,7 +71,6 @@ class ShiftedRows(Finding):
 
     entries: Literal["rows", "a", "alpha", "d"]
     toward: Literal["down", "up"]
-    kind: ClassVar[FaultKind] = "shift"
 
 
 class WrongOffset(Finding):
@@ -103,21 +79,18 @@ class WrongOffset(Finding):
     joint: int
     given_deg: float
     fits_deg: float
-    kind: ClassVar[FaultKind] = "offset"
 
 
 class ReversedDirection(Finding):
     """A joint turns the other way."""
 
     joint: int
-    kind: ClassVar[FaultKind] = "direction"
 
 
 class WrongConvention(Finding):
     """The table was read in the other Denavit-Hartenberg convention; ``read_as`` is the one that it was read in."""
 
     read_as: Literal["standard", "modified"]
-    kind: ClassVar[FaultKind] = "convention"
 
 
 class WrongLimits(Finding):
@@ -125,7 +98,6 @@ class WrongLimits(Finding):
 
     joint: int | None
     fault: LimitFault
-    kind: ClassVar[FaultKind] = "limits"
 
 
 class WrongLimit(Finding):
@@ -135,7 +107,6 @@ class WrongLimit(Finding):
     side: Side
     given_deg: float
     fits_deg: float
-    kind: ClassVar[FaultKind] = "limits"
 
 
 class WrongLength(Finding):
@@ -145,14 +116,12 @@ class WrongLength(Finding):
     column: LengthColumn
     given_mm: float
     fits_mm: float
-    kind: ClassVar[FaultKind] = "length"
 
 
 class WrongScale(Finding):
     """All lengths are wrong by a common factor."""
 
     factor: float
-    kind: ClassVar[FaultKind] = "scale"
 
 
 class BaseElsewhere(Finding):
@@ -160,7 +129,6 @@ class BaseElsewhere(Finding):
 
     shift_mm: tuple[float, float, float]
     turn_deg: float
-    kind: ClassVar[FaultKind] = "base"
 
 
 class FlangeElsewhere(Finding):
@@ -168,7 +136,6 @@ class FlangeElsewhere(Finding):
 
     shift_mm: tuple[float, float, float]
     turn_deg: float = 0.0
-    kind: ClassVar[FaultKind] = "flange"
 
 
 class CountedFromGround(Finding):
@@ -178,7 +145,6 @@ class CountedFromGround(Finding):
     joint: int
     along: tuple[int, ...]
     sign: Literal[1, -1]
-    kind: ClassVar[FaultKind] = "ground"
 
 
 Fault = (
