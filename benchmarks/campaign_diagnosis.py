@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from er3a import load_references, load_robot
+from er3a.diagnosis import faults
 from er3a.diagnosis.ranking import case_of, rank, usable
 from er3a.pipeline.messages.diagnosis import both
 from testing.evidence import sized
@@ -105,9 +106,28 @@ def by(key: Callable[[Outcome], str], found: Sequence[Outcome]) -> list[str]:
     return [row((kind,), own) for kind, own in sorted(kinds.items())]
 
 
+FAMILIES: dict[str, tuple[type, ...]] = {
+    "unit": (faults.WrongUnit,),
+    "alpha sign": (faults.WrongAlphaSign,),
+    "alpha": (faults.WrongAlpha,),
+    "swap": (faults.SwappedEntries,),
+    "rows": (faults.SwappedRows,),
+    "limits": (faults.SwappedLimits, faults.WrongLimits, faults.WrongLimit),
+    "shift": (faults.ShiftedRows,),
+    "offset": (faults.WrongOffset,),
+    "direction": (faults.ReversedDirection,),
+    "convention": (faults.WrongConvention,),
+    "length": (faults.WrongLength,),
+    "scale": (faults.WrongScale,),
+    "base": (faults.BaseElsewhere,),
+    "flange": (faults.FlangeElsewhere,),
+    "ground": (faults.CountedFromGround,),
+}
+
+
 def kind_of(outcome: Outcome) -> str:
     """The family of a single fault."""
-    return outcome.faults[0].kind.replace("_", " ")
+    return next(name for name, own in FAMILIES.items() if isinstance(outcome.faults[0], own))
 
 
 def table() -> str:

@@ -15,22 +15,24 @@ library. Every sheet is short however much the object holds.
 
 What computation finds: codes with typed parameters, from which sentences are made elsewhere.
 
-A finding is a frozen dataclass whose last field is ``code: Literal["some_code"] = "some_code"``; its other fields are
-the parameters, plain or findings themselves, with the unit in the name. Several kinds of finding in one place are a
-union. Nothing decides by a sentence: code asks for the type or the code.
+The fields of a :class:`Finding` but its code are the parameters, plain or findings themselves, with the unit in the
+name. Several kinds of finding in one place are a union. Nothing decides by a sentence: code asks for the type or the
+code.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from html import escape
+from inspect import get_annotations
 from itertools import islice
 from types import MethodType
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -257,12 +259,19 @@ def _cut(text: str) -> str:
     return text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 3] + "..."
 
 
-class Finding(Protocol):
-    """Any finding."""
+@dataclass_transform(frozen_default=True)
+class Finding:
+    """Base of what computation finds: frozen dataclasses by being derived from it.
 
+    The last field of each is its ``code``, the stable identifier that summaries hold: the name of the class in lower
+    case with underscores (``WrongUnit``: "wrong_unit"), unless ``class AllSafe(Finding, code="trajectory.safe")`` gives
+    another.
+    """
+
+    code: ClassVar[str]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    @property
-    def code(self) -> str:
-        """What was found: the stable identifier that summaries hold."""
-        ...
+    def __init_subclass__(cls, code: str | None = None) -> None:
+        cls.code = code or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+        cls.__annotations__ = get_annotations(cls) | {"code": Literal[cls.code]}
+        dataclass(frozen=True)(cls)

@@ -444,9 +444,6 @@ class Turntable(WithoutParameters):
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         return solve_turntable(self.links, T)[:, None], np.full(len(T), CERTAIN)
 
-    def seeds(self, T: Reals, values: Reals) -> Reals:
-        return np.empty((0, 1))
-
 
 @dataclass(frozen=True, eq=False)
 class PlanarFour('''

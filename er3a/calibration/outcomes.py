@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import Finding
 from er3a.errors import Er3aError
 from er3a.references.quantities import Pose
 
@@ -22,43 +22,33 @@ TermVerdict = Literal["taken", "not_lower", "noise", "wrong_way"]
 may have made it, or because a load would have to lift the arm."""
 
 
-@dataclass(frozen=True)
-class MovesNothing:
+class MovesNothing(Finding):
     """An entry moves none of the measured points."""
 
     entry: str
-    code: Literal["moves_nothing"] = "moves_nothing"
 
 
-@dataclass(frozen=True)
-class NotToldApart:
+class NotToldApart(Finding):
     """Entries act alike on the measured points; ``parallel_joints``: because these joints are parallel, if so."""
 
     entries: tuple[str, ...]
     parallel_joints: tuple[int, int] | None
-    code: Literal["not_told_apart"] = "not_told_apart"
 
 
-@dataclass(frozen=True)
-class SetsScale:
+class SetsScale(Finding):
     """No length was measured, so that the longest keeps its value, and all others are given beside it."""
 
     entry: str
-    code: Literal["sets_scale"] = "sets_scale"
 
 
 Held = MovesNothing | NotToldApart | SetsScale
 
 
-@dataclass(frozen=True)
-class NoPositions:
+class NoPositions(Finding):
     """There are no positions of single points."""
 
-    code: Literal["no_positions"] = "no_positions"
 
-
-@dataclass(frozen=True)
-class MorePositions:
+class MorePositions(Finding):
     """A level asks for more positions.
 
     Attributes
@@ -79,11 +69,9 @@ class MorePositions:
     least: int
     entries: tuple[str, ...]
     examples_deg: tuple[Pose, ...]
-    code: Literal["more_positions"] = "more_positions"
 
 
-@dataclass(frozen=True)
-class MoreTouches:
+class MoreTouches(Finding):
     """Places, planes, pairs or bars are touched at too few poses.
 
     Attributes
@@ -100,16 +88,13 @@ class MoreTouches:
     determinable: int
     least: int
     each: tuple[tuple[str, int, int], ...]
-    code: Literal["more_touches"] = "more_touches"
 
 
-@dataclass(frozen=True)
-class NoCorrectionFits:
+class NoCorrectionFits(Finding):
     """The steps do not end: the table has a gross fault or is another arm's."""
 
     steps: int
     rest_mm: float
-    code: Literal["no_correction_fits"] = "no_correction_fits"
 
 
 NotCalibrated = NoPositions | MorePositions | MoreTouches | NoCorrectionFits
@@ -123,31 +108,25 @@ class CalibrationError(Er3aError):
         super().__init__(problem)
 
 
-@dataclass(frozen=True)
-class Misfit:
+class Misfit(Finding):
     """No corrections make the table meet the positions to three times their uncertainty."""
 
     level: LevelName
     rms_before_mm: float
     rms_after_mm: float
-    code: Literal["misfit"] = "misfit"
 
 
-@dataclass(frozen=True)
-class CorrectionsFound:
+class CorrectionsFound(Finding):
     """Entries whose 95 % interval does not hold 0."""
 
     entries: tuple[str, ...]
-    code: Literal["corrections_found"] = "corrections_found"
 
 
-@dataclass(frozen=True)
-class NoCorrectionFound:
+class NoCorrectionFound(Finding):
     """All 95 % intervals hold 0; those of ``open`` entries are wider than what a table could be wrong by."""
 
     intervals: int
     open: tuple[str, ...] = ()
-    code: Literal["no_correction_found"] = "no_correction_found"
 
 
 CalibrationConclusion = Misfit | CorrectionsFound | NoCorrectionFound

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import Literal
+
+from er3a.by_value import Finding
 
 BASE = 0  # number of the link that stands still
 TRIED = 1024  # joint vectors, spread over the limits, in which each pair is tried
@@ -26,52 +26,44 @@ class TwoBodies(ABC):
         return "/".join(self.names)
 
 
-@dataclass(frozen=True)
-class LinkPair(TwoBodies):
+class LinkPair(TwoBodies, Finding):
     """Two links: 0 for the base, 1..6 for the link that joint 1..6 turns."""
 
     first: int
     second: int
-    code: Literal["link_pair"] = "link_pair"
 
     @property
     def names(self) -> tuple[str, str]:
         return link_label(self.first), link_label(self.second)
 
 
-@dataclass(frozen=True)
-class LinkAndSolid(TwoBodies):
+class LinkAndSolid(TwoBodies, Finding):
     """A link and a solid of the scene, by its name."""
 
     link: int
     solid: str
-    code: Literal["link_and_solid"] = "link_and_solid"
 
     @property
     def names(self) -> tuple[str, str]:
         return link_label(self.link), self.solid
 
 
-@dataclass(frozen=True)
-class CarriedAndLink(TwoBodies):
+class CarriedAndLink(TwoBodies, Finding):
     """What the tool carries, by its name, and a link."""
 
     carried: str
     link: int
-    code: Literal["carried_and_link"] = "carried_and_link"
 
     @property
     def names(self) -> tuple[str, str]:
         return link_label(self.link), self.carried
 
 
-@dataclass(frozen=True)
-class CarriedAndSolid(TwoBodies):
+class CarriedAndSolid(TwoBodies, Finding):
     """What the tool carries and a solid of the scene, by their names."""
 
     carried: str
     solid: str
-    code: Literal["carried_and_solid"] = "carried_and_solid"
 
     @property
     def names(self) -> tuple[str, str]:
@@ -81,36 +73,29 @@ class CarriedAndSolid(TwoBodies):
 Pair = LinkPair | LinkAndSolid | CarriedAndLink | CarriedAndSolid
 
 
-@dataclass(frozen=True)
-class PairOverlaps:
+class PairOverlaps(Finding):
     """Two bodies overlap, by a depth."""
 
     pair: Pair
     depth_mm: float
-    code: Literal["pair_overlaps"] = "pair_overlaps"
 
 
-@dataclass(frozen=True)
-class PairTooNear:
+class PairTooNear(Finding):
     """Two bodies come nearer to each other than the margin that is to be kept."""
 
     pair: Pair
     clearance_mm: float
     margin_mm: float
-    code: Literal["pair_too_near"] = "pair_too_near"
 
 
-@dataclass(frozen=True)
-class PairsUnexamined:
+class PairsUnexamined(Finding):
     """Pairs whose collisions were not looked at, because their shapes overlap in all joint vectors tried
     and so can't be right."""
 
     pairs: tuple[Pair, ...]
-    code: Literal["pairs_unexamined"] = "pairs_unexamined"
 
 
-@dataclass(frozen=True)
-class ShapesAssumed:
+class ShapesAssumed(Finding):
     """No document that verdicts rest on gives the shapes of an arm's links: what is said of collisions rests on
     assumed ones.
 
@@ -124,7 +109,6 @@ class ShapesAssumed:
     given: bool
     margin_mm: float
     near: tuple[str, ...] = ()
-    code: Literal["shapes_assumed"] = "shapes_assumed"
 
 
 def link_label(number: int) -> str:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+from er3a.by_value import Finding
 from er3a.diagnosis.faults import Faults
 from er3a.references.quantities import Pose, Side, Unit
 
 
-@dataclass(frozen=True)
-class FlangePositionDecides:
+class FlangePositionDecides(Finding):
     """Hypotheses differ in where the flange is at a pose.
 
     Attributes
@@ -22,30 +21,21 @@ class FlangePositionDecides:
     pose_deg: Pose
     share: float
     most_mm: float
-    code: Literal["flange_position_decides"] = "flange_position_decides"
 
 
-@dataclass(frozen=True)
-class LimitDecides:
+class LimitDecides(Finding):
     """Hypotheses differ in a joint's limit."""
 
     joint: int
     side: Side
-    code: Literal["limit_decides"] = "limit_decides"
 
 
-@dataclass(frozen=True)
-class NothingDecides:
+class NothingDecides(Finding):
     """Hypotheses are the same arm written in different ways."""
 
-    code: Literal["nothing_decides"] = "nothing_decides"
 
-
-@dataclass(frozen=True)
-class OrientationDecides:
+class OrientationDecides(Finding):
     """Hypotheses differ in the flange's orientation, but nowhere in its position."""
-
-    code: Literal["orientation_decides"] = "orientation_decides"
 
 
 NextMeasurement = FlangePositionDecides | LimitDecides | NothingDecides | OrientationDecides
@@ -80,15 +70,11 @@ class RankedHypothesis:
     score: float
 
 
-@dataclass(frozen=True)
-class NothingToRestOn:
+class NothingToRestOn(Finding, code="no_reference"):
     """A reference set states nothing that a diagnosis can use."""
 
-    code: Literal["no_reference"] = "no_reference"
 
-
-@dataclass(frozen=True)
-class Resolution:
+class Resolution(Finding):
     """From which size on a single wrong entry would be noticed, whichever it is and whichever way it is wrong.
 
     Attributes
@@ -102,20 +88,16 @@ class Resolution:
     angle_deg: float | None
     half_turns: tuple[str, ...]
     unseen: tuple[str, ...]
-    code: Literal["resolution"] = "resolution"
 
 
-@dataclass(frozen=True)
-class NothingToExplain:
+class NothingToExplain(Finding, code="met"):
     """All references that a diagnosis rests on are met."""
 
     references: int
     resolution: Resolution | None = None
-    code: Literal["met"] = "met"
 
 
-@dataclass(frozen=True)
-class MostLikelyFault:
+class MostLikelyFault(Finding, code="named"):
     """The best hypothesis meets all references.
 
     Attributes
@@ -128,11 +110,9 @@ class MostLikelyFault:
     residual_after: float
     unit: Unit
     alternatives: tuple[Faults, ...] = ()
-    code: Literal["named"] = "named"
 
 
-@dataclass(frozen=True)
-class TooSmallToTell:
+class TooSmallToTell(Finding):
     """Several hypotheses meet all references, but only because the disagreement is small.
 
     Attributes
@@ -146,11 +126,9 @@ class TooSmallToTell:
     residual: float
     distinguishability: float
     unit: Unit
-    code: Literal["too_small_to_tell"] = "too_small_to_tell"
 
 
-@dataclass(frozen=True)
-class MainFault:
+class MainFault(Finding, code="mostly"):
     """No hypothesis meets all references; the best leaves less than 5 % of the residual.
 
     Attributes
@@ -163,11 +141,9 @@ class MainFault:
     residual_after: float
     unit: Unit
     alternatives: tuple[Faults, ...] = ()
-    code: Literal["mostly"] = "mostly"
 
 
-@dataclass(frozen=True)
-class NoFaultStandsOut:
+class NoFaultStandsOut(Finding):
     """References are missed, and no hypothesis does better than the table as it is.
 
     Attributes
@@ -181,11 +157,9 @@ class NoFaultStandsOut:
     references: int
     half_widths: float
     tried: int
-    code: Literal["no_fault_stands_out"] = "no_fault_stands_out"
 
 
-@dataclass(frozen=True)
-class NoFewFaultsExplain:
+class NoFewFaultsExplain(Finding, code="unexplained"):
     """None of the single faults and pairs that were tried explains the residual.
 
     Attributes
@@ -198,7 +172,6 @@ class NoFewFaultsExplain:
     residual_after: float
     unit: Unit
     least: float
-    code: Literal["unexplained"] = "unexplained"
 
 
 Conclusion = (

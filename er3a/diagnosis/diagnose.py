@@ -9,23 +9,7 @@ from typing import cast
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
-from er3a.diagnosis.conclusions import (
-    Conclusion,
-    FlangePositionDecides,
-    LimitDecides,
-    MainFault,
-    MostLikelyFault,
-    NextMeasurement,
-    NoFaultStandsOut,
-    NoFewFaultsExplain,
-    NothingDecides,
-    NothingToExplain,
-    NothingToRestOn,
-    OrientationDecides,
-    RankedHypothesis,
-    Resolution,
-    TooSmallToTell,
-)
+from er3a.diagnosis import conclusions
 from er3a.diagnosis.defined_otherwise import Conventions, conventions_of, counted_from_ground
 from er3a.diagnosis.faults import SIDES, Faults, entry_of
 from er3a.diagnosis.fitting import MEETS, PROBE, FreeNumber, minimise_max, moved
@@ -54,7 +38,7 @@ TRIED_RAD = tuple(np.radians([1.0, 10.0, 37.0, 90.0, 150.0, 180.0]).tolist())
 TRIED_M = 0.001, 0.01, 0.1, 0.5
 
 
-def deciding_measurement(tables: Tables, robot: Robot) -> NextMeasurement | None:
+def deciding_measurement(tables: Tables, robot: Robot) -> conclusions.NextMeasurement | None:
     """The pose, out of single joints turned and all turned together, at which the flange positions that the tables
     predict are farthest apart; else the limits in which they differ.
 
@@ -78,13 +62,15 @@ def deciding_measurement(tables: Tables, robot: Robot) -> NextMeasurement | None
     best = int(np.lexsort((-apart[pairs].max(axis=0), -share))[0])
     if share[best] > 0:
         pose = cast(Pose, tuple(poses[best].tolist()))
-        return FlangePositionDecides(pose, float(share[best]), float(apart[pairs][:, best].max()))
+        return conclusions.FlangePositionDecides(pose, float(share[best]), float(apart[pairs][:, best].max()))
     for side in SIDES:
         column = tables.lower if side == "lower" else tables.upper
         joints = np.flatnonzero(np.ptp(column, axis=0) > APART_RAD)
         if len(joints):
-            return LimitDecides(int(joints[0]) + 1, side)
-    return NothingDecides() if np.ptp(flanges, axis=0).max() < APART_RAD else OrientationDecides()
+            return conclusions.LimitDecides(int(joints[0]) + 1, side)
+    return (
+        conclusions.NothingDecides() if np.ptp(flanges, axis=0).max() < APART_RAD else conclusions.OrientationDecides()
+    )
 
 
 def _candidates(robot: Robot) -> Reals:
@@ -107,46 +93,38 @@ ALIKE = 0.01
 """Two hypotheses that differ by less of a half-width than this, whatever value they take, are alike at any size."""
 
 
-def resolution_of(case: Case) -> Resolution:
+def resolution_of(case: Case) -> conclusions.Resolution:
     """What would be noticed of a table that meets all references."""
     entries = [number for number in case.numbers if number.column]
     noticed = {number: least_noticed(case, number) for number in entries}
     lengths = [size * MM for number, size in noticed.items() if size is not None and not number.is_angle]
     angles = [float(np.degrees(size)) for number, size in noticed.items() if size is not None and number.is_angle]
     half_turns = [number for number in entries if number.is_angle and not _missed(case, number, np.array([np.pi]))[0]]
-    joints = range(case.given.direction.shape[-1])
-    reversible = [f"direction{joint + 1}" for joint in joints if not _noticed_reversed(case, joint)]
-    return Resolution(
+    return conclusions.Resolution(
         length_mm=max(lengths, default=None),
         angle_deg=max(angles, default=None),
         half_turns=tuple(number.name for number in half_turns if noticed[number] is not None),
-        unseen=(*(number.name for number, size in noticed.items() if size is None), *reversible),
+        unseen=(*(number.name for number, size in noticed.items() if size is None), *_reversible(case)),
     )
 
 
 def unseen_of(case: Case) -> tuple[str, ...]:
     """Entries that no reference reacts to, whatever their value, and joints that could be reversed."""
+    before = case.difference(case.given)[0]
     entries = [number for number in case.numbers if number.column]
     if not entries:
         rows = range(1, case.given.d.shape[-1] + 1)
         names = [f"{name}{row}" for name in ("a", "alpha", "d", "offset") for row in rows]
     else:
-        names = [number.name for number in entries if _never_missed(case, number)]
-    return (*names, *_reversible(case))
+        sizes = {number: np.array(TRIED_RAD if number.is_angle else TRIED_M) for number in entries}
+        missed = {number: _missed(case, number, np.concatenate([own, -own]), before) for number, own in sizes.items()}
+        names = [number.name for number, own in missed.items() if not own.any()]
+    return (*names, *_reversible(case, before))
 
 
-def _never_missed(case: Case, number: FreeNumber) -> bool:
-    """Whether no change of an entry that a table could have moves what the references say."""
-    sizes = np.array(TRIED_RAD if number.is_angle else TRIED_M)
-    before = case.difference(case.given)[0]
-    tables = case.given[np.zeros(2 * len(sizes), dtype=int)]
-    amounts = np.concatenate([sizes, -sizes])[:, None]
-    changed = case.difference(moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts))
-    return bool((np.abs(changed - before) <= case.uncertainty * MEETS).all())
-
-
-def _reversible(case: Case) -> list[str]:
-    before = case.difference(case.given)[0]
+def _reversible(case: Case, before: Reals | float = 0.0) -> list[str]:
+    """Joints that could be reversed without a difference to references leaving ``before`` by more than their
+    uncertainty."""
     found = []
     for joint in range(case.given.direction.shape[-1]):
         turned = case.given.with_column("direction", [joint], -case.given.direction[:, [joint]])
@@ -163,11 +141,6 @@ def least_noticed(case: Case, number: FreeNumber) -> float | None:
     if not missed.any(axis=1).all():
         return None
     return float(sizes[missed.argmax(axis=1).max()])
-
-
-def _noticed_reversed(case: Case, joint: int) -> bool:
-    turned = case.given.with_column("direction", [joint], -case.given.direction[:, [joint]])
-    return bool((np.abs(case.difference(turned)) > case.uncertainty * MEETS).any())
 
 
 def distinguishability(case: Case, ranking: Ranking) -> float | None:
@@ -208,10 +181,10 @@ def _slopes(case: Case, ranking: Ranking, row: int) -> Reals:
     return slopes
 
 
-def _missed(case: Case, number: FreeNumber, amounts: Reals) -> Flags:
+def _missed(case: Case, number: FreeNumber, amounts: Reals, before: Reals | float = 0.0) -> Flags:
     tables = case.given[np.zeros(len(amounts), dtype=int)]
     changed = moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts[:, None])
-    missed: Flags = np.any(np.abs(case.difference(changed)) > case.uncertainty * MEETS, axis=1)
+    missed: Flags = np.any(np.abs(case.difference(changed) - before) > case.uncertainty * MEETS, axis=1)
     return missed
 
 
@@ -219,7 +192,7 @@ MOSTLY = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Hypothesis(ByValue, Displayed, RankedHypothesis):
+class Hypothesis(ByValue, Displayed, conclusions.RankedHypothesis):
     """A fault or two that would explain the disagreement, and ``corrected``, the robot without the faults."""
 
     corrected: Robot
@@ -283,7 +256,7 @@ class Diagnosis(ByValue, Displayed):
     left : (references,), differences that the best one leaves, in their units; None where there is none
     """
 
-    conclusion: Conclusion
+    conclusion: conclusions.Conclusion
     references: int
     tried: int
     ranking: Ranking | None
@@ -293,7 +266,7 @@ class Diagnosis(ByValue, Displayed):
     @property
     def names_fault(self) -> bool:
         """Whether the best hypothesis explains all or most of the disagreement."""
-        return isinstance(self.conclusion, MostLikelyFault | MainFault)
+        return isinstance(self.conclusion, conclusions.MostLikelyFault | conclusions.MainFault)
 
     def sheet(self) -> Sheet:
         """The conclusion, and a row for each hypothesis."""
@@ -349,11 +322,11 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     """Hypotheses, and what they amount to."""
     stated = usable(references)
     if not stated:
-        return Diagnosis(NothingToRestOn(), 0, 0, None, ())
+        return Diagnosis(conclusions.NothingToRestOn(), 0, 0, None, ())
     case = case_of(robot, stated)
     ranking = rank_case(case)
     if not ranking:
-        return Diagnosis(NothingToExplain(len(stated), resolution_of(case)), len(stated), 0, None, ())
+        return Diagnosis(conclusions.NothingToExplain(len(stated), resolution_of(case)), len(stated), 0, None, ())
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
     explained = bool(hypotheses) and hypotheses[0].explains
@@ -414,29 +387,29 @@ def _defined_otherwise(ranking: Ranking, chosen: Conventions, left: Reals, other
     )
 
 
-def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> Conclusion | None:
+def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> conclusions.Conclusion | None:
     """What the best hypothesis amounts to; None if it explains neither all nor most."""
     figures = best.residual_before, best.residual_after, best.unit
     if best.explains:
-        return MostLikelyFault(best.faults, *figures, alternatives)
+        return conclusions.MostLikelyFault(best.faults, *figures, alternatives)
     if best.residual_after < MOSTLY * best.residual_before:
-        return MainFault(best.faults, *figures, alternatives)
+        return conclusions.MainFault(best.faults, *figures, alternatives)
     return None
 
 
-def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) -> Conclusion:
+def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) -> conclusions.Conclusion:
     tried = len(ranking.pool.faults)
     if not hypotheses:
         relative = np.nan_to_num(np.abs(ranking.before) / case.uncertainty, nan=np.inf)
         missed = int((relative > MEETS).sum())
-        return NoFaultStandsOut(missed, len(relative), float(relative.max()), tried)
+        return conclusions.NoFaultStandsOut(missed, len(relative), float(relative.max()), tried)
     best = hypotheses[0]
     if best.explains and (factor := distinguishability(case, ranking)) is not None:
         candidates = (best.faults, *best.indistinguishable_from)
-        return TooSmallToTell(candidates, best.residual_before, factor * best.residual_before, best.unit)
+        return conclusions.TooSmallToTell(candidates, best.residual_before, factor * best.residual_before, best.unit)
     figures = best.residual_before, best.residual_after, best.unit
     named = _concluded(best, best.indistinguishable_from)
-    return named or NoFewFaultsExplain(tried, *figures, _least_left(ranking, best.unit))
+    return named or conclusions.NoFewFaultsExplain(tried, *figures, _least_left(ranking, best.unit))
 
 
 def _least_left(ranking: Ranking, unit: Unit) -> float:

@@ -7,211 +7,144 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.kinematics.table_batch import COLUMNS, Tables
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Limit, PoseOutside, Side, value_at
 from er3a.references.reference import Reference, expected_of
 
-FaultKind = Literal[
-    "unit",
-    "alpha_sign",
-    "alpha",
-    "swap",
-    "rows",
-    "limits",
-    "shift",
-    "offset",
-    "direction",
-    "convention",
-    "length",
-    "scale",
-    "base",
-    "flange",
-    "ground",
-]
 Misread = Literal["metres_as_millimetres", "millimetres_as_metres", "radians_as_degrees", "degrees_as_radians"]
 Entries = Literal["a", "d", "lengths", "alpha", "offset", "limits", "angles"]
 LimitFault = Literal["crossed", "signs_swapped", "lower_sign", "upper_sign"]
 LengthColumn = Literal["a", "d"]
 
 
-@dataclass(frozen=True)
-class WrongUnit:
+class WrongUnit(Finding):
     """Entries were read in the wrong unit."""
 
     entries: Entries
     misread: Misread
-    kind: ClassVar[FaultKind] = "unit"
-    code: Literal["wrong_unit"] = "wrong_unit"
 
 
-@dataclass(frozen=True)
-class WrongAlphaSign:
+class WrongAlphaSign(Finding):
     """A joint's alpha has the wrong sign."""
 
     joint: int
     given_deg: float
     fits_deg: float
-    kind: ClassVar[FaultKind] = "alpha_sign"
-    code: Literal["wrong_alpha_sign"] = "wrong_alpha_sign"
 
 
-@dataclass(frozen=True)
-class WrongAlpha:
+class WrongAlpha(Finding):
     """A joint's alpha is missing (given as 0) or wrong."""
 
     joint: int
     given_deg: float
     fits_deg: float
-    kind: ClassVar[FaultKind] = "alpha"
-    code: Literal["wrong_alpha"] = "wrong_alpha"
 
 
-@dataclass(frozen=True)
-class SwappedEntries:
+class SwappedEntries(Finding):
     """a and d are swapped, of one joint or, if None, of all."""
 
     joint: int | None
-    kind: ClassVar[FaultKind] = "swap"
-    code: Literal["swapped_entries"] = "swapped_entries"
 
 
-@dataclass(frozen=True)
-class SwappedRows:
+class SwappedRows(Finding):
     """Two rows of the table are swapped."""
 
     first: int
     second: int
-    kind: ClassVar[FaultKind] = "rows"
-    code: Literal["swapped_rows"] = "swapped_rows"
 
 
-@dataclass(frozen=True)
-class SwappedLimits:
+class SwappedLimits(Finding):
     """The limits of two joints are swapped."""
 
     first: int
     second: int
-    kind: ClassVar[FaultKind] = "limits"
-    code: Literal["swapped_limits"] = "swapped_limits"
 
 
-@dataclass(frozen=True)
-class ShiftedRows:
+class ShiftedRows(Finding):
     """A column, or all rows, are shifted by one joint."""
 
     entries: Literal["rows", "a", "alpha", "d"]
     toward: Literal["down", "up"]
-    kind: ClassVar[FaultKind] = "shift"
-    code: Literal["shifted_rows"] = "shifted_rows"
 
 
-@dataclass(frozen=True)
-class WrongOffset:
+class WrongOffset(Finding):
     """A joint's offset is missing (given as 0) or wrong."""
 
     joint: int
     given_deg: float
     fits_deg: float
-    kind: ClassVar[FaultKind] = "offset"
-    code: Literal["wrong_offset"] = "wrong_offset"
 
 
-@dataclass(frozen=True)
-class ReversedDirection:
+class ReversedDirection(Finding):
     """A joint turns the other way."""
 
     joint: int
-    kind: ClassVar[FaultKind] = "direction"
-    code: Literal["reversed_direction"] = "reversed_direction"
 
 
-@dataclass(frozen=True)
-class WrongConvention:
+class WrongConvention(Finding):
     """The table was read in the other Denavit-Hartenberg convention; ``read_as`` is the one that it was read in."""
 
     read_as: Literal["standard", "modified"]
-    kind: ClassVar[FaultKind] = "convention"
-    code: Literal["wrong_convention"] = "wrong_convention"
 
 
-@dataclass(frozen=True)
-class WrongLimits:
+class WrongLimits(Finding):
     """The limits of one joint, or of all if None, are crossed or have wrong signs."""
 
     joint: int | None
     fault: LimitFault
-    kind: ClassVar[FaultKind] = "limits"
-    code: Literal["wrong_limits"] = "wrong_limits"
 
 
-@dataclass(frozen=True)
-class WrongLimit:
+class WrongLimit(Finding):
     """One of a joint's two limits is wrong."""
 
     joint: int
     side: Side
     given_deg: float
     fits_deg: float
-    kind: ClassVar[FaultKind] = "limits"
-    code: Literal["wrong_limit"] = "wrong_limit"
 
 
-@dataclass(frozen=True)
-class WrongLength:
+class WrongLength(Finding):
     """A length is missing (given as 0) or wrong."""
 
     joint: int
     column: LengthColumn
     given_mm: float
     fits_mm: float
-    kind: ClassVar[FaultKind] = "length"
-    code: Literal["wrong_length"] = "wrong_length"
 
 
-@dataclass(frozen=True)
-class WrongScale:
+class WrongScale(Finding):
     """All lengths are wrong by a common factor."""
 
     factor: float
-    kind: ClassVar[FaultKind] = "scale"
-    code: Literal["wrong_scale"] = "wrong_scale"
 
 
-@dataclass(frozen=True)
-class BaseElsewhere:
+class BaseElsewhere(Finding):
     """The references' base stands elsewhere: ``shift_mm`` and ``turn_deg`` are the arm's in the base's frame."""
 
     shift_mm: tuple[float, float, float]
     turn_deg: float
-    kind: ClassVar[FaultKind] = "base"
-    code: Literal["base_elsewhere"] = "base_elsewhere"
 
 
-@dataclass(frozen=True)
-class FlangeElsewhere:
+class FlangeElsewhere(Finding):
     """The references' flange stands elsewhere than the table's: ``shift_mm`` and ``turn_deg`` in the flange's frame."""
 
     shift_mm: tuple[float, float, float]
     turn_deg: float = 0.0
-    kind: ClassVar[FaultKind] = "flange"
-    code: Literal["flange_elsewhere"] = "flange_elsewhere"
 
 
-@dataclass(frozen=True)
-class CountedFromGround:
+class CountedFromGround(Finding):
     """The references count a joint from the ground, as arms with a linkage are sold: the table's joint is theirs plus
     (``sign`` 1) or minus the sum of the joints ``along``."""
 
     joint: int
     along: tuple[int, ...]
     sign: Literal[1, -1]
-    kind: ClassVar[FaultKind] = "ground"
-    code: Literal["counted_from_ground"] = "counted_from_ground"
 
 
 Fault = (

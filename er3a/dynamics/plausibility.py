@@ -7,11 +7,9 @@ the table, only what is off by orders of magnitude counts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.dynamics.arm_model import WATER, LinkShape, drives_of, link_shapes
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import MassBody, NoBody, about, no_body, six_moments
@@ -29,88 +27,70 @@ WEIGHT_RATIO = 0.15
 PARALLEL_RATIO = 2.0
 
 
-@dataclass(frozen=True)
-class ImpossibleInertia:
+class ImpossibleInertia(Finding):
     """Numbers that no rigid body can have."""
 
     link: int
     why: NoBody
-    code: Literal["impossible_inertia"] = "impossible_inertia"
 
 
-@dataclass(frozen=True)
-class MissingLink:
+class MissingLink(Finding):
     """A link that a joint moves has no mass; ``singular``: and its joint no rotor, so that accelerations are NaN."""
 
     link: int
     singular: bool
-    code: Literal["missing_link"] = "missing_link"
 
 
-@dataclass(frozen=True)
-class PointMass:
+class PointMass(Finding):
     """A link has a mass and no inertia."""
 
     link: int
-    code: Literal["point_mass"] = "point_mass"
 
 
-@dataclass(frozen=True)
-class InertiaWithoutMass:
+class InertiaWithoutMass(Finding):
     """A link has an inertia and no mass, as sums of parameters that were identified together do."""
 
     link: int
-    code: Literal["inertia_without_mass"] = "inertia_without_mass"
 
 
-@dataclass(frozen=True)
-class CentreOutside:
+class CentreOutside(Finding):
     """A centre of mass is outside the link's shape."""
 
     link: int
     outside_mm: float
-    code: Literal["centre_outside"] = "centre_outside"
 
 
-@dataclass(frozen=True)
-class UnlikelyDensity:
+class UnlikelyDensity(Finding):
     """A link's mass, filled into its shape, has a density that no link has: grams for kg, or the other way."""
 
     link: int
     mass_kg: float
     density_kg_m3: float
-    code: Literal["unlikely_density"] = "unlikely_density"
 
 
-@dataclass(frozen=True)
-class UnlikelyInertia:
+class UnlikelyInertia(Finding):
     """A link's radius of gyration does not fit its shape's: kg mm^2 or mm^4 for kg m^2."""
 
     link: int
     gyration_mm: float
     shape_mm: float
-    code: Literal["unlikely_inertia"] = "unlikely_inertia"
 
 
-@dataclass(frozen=True)
-class AboutOrigin:
+class AboutOrigin(Finding):
     """An inertia fits the link's shape far better as one about the frame's origin than about the centre of mass."""
 
     link: int
     given_kg_m2: float
     about_centre_kg_m2: float
     shape_kg_m2: float
-    code: Literal["about_origin"] = "about_origin"
 
 
-@dataclass(frozen=True)
-class SumOffWeight:
+class SumOffWeight(Finding):
     """The links' masses do not make the weight that the manufacturer states."""
 
     sum_kg: float
     weight_kg: float
     complete: bool
-    code: Literal["sum_off_weight"] = "sum_off_weight"
 
 
 MassFinding = (

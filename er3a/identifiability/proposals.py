@@ -7,11 +7,11 @@ what else is open. A length or an angle is measured by itself, as finely as its 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal, cast
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.identifiability.entries import TableNumber, entries_of, shifted
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence
 from er3a.identifiability.statements import ToolRange
@@ -35,8 +35,7 @@ WAYS_TO_LOOK: tuple[tuple[Point, Manner], ...] = (
 )
 
 
-@dataclass(frozen=True)
-class LookAtMotion:
+class LookAtMotion(Finding):
     """Jog a joint in + from a pose and look where to a point or the tool goes; ``seen`` is what the table says."""
 
     entry: str
@@ -44,50 +43,41 @@ class LookAtMotion:
     point: Point
     pose_deg: Pose
     seen: Seen
-    code: Literal["look_at_motion"] = "look_at_motion"
 
 
-@dataclass(frozen=True)
-class ReadLimit:
+class ReadLimit(Finding):
     """Jog a joint to its limit and read its angle."""
 
     entry: str
     joint: int
     side: Side
     half_width_deg: float
-    code: Literal["read_limit"] = "read_limit"
 
 
-@dataclass(frozen=True)
-class TimeJoint:
+class TimeJoint(Finding):
     """Time a joint's turn at full speed."""
 
     entry: str
     joint: int
     half_width_deg_s: float
-    code: Literal["time_joint"] = "time_joint"
 
 
-@dataclass(frozen=True)
-class MeasureAngle:
+class MeasureAngle(Finding):
     """Measure an angle of the table: between two axes, or at the zero mark."""
 
     entry: str
     column: Literal["alpha", "offset"]
     joint: int
     half_width_deg: float
-    code: Literal["measure_angle"] = "measure_angle"
 
 
-@dataclass(frozen=True)
-class MeasureLength:
+class MeasureLength(Finding):
     """Measure a length of the table, between two axes or along one."""
 
     entry: str
     column: Literal["a", "d"]
     joint: int
     half_width_mm: float
-    code: Literal["measure_length"] = "measure_length"
 
 
 Proposal = LookAtMotion | ReadLimit | TimeJoint | MeasureAngle | MeasureLength

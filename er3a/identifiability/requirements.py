@@ -12,9 +12,8 @@ In this order:
 - :func:`climber`: kernels that climb to the largest or smallest value of a measure of one arm, from where it was
   attained before, by Newton's method with Levenberg's damping; bounds that are in the way are held, derivatives are
   central differences;
-- :func:`peak`: the largest value of any smooth function over a box of joint angles. Points spread evenly over the box
-  and its corners are looked at in one batch; from the best of them Newton's method, its Hessian made definite by the
-  absolute values of its eigenvalues. Nothing is random;
+- :func:`peak`: the largest value of any smooth function over a box of joint angles: from the best of given points
+  Newton's method, its Hessian made definite by the absolute values of its eigenvalues. Nothing is random;
 - :class:`Asked`: what is asked of a table, and by how much tables miss it.
 """
 
@@ -23,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -191,14 +190,12 @@ What = tuple[int, int, int, float]
 """Measure, axis, frame and sign."""
 
 
-def measure_code(quantity: quantities.Extreme) -> tuple[int, int, int] | None:
-    """Which measure, of which axis and frame; None for one that the kernels don't know."""
+def measure_code(quantity: quantities.Extreme) -> tuple[int, int, int]:
+    """Which measure, of which axis and frame."""
     frame = quantities.FRAME_OF_POINT[quantity.point]
     if isinstance(quantity, quantities.AxisDistance):
         return DISTANCE, quantity.axis - 1, frame
-    if isinstance(quantity, quantities.SectionExtent):
-        return (SECTION_X if quantity.coordinate == "x" else SECTION_Z), 0, frame
-    return None
+    return (SECTION_X if cast(quantities.SectionExtent, quantity).coordinate == "x" else SECTION_Z), 0, frame
 
 
 Climber = Callable[[Reals], tuple[Reals, float]]
@@ -397,16 +394,9 @@ def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
     return np.concatenate(points)
 
 
-def peak(function: Function, lower: Reals, upper: Reals, points: Reals | None = None) -> tuple[Reals, float]:
-    """Where a function is largest, and its value there.
-
-    Parameters
-    ----------
-    points : (P, d), where to look first; all over the box by default
-    """
-    points = box_points(lower, upper) if points is None else points
-    values = function(points)
-    starts = points[best_apart(points, values, STARTS)]
+def peak(function: Function, lower: Reals, upper: Reals, points: Reals) -> tuple[Reals, float]:
+    """Where a function is largest, and its value there; ``points`` (P, d): where to look first."""
+    starts = points[best_apart(points, function(points), STARTS)]
     ends = [climb(function, start, lower, upper) for start in starts]
     return max(ends, key=lambda end: end[1])
 
@@ -577,38 +567,20 @@ class FollowedExtreme:
 
     def at(self, table: Tables) -> float:
         """The extreme in mm of a table (a batch of one)."""
-        if self.code is not None:
-            spread = self._spread_of(table)
-            climb_from = climber(table, self.robot, self.code, self.sign, np.array(self.joints))
-            if not self.known:
-                self.q = self._scanned(table, spread, climb_from)
-            q = np.clip(self.q, spread.lower, spread.upper)
-            q[0] = 0.0
-            value = -np.inf
-            last = np.concatenate([q[None], spread.watched])
-            for _ in range(OVERTAKINGS):
-                self.q, now = climb_from(last)
-                if now <= value + OVERTAKEN_M:
-                    break
-                value, last = now, np.concatenate([self.q[None], spread.across(self.q)])
-            self.known = True
-            return self.sign * value * quantities.MM
-        lower, upper = table.lower[0, self.joints], table.upper[0, self.joints]
-        lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
-
-        def measured(q: Reals) -> Reals:
-            values: Reals = self.sign * self._measure(table, self._whole(q))[0]
-            return values
-
-        if self.known:
-            q, value = climb(measured, np.clip(self.q[self.joints], lower, upper), lower, upper)
-            points = box_points(lower, upper, WATCHED)
-            values = measured(points)
-            if values.max() > value + OVERTAKEN_M:
-                q, value = peak(measured, lower, upper, points)
-        else:
-            q, value = peak(measured, lower, upper)
-        self.q, self.known = self._whole(q), True
+        spread = self._spread_of(table)
+        climb_from = climber(table, self.robot, self.code, self.sign, np.array(self.joints))
+        if not self.known:
+            self.q = self._scanned(table, spread, climb_from)
+        q = np.clip(self.q, spread.lower, spread.upper)
+        q[0] = 0.0
+        value = -np.inf
+        last = np.concatenate([q[None], spread.watched])
+        for _ in range(OVERTAKINGS):
+            self.q, now = climb_from(last)
+            if now <= value + OVERTAKEN_M:
+                break
+            value, last = now, np.concatenate([self.q[None], spread.across(self.q)])
+        self.known = True
         return self.sign * value * quantities.MM
 
     def _spread_of(self, table: Tables) -> _Spread:

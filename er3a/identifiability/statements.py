@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.diagnosis.conclusions import Conclusion, NoFaultStandsOut, NoFewFaultsExplain
 from er3a.diagnosis.ranking import rank
 from er3a.geometry.transforms import rotation_angle
@@ -27,8 +27,7 @@ QUARTERS = (-1, 1, 2)
 MOST_FAULTS = 2
 
 
-@dataclass(frozen=True)
-class NotTheRobotDescribed:
+class NotTheRobotDescribed(Finding):
     """No one or two corrections make the table the robot that other documents describe.
 
     Attributes
@@ -43,11 +42,9 @@ class NotTheRobotDescribed:
     mismatch_mm: float
     left_mm: float
     tried: int
-    code: Literal["not_the_robot_described"] = "not_the_robot_described"
 
 
-@dataclass(frozen=True)
-class InconsistentWithOwnText:
+class InconsistentWithOwnText(Finding):
     """A table does not agree with what its own author says beside it.
 
     Attributes
@@ -64,7 +61,6 @@ class InconsistentWithOwnText:
     unit: str
     against: tuple[str, ...]
     missed: int
-    code: Literal["inconsistent_with_own_text"] = "inconsistent_with_own_text"
 
 
 def is_unexplained(conclusion: Conclusion | None) -> bool:

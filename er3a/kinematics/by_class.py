@@ -164,7 +164,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     if solver.chain.code == "scara":  # without the tilt that no joint can take away
         T = forward(robot, rows[0])
     chain = solver.poses_at(T)
-    found = [to_rows(robot, rows), solver.chain.seeds(T, values)]
+    found = [to_rows(robot, rows), *solver.chain.seeds(T)]
     if chain.error(to_rows(robot, q_ref)) < 1e-11:
         found.insert(0, to_rows(robot, q_ref)[None])
     in_doubt = certainty == CONTINUUM or (certainty == UNCERTAIN and solver.sliding.any())

@@ -18,7 +18,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import MOST_ROWS, ByValue, Displayed, Sheet, shortly
+from er3a.by_value import MOST_ROWS, ByValue, Displayed, Finding, Sheet, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
@@ -92,35 +92,27 @@ def _outward(slot: int) -> float:
 Label = BranchLabel | SlotName | Literal["found_arm"]
 
 
-@dataclass(frozen=True)
-class ClosedForm:
+class ClosedForm(Finding):
     """All solutions, by the closed form."""
 
     arm_class: Literal["spherical_wrist"] = "spherical_wrist"
-    code: Literal["closed_form"] = "closed_form"
 
 
-@dataclass(frozen=True)
-class DependentJoints:
+class DependentJoints(Finding):
     """The joints move the tool in fewer ways than there are joints (six at most), such as two parallel slides.
 
     Each pose that they reach, they reach in infinitely many ways.
     """
 
-    code: Literal["dependent_joints"] = "dependent_joints"
 
-
-@dataclass(frozen=True)
-class Iteration:
+class Iteration(Finding):
     """Solutions by iteration from random starts, which may miss some; ``lacking`` where the arm has no closed form."""
 
     starts: int
     lacking: ClosedFormMissing | DependentJoints | None = None
-    code: Literal["iteration"] = "iteration"
 
 
-@dataclass(frozen=True)
-class ByClass:
+class ByClass(Finding):
     """All solutions of an arm without spherical wrist, by the solver of its class.
 
     Attributes
@@ -134,117 +126,92 @@ class ByClass:
     certain: bool
     named: bool
     cuspidal: bool = False
-    code: Literal["by_class"] = "by_class"
 
 
 Method = ClosedForm | ByClass | Iteration
 
 
-@dataclass(frozen=True)
-class WristTiltsTooLittle:
+class WristTiltsTooLittle(Finding):
     """The wrist would have to tilt further than it can."""
 
     missing_deg: float
-    code: Literal["wrist_tilts_too_little"] = "wrist_tilts_too_little"
 
 
-@dataclass(frozen=True)
-class WristTooNearAxis1:
+class WristTooNearAxis1(Finding, code="wrist_too_near_axis_1"):
     """The wrist centre would be nearer to axis 1 than the arm's sideways offset lets it come."""
 
     gap_mm: float
-    code: Literal["wrist_too_near_axis_1"] = "wrist_too_near_axis_1"
 
 
-@dataclass(frozen=True)
-class WristTooFar:
+class WristTooFar(Finding):
     """The wrist centre would be farther from axis 2 than the stretched arm reaches."""
 
     gap_mm: float
     reach_mm: float
-    code: Literal["wrist_too_far"] = "wrist_too_far"
 
 
-@dataclass(frozen=True)
-class WristTooNear:
+class WristTooNear(Finding):
     """The wrist centre would be nearer to axis 2 than the folded arm reaches."""
 
     gap_mm: float
     least_mm: float
-    code: Literal["wrist_too_near"] = "wrist_too_near"
 
 
-@dataclass(frozen=True)
-class NearestMiss:
+class NearestMiss(Finding):
     """By how much the nearest arm that a search found misses the pose."""
 
     position_mm: float
     rotation_deg: float
-    code: Literal["nearest_miss"] = "nearest_miss"
 
 
-@dataclass(frozen=True)
-class BadGuess:
+class BadGuess(Finding):
     """The iteration failed from its start; from others, or without limits, an arm within the limits was found."""
 
     miss: NearestMiss
     solved_by: Literal["other_starts", "without_limits"]
-    code: Literal["bad_guess"] = "bad_guess"
 
 
-@dataclass(frozen=True)
-class LimitBound:
+class LimitBound(Finding):
     """Arms were found only outside the limits."""
 
     miss: NearestMiss
     exceeded: LimitsExceeded
-    code: Literal["limit_bound"] = "limit_bound"
 
 
-@dataclass(frozen=True)
-class SingularEnd:
+class SingularEnd(Finding, code="singular"):
     """The iteration creeps towards a singular arm, where it ends."""
 
     miss: NearestMiss
-    code: Literal["singular"] = "singular"
 
 
-@dataclass(frozen=True)
-class Unreachable:
+class Unreachable(Finding):
     """No start leads to the pose."""
 
     miss: NearestMiss
-    code: Literal["unreachable"] = "unreachable"
 
 
-@dataclass(frozen=True)
-class NoSolutionOfClass:
+class NoSolutionOfClass(Finding):
     """The solver of the arm's class has no solution; the nearest arm that a search found misses by so much."""
 
     miss: NearestMiss
-    code: Literal["no_solution_of_class"] = "no_solution_of_class"
 
 
 OutOfReach = WristTiltsTooLittle | WristTooNearAxis1 | WristTooFar | WristTooNear
 NotFound = BadGuess | LimitBound | SingularEnd | Unreachable | NoSolutionOfClass
 
 
-@dataclass(frozen=True)
-class SideUnsolved:
+class SideUnsolved(Finding):
     """Why no branch exists with the wrist in front of axis 1, or reached over the head (back)."""
 
     side: Literal["front", "back"]
     why: OutOfReach
-    code: Literal["side_unsolved"] = "side_unsolved"
 
 
-@dataclass(frozen=True)
-class PoseUnsolved:
+class PoseUnsolved(Finding):
     """Why a pose has no solution by the arm's class, or iteration found none; numbered as the poses lie in memory."""
 
     pose: int
     why: NotFound
-    code: Literal["pose_unsolved"] = "pose_unsolved"
 
 
 Unsolved = SideUnsolved | PoseUnsolved

@@ -7,11 +7,11 @@ base and tool need no cases of their own.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import Finding
 from er3a.errors import NotWristPartitionedError
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle, wrap_to_pi
 from er3a.kinematics import closed_form
@@ -25,58 +25,40 @@ from er3a.robots.robot import Robot, derived
 PARALLEL = 1e-9
 
 
-@dataclass(frozen=True)
-class NotSixTurning:
+class NotSixTurning(Finding, code="not_six_turning_joints"):
     """The arm has another number of joints than six, or one of them slides."""
 
     joints: int
     sliding: int
-    code: Literal["not_six_turning_joints"] = "not_six_turning_joints"
 
 
-@dataclass(frozen=True)
-class CoupledWrist:
+class CoupledWrist(Finding):
     """The coupling is none of whole turns among the first three joints."""
 
-    code: Literal["coupled_wrist"] = "coupled_wrist"
 
-
-@dataclass(frozen=True)
-class CoupledJoints:
+class CoupledJoints(Finding):
     """Joints depend on one another: they are coupled, or sums of them are limited."""
 
-    code: Literal["coupled_joints"] = "coupled_joints"
 
-
-@dataclass(frozen=True)
-class ElbowAxesNotParallel:
+class ElbowAxesNotParallel(Finding):
     """Axes 2 and 3 are not parallel."""
 
-    code: Literal["elbow_axes_not_parallel"] = "elbow_axes_not_parallel"
 
-
-@dataclass(frozen=True)
-class NeighboursParallel:
+class NeighboursParallel(Finding, code="neighbouring_axes_parallel"):
     """Two neighbouring axes are parallel that must not be."""
 
     first: int
     second: int
-    code: Literal["neighbouring_axes_parallel"] = "neighbouring_axes_parallel"
 
 
-@dataclass(frozen=True)
-class NoWristCentre:
+class NoWristCentre(Finding, code="no_common_point_of_axes_4_5_6"):
     """Axes 4, 5 and 6 miss a common point."""
 
     miss_mm: float
-    code: Literal["no_common_point_of_axes_4_5_6"] = "no_common_point_of_axes_4_5_6"
 
 
-@dataclass(frozen=True)
-class NoArmLength:
+class NoArmLength(Finding, code="upper_arm_or_forearm_without_length"):
     """The upper arm or the forearm has no length."""
-
-    code: Literal["upper_arm_or_forearm_without_length"] = "upper_arm_or_forearm_without_length"
 
 
 ClosedFormMissing = (

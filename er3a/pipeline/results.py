@@ -214,12 +214,10 @@ class LeftOut:
     amount: int | float | None = None
 
 
-@dataclass(frozen=True)
-class NoPass:
+class NoPass(Finding):
     """What was not examined and may turn a verdict, which therefore is no pass."""
 
     missed: tuple[LeftOut, ...]
-    code: Literal["no_pass"] = "no_pass"
 
 
 @dataclass(frozen=True)
@@ -294,12 +292,10 @@ class Stored(ByValue, Generic[ResultsT]):
         return self.results.summary.verdict.status
 
 
-@dataclass(frozen=True)
-class NotComputed:
+class NotComputed(Finding, code="stage.not_computed"):
     """A stage could not be computed for a robot."""
 
     reason: str
-    code: Literal["stage.not_computed"] = "stage.not_computed"
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,7 +347,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
 
 def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
     known: tuple[type[Finding], ...] = (NotComputed, *stage.absences)
-    kinds = {str(kind.code): kind for kind in known}
+    kinds: dict[str, Any] = {kind.code: kind for kind in known}
     found: Finding = _adapter(kinds[verdict["code"]]).validate_python(verdict["params"])
     return found
 

@@ -205,24 +205,20 @@ def merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, fl
     return kept
 
 
-@dataclass(frozen=True)
-class AboveLimit:
+class AboveLimit(Finding):
     """A joint (from 1) goes beyond its upper limit."""
 
     joint: int
     reached_deg: float
     limit_deg: float
-    code: Literal["above_limit"] = "above_limit"
 
 
-@dataclass(frozen=True)
-class BelowLimit:
+class BelowLimit(Finding):
     """A joint (from 1) goes beyond its lower limit."""
 
     joint: int
     reached_deg: float
     limit_deg: float
-    code: Literal["below_limit"] = "below_limit"
 
 
 @dataclass(frozen=True)
@@ -240,18 +236,12 @@ class NeededSpeed:
         return self.needed_deg_s / self.limit_deg_s
 
 
-@dataclass(frozen=True)
-class TooFast(NeededSpeed):
+class TooFast(NeededSpeed, Finding):
     """A joint (from 1) would have to move faster than it can; values are in mm if it ``slides``."""
 
-    code: Literal["too_fast"] = "too_fast"
 
-
-@dataclass(frozen=True)
-class TooFastIfAssumed(NeededSpeed):
+class TooFastIfAssumed(NeededSpeed, Finding):
     """A joint (from 1), whose maximum speed is assumed, would have to move faster; in mm if it ``slides``."""
-
-    code: Literal["too_fast_if_assumed"] = "too_fast_if_assumed"
 
 
 @dataclass(frozen=True)
@@ -269,29 +259,21 @@ class NeededAcceleration:
         return self.needed_deg_s2 / self.limit_deg_s2
 
 
-@dataclass(frozen=True)
-class AccelerationTooGreat(NeededAcceleration):
+class AccelerationTooGreat(NeededAcceleration, Finding):
     """A joint (from 1) would have to accelerate more than it can; in mm if it ``slides``."""
 
-    code: Literal["acceleration_too_great"] = "acceleration_too_great"
 
-
-@dataclass(frozen=True)
-class AccelerationTooGreatIfAssumed(NeededAcceleration):
+class AccelerationTooGreatIfAssumed(NeededAcceleration, Finding):
     """A joint (from 1), whose maximum acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
 
-    code: Literal["acceleration_too_great_if_assumed"] = "acceleration_too_great_if_assumed"
 
-
-@dataclass(frozen=True)
-class JerkTooGreat:
+class JerkTooGreat(Finding):
     """A joint (from 1) would need a jerk beyond its limit (mm if it ``slides``); None where its acceleration steps."""
 
     joint: int
     needed_deg_s3: float | None
     limit_deg_s3: float
     slides: bool = False
-    code: Literal["jerk_too_great"] = "jerk_too_great"
 
     @property
     def ratio(self) -> float:
@@ -302,12 +284,10 @@ class JerkTooGreat:
 RateCause = TooFast | TooFastIfAssumed | AccelerationTooGreat | AccelerationTooGreatIfAssumed | JerkTooGreat
 
 
-@dataclass(frozen=True)
-class PathOutOfReach:
+class PathOutOfReach(Finding, code="out_of_reach"):
     """No branch reaches the pose; per side of the arm, why."""
 
     reasons: tuple[Unsolved, ...]
-    code: Literal["out_of_reach"] = "out_of_reach"
 
 
 OVER = 1e-6  # relative, by which rounding may exceed a limit of rates

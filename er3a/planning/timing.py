@@ -17,12 +17,12 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Finding
 from er3a.errors import Er3aError
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.motion_faults import OVER, RateLimit
@@ -39,25 +39,16 @@ STRAIGHT_NODES = 81
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
-@dataclass(frozen=True)
-class MustStandStill:
+class MustStandStill(Finding):
     """The arm would have to stand still on the way."""
 
-    code: Literal["must_stand_still"] = "must_stand_still"
 
-
-@dataclass(frozen=True)
-class NoTimeLawFound:
+class NoTimeLawFound(Finding):
     """The time-optimal parametrisation found no time law under the joints' limits."""
 
-    code: Literal["no_time_law_found"] = "no_time_law_found"
 
-
-@dataclass(frozen=True)
-class ToppraMissing:
+class ToppraMissing(Finding):
     """The library that finds time laws is not installed."""
-
-    code: Literal["toppra_missing"] = "toppra_missing"
 
 
 NoTimeLaw = MustStandStill | NoTimeLawFound | ToppraMissing

@@ -28,7 +28,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Finding
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import frames, jacobian
 from er3a.kinematics.singularity import TYPES, NearSingular, SingularityType, characteristic_length, determinant_factors
@@ -68,12 +68,10 @@ QUANTITIES: tuple[Quantity, ...] = ("singular", "limits", "speed", "acceleration
 RATES = slice(2, 5)
 
 
-@dataclass(frozen=True)
-class Undecided:
+class Undecided(Finding):
     """What the bounds do not settle."""
 
     quantity: Quantity
-    code: Literal["undecided"] = "undecided"
 
 
 @dataclass(frozen=True, eq=False)

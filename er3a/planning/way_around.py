@@ -25,6 +25,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
@@ -55,52 +56,38 @@ MOST_PAIRS = 4
 LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 
 
-@dataclass(frozen=True)
-class PlannerMissing:
+class PlannerMissing(Finding):
     """The library that plans is not installed."""
 
-    code: Literal["planner_missing"] = "planner_missing"
 
-
-@dataclass(frozen=True)
-class NothingMeasured:
+class NothingMeasured(Finding):
     """Without distances nothing can be planned."""
 
-    code: Literal["nothing_measured"] = "nothing_measured"
 
-
-@dataclass(frozen=True)
-class EndOverlaps:
+class EndOverlaps(Finding):
     """At the start (or the end) something overlaps."""
 
     end: Literal["start", "end"]
     overlap: PairOverlaps
-    code: Literal["end_overlaps"] = "end_overlaps"
 
 
-@dataclass(frozen=True)
-class EndOutsideLimits:
+class EndOutsideLimits(Finding):
     """At the start (or the end) joints are outside their limits."""
 
     end: Literal["start", "end"]
     limits: LimitsExceeded
-    code: Literal["end_outside_limits"] = "end_outside_limits"
 
 
-@dataclass(frozen=True)
-class EndUnreached:
+class EndUnreached(Finding):
     """No joint angles within the limits reach the start (or the end)."""
 
     end: Literal["start", "end"]
-    code: Literal["end_unreached"] = "end_unreached"
 
 
-@dataclass(frozen=True)
-class NoneFound:
+class NoneFound(Finding):
     """No way was found within so many rounds; there may be one."""
 
     rounds: int
-    code: Literal["none_found"] = "none_found"
 
 
 NoWayAround = (

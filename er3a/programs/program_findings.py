@@ -2,70 +2,53 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
+from er3a.by_value import Finding
 from er3a.planning.names import PathVerdict
 from er3a.programs.instructions import Place
 
 
-@dataclass(frozen=True)
-class DataFileMissing:
+class DataFileMissing(Finding, code="program_data_file_missing"):
     """The file with the program's points (.dat, .var) is not beside it."""
 
     file: str
-    code: Literal["program_data_file_missing"] = "program_data_file_missing"
 
 
-@dataclass(frozen=True)
-class NameTwice:
+class NameTwice(Finding, code="program_name_twice"):
     """A name is given twice; the later one counts."""
 
     name: str
     place: Place
-    code: Literal["program_name_twice"] = "program_name_twice"
 
 
-@dataclass(frozen=True)
-class NotUnderstood:
+class NotUnderstood(Finding, code="program_not_understood"):
     """A piece of text that is kept, but not understood."""
 
     text: str
     place: Place
-    code: Literal["program_not_understood"] = "program_not_understood"
 
 
-@dataclass(frozen=True)
-class NotSimulated:
+class NotSimulated(Finding, code="program_not_simulated"):
     """An instruction that is understood, but what it does to motions is not followed."""
 
     text: str
     place: Place
-    code: Literal["program_not_simulated"] = "program_not_simulated"
 
 
-@dataclass(frozen=True)
-class FormInferred:
+class FormInferred(Finding, code="program_form_inferred"):
     """An element whose form is not known from any file of the controller; it was read as like ones are built."""
 
     element: str
     place: Place
-    code: Literal["program_form_inferred"] = "program_form_inferred"
 
 
-@dataclass(frozen=True)
-class OtherEncoding:
+class OtherEncoding(Finding, code="program_other_encoding"):
     """The text is not UTF-8; it was read as ``encoding``."""
 
     encoding: str
-    code: Literal["program_other_encoding"] = "program_other_encoding"
 
 
-@dataclass(frozen=True)
-class NothingMoves:
+class NothingMoves(Finding, code="program_nothing_moves"):
     """No instruction of the program moves the arm."""
-
-    code: Literal["program_nothing_moves"] = "program_nothing_moves"
 
 
 ProgramFinding = (
@@ -73,114 +56,88 @@ ProgramFinding = (
 )
 
 
-@dataclass(frozen=True)
-class ArcsSplit:
+class ArcsSplit(Finding, code="written_arcs_split"):
     """Arcs were written as lines that stay within a distance of them."""
 
     arcs: int
     lines: int
     deviation_m: float
-    code: Literal["written_arcs_split"] = "written_arcs_split"
 
 
-@dataclass(frozen=True)
-class ZonesDropped:
+class ZonesDropped(Finding, code="written_zones_dropped"):
     """Zones that the language has no equal for were written as stops."""
 
     zones: int
-    code: Literal["written_zones_dropped"] = "written_zones_dropped"
 
 
-@dataclass(frozen=True)
-class SplinesAsLines:
+class SplinesAsLines(Finding, code="written_splines_as_lines"):
     """Points of splines were written as straight lines."""
 
     points: int
-    code: Literal["written_splines_as_lines"] = "written_splines_as_lines"
 
 
-@dataclass(frozen=True)
-class SpeedsEstimated:
+class SpeedsEstimated(Finding, code="written_speeds_estimated"):
     """Durations were written as speeds; the controller's own ramps decide the time."""
 
     motions: int
-    code: Literal["written_speeds_estimated"] = "written_speeds_estimated"
 
 
-@dataclass(frozen=True)
-class SpeedsCut:
+class SpeedsCut(Finding, code="written_speeds_cut"):
     """Speeds above what the joints can do were written as the largest."""
 
     motions: int
-    code: Literal["written_speeds_cut"] = "written_speeds_cut"
 
 
-@dataclass(frozen=True)
-class SpeedsOfAssumed:
+class SpeedsOfAssumed(Finding, code="written_speeds_of_assumed"):
     """Speeds written as shares of a joint's greatest, or shares as speeds, where that is ``assumed`` (with units)."""
 
     motions: int
     assumed: str
-    code: Literal["written_speeds_of_assumed"] = "written_speeds_of_assumed"
 
 
-@dataclass(frozen=True)
-class HalfTurnsSplit:
+class HalfTurnsSplit(Finding, code="written_half_turns_split"):
     """Lines with a turn by 180 deg were written as two halves, so that the sense of the turn is fixed."""
 
     lines: int
-    code: Literal["written_half_turns_split"] = "written_half_turns_split"
 
 
-@dataclass(frozen=True)
-class TargetsLeftOut:
+class TargetsLeftOut(Finding, code="written_targets_left_out"):
     """Motions whose targets the program does not give were written as comments."""
 
     motions: int
-    code: Literal["written_targets_left_out"] = "written_targets_left_out"
 
 
-@dataclass(frozen=True)
-class ToolNotGiven:
+class ToolNotGiven(Finding, code="written_tool_not_given"):
     """The tool is known by its name alone; it has to be set on the controller."""
 
     name: str
-    code: Literal["written_tool_not_given"] = "written_tool_not_given"
 
 
-@dataclass(frozen=True)
-class ValuesRounded:
+class ValuesRounded(Finding, code="written_values_rounded"):
     """Speeds or zones were rounded down to those that the language has names for."""
 
     values: int
-    code: Literal["written_values_rounded"] = "written_values_rounded"
 
 
-@dataclass(frozen=True)
-class NotTranslated:
+class NotTranslated(Finding, code="written_not_translated"):
     """Signals, waits for conditions and unknown text of another language were written as comments."""
 
     instructions: int
-    code: Literal["written_not_translated"] = "written_not_translated"
 
 
-@dataclass(frozen=True)
-class WrittenUnsafe:
+class WrittenUnsafe(Finding):
     """The path is not safe as it is, and was written all the same because that was asked for."""
 
     path: str
     verdict: PathVerdict
-    code: Literal["written_unsafe"] = "written_unsafe"
 
 
-@dataclass(frozen=True)
-class WrittenNearAssumed:
+class WrittenNearAssumed(Finding):
     """The path is clear of assumed shapes by less than what these may be wrong by."""
 
     path: str
     clearance_mm: float
     margin_mm: float
-    code: Literal["written_near_assumed"] = "written_near_assumed"
 
 
 WriteFinding = (

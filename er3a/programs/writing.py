@@ -6,7 +6,7 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -573,7 +573,7 @@ class Writer(ABC):
         return (*found, *map(program_findings.ToolNotGiven, self.tools))
 
 
-COUNTED = {
+COUNTED: dict[str, Callable[[int], program_findings.WriteFinding]] = {
     "zones": program_findings.ZonesDropped,
     "splines": program_findings.SplinesAsLines,
     "estimated": program_findings.SpeedsEstimated,

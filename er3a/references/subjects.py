@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Literal, Self
 
+from er3a.by_value import Finding
 from er3a.references.quantities import Coordinate, Extremity, Point, SectionAxis, Segment, Side
 
 CornerLabel = Literal["x", "abs_x", "z"]
@@ -28,122 +29,96 @@ class Subject:
         )
 
 
-@dataclass(frozen=True)
-class AxisDirection(Subject):
+class AxisDirection(Subject, Finding):
     """Direction of a joint's axis; ``signed``: of positive rotation."""
 
     joint: int
     signed: bool
-    code: Literal["axis_direction"] = "axis_direction"
 
 
-@dataclass(frozen=True)
-class AxisPosition(Subject):
+class AxisPosition(Subject, Finding):
     """Where a joint's axis lies."""
 
     joint: int
     coordinate: Coordinate | None
-    code: Literal["axis_position"] = "axis_position"
 
 
-@dataclass(frozen=True)
-class PointAtPose(Subject):
+class PointAtPose(Subject, Finding):
     """Where a point lies at a pose that the source names."""
 
     pose: str
     point: Point
     coordinate: Coordinate | None
-    code: Literal["point_at_pose"] = "point_at_pose"
 
 
-@dataclass(frozen=True)
-class OrientationAtPose(Subject):
+class OrientationAtPose(Subject, Finding):
     """How the flange is oriented at a pose that the source names."""
 
     pose: str
     coordinate: Coordinate | None
-    code: Literal["orientation_at_pose"] = "orientation_at_pose"
 
 
-@dataclass(frozen=True)
-class PoseExcess(Subject):
+class PoseExcess(Subject, Finding):
     """How far a pose that the source names lies outside the limits."""
 
     pose: str
-    code: Literal["pose_excess"] = "pose_excess"
 
 
-@dataclass(frozen=True)
-class SegmentInclination(Subject):
+class SegmentInclination(Subject, Finding):
     """How far a segment of the arm leans from the vertical."""
 
     segment: Segment
-    code: Literal["segment_inclination"] = "segment_inclination"
 
 
-@dataclass(frozen=True)
-class DrawingCorner(Subject):
+class DrawingCorner(Subject, Finding):
     """A corner of the workspace drawing, at angles of joints 2 and 3."""
 
     q2_deg: float
     q3_deg: float
     coordinate: CornerLabel | None
-    code: Literal["drawing_corner"] = "drawing_corner"
 
 
-@dataclass(frozen=True)
-class DrawingExtent(Subject):
+class DrawingExtent(Subject, Finding):
     """How far the workspace drawing extends."""
 
     extreme: Extremity
     axis: SectionAxis
-    code: Literal["drawing_extent"] = "drawing_extent"
 
 
-@dataclass(frozen=True)
-class Reach(Subject):
+class Reach(Subject, Finding):
     """Largest or smallest distance of a point from the axis of joint 1 or 2."""
 
     extreme: Extremity
     point: Point
     axis: int
-    code: Literal["reach"] = "reach"
 
 
-@dataclass(frozen=True)
-class JointLimit(Subject):
+class JointLimit(Subject, Finding):
     """A joint's lower or upper limit."""
 
     joint: int
     side: Side
-    code: Literal["joint_limit"] = "joint_limit"
 
 
-@dataclass(frozen=True)
-class JointSpeed(Subject):
+class JointSpeed(Subject, Finding):
     """A joint's maximum speed."""
 
     joint: int
-    code: Literal["joint_speed"] = "joint_speed"
 
 
-@dataclass(frozen=True)
-class MotionOfJoint(Subject):
+class MotionOfJoint(Subject, Finding):
     """What is seen while a joint is jogged in +."""
 
     joint: int
     point: Point
     seen: str
-    code: Literal["motion_of_joint"] = "motion_of_joint"
 
 
-@dataclass(frozen=True)
-class EntryOfTable(Subject):
+class EntryOfTable(Subject, Finding):
     """An entry of the table, measured by itself."""
 
     column: Literal["a", "d", "alpha", "offset"]
     joint: int
-    code: Literal["entry_of_table"] = "entry_of_table"
 
 
 ReferenceSubject = (

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.errors import Er3aError
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
@@ -17,8 +17,7 @@ SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
 MOST_ROWS = 10_000
 
 
-@dataclass(frozen=True)
-class LimitExceeded:
+class LimitExceeded(Finding):
     """A joint stands above its upper or below its lower limit, by the excess."""
 
     joint: int
@@ -26,11 +25,9 @@ class LimitExceeded:
     angle_deg: float
     excess_deg: float
     limit_deg: float
-    code: Literal["limit_exceeded"] = "limit_exceeded"
 
 
-@dataclass(frozen=True)
-class SlideExceeded:
+class SlideExceeded(Finding):
     """A prismatic joint is beyond its upper or below its lower limit, by the excess."""
 
     joint: int
@@ -38,11 +35,9 @@ class SlideExceeded:
     position_mm: float
     excess_mm: float
     limit_mm: float
-    code: Literal["slide_exceeded"] = "slide_exceeded"
 
 
-@dataclass(frozen=True)
-class CombinationExceeded:
+class CombinationExceeded(Finding):
     """A sum of joints is above its upper or below its lower limit; values in deg (mm if all of them slide)."""
 
     joints: tuple[int, ...]
@@ -52,18 +47,15 @@ class CombinationExceeded:
     excess: float
     limit: float
     sliding: bool
-    code: Literal["combination_exceeded"] = "combination_exceeded"
 
 
 Exceeded = LimitExceeded | SlideExceeded | CombinationExceeded
 
 
-@dataclass(frozen=True)
-class LimitsExceeded:
+class LimitsExceeded(Finding):
     """One or more joints, or sums of joints, stand outside their limits."""
 
     joints: tuple[Exceeded, ...]
-    code: Literal["limits_exceeded"] = "limits_exceeded"
 
 
 def within(robot: Robot, q: Reals) -> Flags:

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.collision.pairs import PairOverlaps
 from er3a.geometry.vectors import max_joint_move
 from er3a.kinematics.solutions import Label, Solutions, Unsolved
@@ -26,114 +26,89 @@ SAME_MOVE = 1e-9
 Refusal = LimitsExceeded | PairOverlaps
 
 
-@dataclass(frozen=True)
-class OtherBranch:
+class OtherBranch(Finding):
     """The next best solution is on another branch."""
 
     branch: int
     label: Label
-    code: Literal["other_branch"] = "other_branch"
 
 
-@dataclass(frozen=True)
-class JointTurned:
+class JointTurned(Finding):
     """A joint of the next best solution stands whole turns further."""
 
     joint: int
     turn_deg: int
-    code: Literal["joint_turned"] = "joint_turned"
 
 
-@dataclass(frozen=True)
-class OtherTurns:
+class OtherTurns(Finding):
     """The next best solution is on the same branch, with joints turned."""
 
     joints: tuple[JointTurned, ...]
-    code: Literal["other_turns"] = "other_turns"
 
 
-@dataclass(frozen=True)
-class OtherFreeJoint:
+class OtherFreeJoint(Finding):
     """The next best solution is on the same branch, with its free joint at another angle."""
-
-    code: Literal["other_free_joint"] = "other_free_joint"
 
 
 NextBest = OtherBranch | OtherTurns | OtherFreeJoint
 
 
-@dataclass(frozen=True)
-class MaxJointMove:
+class MaxJointMove(Finding, code="greatest_move"):
     """The joint that moves farthest, and how far."""
 
     joint: int
     angle_deg: float
-    code: Literal["greatest_move"] = "greatest_move"
 
 
-@dataclass(frozen=True)
-class OnlyAdmissible:
+class OnlyAdmissible(Finding):
     """No other solution is within the limits (and free of collisions, where they count)."""
 
     move: MaxJointMove
-    code: Literal["only_admissible"] = "only_admissible"
 
 
-@dataclass(frozen=True)
-class MovesLess:
+class MovesLess(Finding):
     """Its largest joint move is less than the next best solution's, by ``less_deg``."""
 
     move: MaxJointMove
     less_deg: float
     next_best: NextBest
-    code: Literal["moves_less"] = "moves_less"
 
 
-@dataclass(frozen=True)
-class MovesLessTogether:
+class MovesLessTogether(Finding):
     """The largest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
 
     move: MaxJointMove
     less_deg: float
     next_best: NextBest
-    code: Literal["moves_less_together"] = "moves_less_together"
 
 
-@dataclass(frozen=True)
-class LowerBranchNumber:
+class LowerBranchNumber(Finding):
     """The next best solution is just as near."""
 
     move: MaxJointMove
     next_best: NextBest
-    code: Literal["lower_branch_number"] = "lower_branch_number"
 
 
-@dataclass(frozen=True)
-class NoSolution:
+class NoSolution(Finding):
     """The pose has no solution at all."""
 
     unsolved: tuple[Unsolved, ...]
-    code: Literal["no_solution"] = "no_solution"
 
 
-@dataclass(frozen=True)
-class AllOutsideLimits:
+class AllOutsideLimits(Finding):
     """All solutions leave the limits; stated of the one that does so least."""
 
     count: int
     branch: int
     label: Label
     exceeded: LimitsExceeded
-    code: Literal["all_outside_limits"] = "all_outside_limits"
 
 
-@dataclass(frozen=True)
-class AllCollide:
+class AllCollide(Finding):
     """All solutions within the limits collide; stated of the one with the largest margin to its limits."""
 
     count: int
     overlap: PairOverlaps
-    code: Literal["all_collide"] = "all_collide"
 
 
 WhyFirst = OnlyAdmissible | MovesLess | MovesLessTogether | LowerBranchNumber

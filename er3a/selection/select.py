@@ -22,7 +22,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Finding, Sheet, shortly
 from er3a.collision.along import bodies_of, clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps
@@ -156,31 +156,25 @@ def checked_weights(rule: str | Mapping[str, float]) -> dict[RuleName, float]:
 COLLIDES = 0.0  # m; a solution with less clearance is refused
 
 
-@dataclass(frozen=True)
-class Measure:
+class Measure(Finding):
     """A solution's measure by a rule, in the rule's unit."""
 
     rule: RuleName
     value: float
-    code: Literal["measure"] = "measure"
 
 
-@dataclass(frozen=True)
-class Placed:
+class Placed(Finding):
     """A solution's place, 1 the best, and what it was ranked by."""
 
     place: int
     measures: tuple[Measure, ...]
-    code: Literal["placed"] = "placed"
 
 
-@dataclass(frozen=True)
-class BestByRules:
+class BestByRules(Finding):
     """The solution taken, and the next best; ``next_best`` is empty if it is the only admissible one."""
 
     measures: tuple[Measure, ...]
     next_best: tuple[Measure, ...]
-    code: Literal["best_by_rules"] = "best_by_rules"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -21,7 +21,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Finding
 from er3a.errors import Er3aError
 from er3a.geometry.transforms import exp_rotation, inverse_right_jacobian, log_rotation, posed
 from er3a.numerics.arrays import Reals
@@ -106,23 +106,19 @@ class BoardViews(ByValue):
     camera: Camera
 
 
-@dataclass(frozen=True)
-class AmbiguousTilt:
+class AmbiguousTilt(Finding):
     """Two poses of the flat board fit an image nearly alike: the other's errors are only ``ratio`` times as large."""
 
     sample: str
     ratio: float
-    code: Literal["ambiguous_tilt"] = "ambiguous_tilt"
 
 
-@dataclass(frozen=True)
-class BoardlessImage:
+class BoardlessImage(Finding):
     """An image shows too few corners of the board, and its sample is left out."""
 
     sample: str
     image: str
     corners: int
-    code: Literal["boardless_image"] = "boardless_image"
 
 
 class BoardNotFoundError(Er3aError):

@@ -17,6 +17,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
@@ -88,88 +89,70 @@ class GraspNeeds:
     probability: float = 0.0
 
 
-@dataclass(frozen=True)
-class GraspOutOfReach:
+class GraspOutOfReach(Finding):
     """No joint solution for any of the poses."""
 
     poses: int
-    code: Literal["grasp_out_of_reach"] = "grasp_out_of_reach"
 
 
-@dataclass(frozen=True)
-class GraspNearLimits:
+class GraspNearLimits(Finding):
     """Every solution is nearer to a joint's limits than asked, or beyond them; the best of them by this much."""
 
     solutions: int
     margin_deg: float
     needed_deg: float
-    code: Literal["grasp_near_limits"] = "grasp_near_limits"
 
 
-@dataclass(frozen=True)
-class GraspSingular:
+class GraspSingular(Finding):
     """Every solution left is nearer to a singularity than asked."""
 
     solutions: int
     singular_value: float
     needed: float
-    code: Literal["grasp_singular"] = "grasp_singular"
 
 
-@dataclass(frozen=True)
-class GraspCollides:
+class GraspCollides(Finding):
     """Every solution left comes nearer to something than asked, at the grasp; the best of them to this."""
 
     solutions: int
     pair: Pair
     clearance_mm: float
     needed_mm: float
-    code: Literal["grasp_collides"] = "grasp_collides"
 
 
-@dataclass(frozen=True)
-class LineLeaves:
+class LineLeaves(Finding):
     """The straight line there or away can't be followed to its end within limits and away from singularities."""
 
     part: Literal["approach", "retreat"]
     after_mm: float
-    code: Literal["line_leaves"] = "line_leaves"
 
 
-@dataclass(frozen=True)
-class LineUnproven:
+class LineUnproven(Finding):
     """The bounds don't settle that the straight line there or away keeps limits, rates and regular poses."""
 
     part: Literal["approach", "retreat"]
-    code: Literal["line_unproven"] = "line_unproven"
 
 
-@dataclass(frozen=True)
-class PathCollides:
+class PathCollides(Finding, code="way_collides"):
     """Something is nearer than asked on a straight line."""
 
     part: Part
     pair: Pair
     clearance_mm: float
     needed_mm: float
-    code: Literal["way_collides"] = "way_collides"
 
 
-@dataclass(frozen=True)
-class NoTransfer:
+class NoTransfer(Finding):
     """The straight joint move from where the arm waits collides, and the planner gives no other way."""
 
     why: NoWayAround
-    code: Literal["no_transfer"] = "no_transfer"
 
 
-@dataclass(frozen=True)
-class GraspUnlikely:
+class GraspUnlikely(Finding):
     """The gripper's tolerance is kept less often than asked; of the grasp that keeps it most often."""
 
     probability: float
     needed: float
-    code: Literal["grasp_unlikely"] = "grasp_unlikely"
 
 
 GraspRefusal = (

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Finding
 from er3a.calibration.calibrate import CLOSE, Close, Estimate
 from er3a.calibration.fit import NO_EFFECT, SCALE
 from er3a.calibration.outcomes import Held, LevelName, MovesNothing, NotToldApart
@@ -39,8 +39,7 @@ TABLE_JOINTS = 6
 LEAST_FREEDOM = 6
 
 
-@dataclass(frozen=True)
-class NoCorrections:
+class NoCorrections(Finding):
     """Why no corrections come with a calibration.
 
     ``joints``: no joint angles were recorded, or the arm does not have six; ``few``: too few samples for so many
@@ -48,7 +47,6 @@ class NoCorrections:
     """
 
     why: Literal["joints", "few", "steps"]
-    code: Literal["no_corrections"] = "no_corrections"
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal, get_args
 
+from er3a.by_value import Finding
 from er3a.errors import Er3aError
 
 SuspectKind = Literal["half_turn_x", "half_turn_y", "half_turn_z", "quarter_turn_z", "mirrored_tilt", "rotation"]
@@ -13,156 +13,127 @@ SuspectKind = Literal["half_turn_x", "half_turn_y", "half_turn_z", "quarter_turn
 poses in which a flat board looks alike; ``rotation``: none of these."""
 
 
-@dataclass(frozen=True)
-class RotationMismatch:
+class RotationMismatch(Finding):
     """Hand and board turn by different angles between this sample and the others; ``off_deg`` in the median."""
 
     sample: str
     kind: SuspectKind
     off_deg: float
-    code: Literal["rotation_mismatch"] = "rotation_mismatch"
 
 
-@dataclass(frozen=True)
-class FarFromFit:
+class FarFromFit(Finding):
     """A sample is farther from what all others predict than their scatter allows, with this probability."""
 
     sample: str
     off_mm: float
     off_deg: float
     probability: float
-    code: Literal["far_from_fit"] = "far_from_fit"
 
 
-@dataclass(frozen=True)
-class RepeatedPose:
+class RepeatedPose(Finding):
     """The flange stands where it stood in another sample; ``apart``: what the two saw of the board differs by."""
 
     sample: str
     first: str
     apart_mm: float
     apart_deg: float
-    code: Literal["repeated_pose"] = "repeated_pose"
 
 
 Suspect = RotationMismatch | FarFromFit | RepeatedPose
 
 
-@dataclass(frozen=True)
-class NoMajority:
+class NoMajority(Finding):
     """No more than half of the samples agree on how far hand and board turn; ``pairs`` of ``of`` differ."""
 
     pairs: int
     of: int
     median_deg: float
-    code: Literal["no_majority"] = "no_majority"
 
 
 Streams = Literal["flange", "target", "both"]
 
 
-@dataclass(frozen=True)
-class QuaternionOrder:
+class QuaternionOrder(Finding):
     """The samples fit if the quaternions of one stream, or both, are read with their real part at the other end."""
 
     stream: Streams
     rms_given_deg: float
     rms_other_deg: float
-    code: Literal["quaternion_order"] = "quaternion_order"
 
 
-@dataclass(frozen=True)
-class AngleOrder:
+class AngleOrder(Finding):
     """The samples fit if the angles of a stream, or both, are read as ``product``: Rx(roll) Ry(pitch) Rz(yaw), ..."""
 
     stream: Streams
     product: str
     rms_given_deg: float
     rms_other_deg: float
-    code: Literal["angle_order"] = "angle_order"
 
 
-@dataclass(frozen=True)
-class TransposedRotations:
+class TransposedRotations(Finding):
     """The samples fit if the rotations of a stream, or both, are transposed while the positions stay."""
 
     stream: Streams
     rms_given_deg: float
     rms_other_deg: float
-    code: Literal["transposed_rotations"] = "transposed_rotations"
 
 
-@dataclass(frozen=True)
-class PositionAxes:
+class PositionAxes(Finding):
     """The samples fit if the positions of a stream are read as ``axes``: -x, z, y is x negated, y and z swapped."""
 
     stream: Streams
     axes: str
     rms_given_mm: float
     rms_other_mm: float
-    code: Literal["position_axes"] = "position_axes"
 
 
 ReadingKind = Literal["quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction"]
 READINGS: tuple[ReadingKind, ...] = get_args(ReadingKind)
 
 
-@dataclass(frozen=True)
-class UnexplainedResiduals:
+class UnexplainedResiduals(Finding):
     """The residuals are larger than those of a camera of any use, and none of the causes ``tried`` explains them."""
 
     rms_mm: float
     rms_deg: float
     tried: tuple[ReadingKind, ...]
-    code: Literal["unexplained_residuals"] = "unexplained_residuals"
 
 
-@dataclass(frozen=True)
-class OtherDirection:
+class OtherDirection(Finding):
     """The samples exclude the direction in which they are given; with these streams inverted they fit."""
 
     flange_inverted: bool
     target_inverted: bool
-    code: Literal["other_direction"] = "other_direction"
 
 
-@dataclass(frozen=True)
-class BoardScale:
+class BoardScale(Finding):
     """The distances seen ask for a board larger by this factor, beyond its 95 % interval."""
 
     factor: float
     half_width: float
-    code: Literal["board_scale"] = "board_scale"
 
 
-@dataclass(frozen=True)
-class LittleMotion:
+class LittleMotion(Finding):
     """The samples turn little: the largest angle between two, and of the rotation axes to their common direction."""
 
     greatest_turn_deg: float
     axes_apart_deg: float
-    code: Literal["little_motion"] = "little_motion"
 
 
-@dataclass(frozen=True)
-class FewSamples:
+class FewSamples(Finding):
     """So few samples that none is judged by the others, and that their scatter is hardly known."""
 
     samples: int
-    code: Literal["few_samples"] = "few_samples"
 
 
-@dataclass(frozen=True)
-class MoreScatter:
+class MoreScatter(Finding):
     """The residuals are larger than the stated standard deviations allow."""
 
     scatter: float
     largest: float
-    code: Literal["more_scatter"] = "more_scatter"
 
 
-@dataclass(frozen=True)
-class MovedBetween:
+class MovedBetween(Finding):
     """From ``sample`` on the camera, or the board, stands elsewhere: the set is of two setups.
 
     ``probability``: that chance makes such a step; 0 where one end of the set was left out and a step explains it.
@@ -173,7 +144,6 @@ class MovedBetween:
     moved_mm: float
     moved_deg: float
     probability: float
-    code: Literal["moved_between"] = "moved_between"
 
 
 RotationReading = QuaternionOrder | AngleOrder | TransposedRotations
@@ -207,45 +177,34 @@ def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationW
     )
 
 
-@dataclass(frozen=True)
-class TooFewSamples:
+class TooFewSamples(Finding):
     """Hand-eye calibration needs three samples at least."""
 
     samples: int
     needed: int
-    code: Literal["too_few_samples"] = "too_few_samples"
 
 
-@dataclass(frozen=True)
-class AllSamplesEqual:
+class AllSamplesEqual(Finding):
     """The flange never moved, or the board never did."""
 
     stream: Literal["flange", "target"]
-    code: Literal["all_samples_equal"] = "all_samples_equal"
 
 
-@dataclass(frozen=True)
-class ParallelTurns:
+class ParallelTurns(Finding, code="parallel_axes"):
     """All motions turn about one direction (by the flange's axes at a sample), so that the shift along it is open."""
 
     axis: tuple[float, float, float]
     spread_deg: float
-    code: Literal["parallel_axes"] = "parallel_axes"
 
 
-@dataclass(frozen=True)
-class NoRotation:
+class NoRotation(Finding):
     """The flange moves but does not turn, so that the camera's position is open."""
 
     greatest_turn_deg: float
-    code: Literal["no_rotation"] = "no_rotation"
 
 
-@dataclass(frozen=True)
-class NothingFits:
+class NothingFits(Finding):
     """The search for the likeliest poses does not end: the two streams don't belong together."""
-
-    code: Literal["nothing_fits"] = "nothing_fits"
 
 
 NotCalibratable = TooFewSamples | AllSamplesEqual | ParallelTurns | NoRotation | NothingFits
@@ -263,8 +222,7 @@ GraspOutcome = Literal["grasped", "not graspable"]
 DirectionStatus = Literal["best", "same_problem", "excluded", "open"]
 
 
-@dataclass(frozen=True)
-class DirectionTried:
+class DirectionTried(Finding):
     """The samples with one stream or both inverted.
 
     Attributes
@@ -281,4 +239,3 @@ class DirectionTried:
     rms_mm: float | None
     rms_deg: float | None
     probability: float
-    code: Literal["direction_tried"] = "direction_tried"

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from er3a.by_value import Finding
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import within
@@ -80,36 +81,27 @@ class Unlimited:
     side: Literal["both"] = "both"
 
 
-@dataclass(frozen=True)
-class Disappears:
+class Disappears(Finding, code="void_disappears"):
     """One limit alone makes the void, or each of two."""
 
     limits: tuple[Relaxed, ...]
-    code: Literal["void_disappears"] = "void_disappears"
 
 
-@dataclass(frozen=True)
-class SeveralLimits:
+class SeveralLimits(Finding, code="void_of_several_limits"):
     """Only several limits together make the void; ``most`` is the one that shrinks it most, if one does."""
 
     most: Relaxed | None
-    code: Literal["void_of_several_limits"] = "void_of_several_limits"
 
 
-@dataclass(frozen=True)
-class Geometry:
+class Geometry(Finding, code="void_of_geometry"):
     """Part of the void stays without any limit; ``most`` is the limit that shrinks it most, if one does."""
 
     remaining_ratio: float
     most: Relaxed | None
-    code: Literal["void_of_geometry"] = "void_of_geometry"
 
 
-@dataclass(frozen=True)
-class OnlySampled:
+class OnlySampled(Finding, code="void_only_sampled"):
     """Only samples suggest the void, so nothing is known of its cause."""
-
-    code: Literal["void_only_sampled"] = "void_only_sampled"
 
 
 VoidCause = Disappears | SeveralLimits | Geometry | OnlySampled

@@ -24,6 +24,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from er3a.by_value import Finding
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
@@ -395,35 +396,26 @@ GENERAL_CELLS = 4
 """For each cell of the budget, where the general method is used: its cells."""
 
 
-@dataclass(frozen=True)
-class SphericalWrist:
+class SphericalWrist(Finding):
     """The cells were decided by the method for spherical wrists."""
 
-    code: Literal["spherical_wrist"] = "spherical_wrist"
 
-
-@dataclass(frozen=True)
-class ToolNearWrist:
+class ToolNearWrist(Finding):
     """The tool point is so near to the wrist centre, for the arm's reach, that its sphere proves little."""
 
     distance_mm: float
-    code: Literal["tool_near_wrist"] = "tool_near_wrist"
 
 
-@dataclass(frozen=True)
-class BoundsFarApart:
+class BoundsFarApart(Finding):
     """The method for spherical wrists leaves so much between its bounds, for narrow limits say, and this one less."""
 
     percent: float
-    code: Literal["bounds_far_apart"] = "bounds_far_apart"
 
 
-@dataclass(frozen=True)
-class GeneralMethod:
+class GeneralMethod(Finding):
     """The cells were decided by the method for any arm, because of what this one lacks."""
 
     lacks: ClosedFormMissing | ToolNearWrist | BoundsFarApart
-    code: Literal["general_method"] = "general_method"
 
 
 ProofMethod = SphericalWrist | GeneralMethod

@@ -5,13 +5,12 @@ Arms with more than six joints are tried at even values of what a pose leaves op
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
-from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from er3a.by_value import Finding
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import (
@@ -44,27 +43,19 @@ BESIDE = np.array([1.1e-4, -0.7e-4, 0.9e-4])  # rad, about the tool's axes
 _PROBED = 24
 
 
-@dataclass(frozen=True)
-class InverseUnknown:
+class InverseUnknown(Finding):
     """No class of arms whose inverse is known fits this one."""
 
-    code: Literal["inverse_unknown"] = "inverse_unknown"
 
-
-@dataclass(frozen=True)
-class JointOneShared:
+class JointOneShared(Finding):
     """Joint 1 is coupled with others or limited together with them, so what it carries around is not the same all
     about."""
 
-    code: Literal["joint_one_shared"] = "joint_one_shared"
 
-
-@dataclass(frozen=True)
-class OrientationsUnknown:
+class OrientationsUnknown(Finding):
     """Which orientations the arm's few joints can give its tool at a point is not known."""
 
     joints: int
-    code: Literal["orientations_unknown"] = "orientations_unknown"
 
 
 MapsMissing = InverseUnknown | JointOneShared | OrientationsUnknown

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import er3a.pipeline.messages.references  # noqa: F401
+from er3a.by_value import Finding
 from er3a.files.csv_file import CsvColumn, Written
 from er3a.files.reference_sets import FORMATS, Format, load_references
 from er3a.files.robot_library import load_robot
@@ -29,11 +30,8 @@ class StandingHeight(Quantity):
         return state.axis(2)[1][..., 2]
 
 
-@dataclass(frozen=True)
-class Shoulder(Subject):
+class Shoulder(Subject, Finding):
     """The shoulder's height."""
-
-    code: Literal["shoulder"] = "shoulder"
 
 
 @dataclass(frozen=True)

@@ -71,8 +71,8 @@ class LockedJoint:
             return own
         return np.concatenate([own, self.rest.values_of(np.delete(x, self.joint, axis=-1))], axis=-1)
 
-    def seeds(self, T: Reals, values: Reals) -> Reals:
-        return np.empty((0, len(self.sliding)))
+    def seeds(self, T: Reals) -> list[Reals]:
+        return []
 
     def names(self, x: Reals) -> tuple[class_solvers.SlotName, ...]:
         return self.rest.names(np.delete(x, self.joint)) if self.rest is not None else ()
@@ -88,9 +88,6 @@ class Unsolved(class_solvers.WithoutParameters):
 
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         return np.full((len(T), self.slots, self.joints), np.nan), np.full(len(T), CONTINUUM)
-
-    def seeds(self, T: Reals, values: Reals) -> Reals:
-        return np.empty((0, self.joints))
 
 
 def chain_solver(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:

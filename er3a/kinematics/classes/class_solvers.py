@@ -152,7 +152,7 @@ class ChainSolver(Protocol):
 
     def values_of(self, x: Reals) -> Reals: ...
 
-    def seeds(self, T: Reals, values: Reals) -> Reals: ...
+    def seeds(self, T: Reals) -> list[Reals]: ...
 
     def names(self, x: Reals) -> tuple[SlotName, ...]: ...
 
@@ -165,9 +165,9 @@ class WithoutParameters:
     def values_of(self, x: Reals) -> Reals:
         return np.empty((*x.shape[:-1], 0))
 
-    def seeds(self, T: Reals, values: Reals) -> Reals:
+    def seeds(self, T: Reals) -> list[Reals]:
         """Members (k, n) of continua of one pose (4, 4) that the class knows without a search."""
-        return np.empty((0, 6))
+        return []
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         return ()
@@ -223,14 +223,13 @@ class ParallelAxes(WithoutParameters):
             certainty[n] = CONTINUUM if any(chain.smallest(x) < RANK_LOST for x in solved) else CERTAIN
         return q, certainty
 
-    def seeds(self, T: Reals, values: Reals) -> Reals:
-        found = [
+    def seeds(self, T: Reals) -> list[Reals]:
+        return [
             family.members(np.array([0.5 * (low + high), 0.25 * low + 0.75 * high]), elbow)
             for family in four_bars(self.arm, T)
             for low, high in family.intervals
             for elbow in (0, 1)
         ]
-        return np.concatenate([np.empty((0, 6)), *found])
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         axes, points = axes_of(self.arm.links)
@@ -276,8 +275,8 @@ class ArmAngle:
             angles = np.where(np.isnan(angles), arm_angles_of(self.spare, x), angles)
         return angles[..., None]
 
-    def seeds(self, T: Reals, values: Reals) -> Reals:
-        return np.empty((0, 7))
+    def seeds(self, T: Reals) -> list[Reals]:
+        return []
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         # slots are 4 elbow + 2 shoulder + wrist
@@ -314,9 +313,6 @@ class PlanarFour(WithoutParameters):
         meet = np.abs(_shortest(q[:, 0, second] - q[:, 1, second])) < DOUBLE_ROOT
         return q, np.where(meet, CONTINUUM, CERTAIN)
 
-    def seeds(self, T: Reals, values: Reals) -> Reals:
-        return np.empty((0, 4))
-
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         return "elbow_plus", "elbow_minus"
 
@@ -344,9 +340,6 @@ class Completed(WithoutParameters):
             meet = np.abs(_shortest(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
             certainty = np.where(meet.any(axis=1), CONTINUUM, certainty)
         return x, certainty
-
-    def seeds(self, T: Reals, values: Reals) -> Reals:
-        return np.empty((0, 6 - len(self.lacking)))
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         if self.code == "position":  # rows that differ in the joints that are not there are one
@@ -376,9 +369,6 @@ class LinkedRows(WithoutParameters):
         off = np.abs(np.where(self.sliding, off, _shortest(off))).max(axis=2)
         x[off > LEFT_OVER] = np.nan
         return x, certainty
-
-    def seeds(self, T: Reals, values: Reals) -> Reals:
-        return np.empty((0, len(self.start)))
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         return self.chain.names(x)

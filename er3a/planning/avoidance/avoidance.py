@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
@@ -19,99 +19,63 @@ from er3a.planning.timing import JointLimits, NoTimeLaw, Timed, fastest, nodes_a
 from er3a.robots.robot import Robot
 
 
-@dataclass(frozen=True)
-class NothingToAvoid:
+class NothingToAvoid(Finding):
     """The path can be reached, within the limits and away from singular poses, everywhere."""
 
-    code: Literal["nothing_to_avoid"] = "nothing_to_avoid"
 
-
-@dataclass(frozen=True)
-class NoSingularRegion:
+class NoSingularRegion(Finding):
     """The path has no singular region to stop at, bend or go around."""
 
-    code: Literal["no_singular_region"] = "no_singular_region"
 
-
-@dataclass(frozen=True)
-class BeginsOutOfReach:
+class BeginsOutOfReach(Finding):
     """The path begins out of reach."""
 
-    code: Literal["begins_out_of_reach"] = "begins_out_of_reach"
 
-
-@dataclass(frozen=True)
-class EndsOutOfReach:
+class EndsOutOfReach(Finding):
     """The path ends out of reach."""
 
-    code: Literal["ends_out_of_reach"] = "ends_out_of_reach"
 
-
-@dataclass(frozen=True)
-class PartlyOutOfReach:
+class PartlyOutOfReach(Finding):
     """A part of the path is out of reach."""
 
-    code: Literal["partly_out_of_reach"] = "partly_out_of_reach"
 
-
-@dataclass(frozen=True)
-class BeginsInRegion:
+class BeginsInRegion(Finding):
     """The path begins inside the singular region, where it can neither stop nor bend."""
 
-    code: Literal["begins_in_region"] = "begins_in_region"
 
-
-@dataclass(frozen=True)
-class EndsInRegion:
+class EndsInRegion(Finding):
     """The path ends inside the singular region, where it can't bend."""
 
-    code: Literal["ends_in_region"] = "ends_in_region"
 
-
-@dataclass(frozen=True)
-class BranchEnds:
+class BranchEnds(Finding):
     """The branch in use ends, and no other continues it."""
 
     t_s: float
     joint: int
-    code: Literal["branch_ends"] = "branch_ends"
 
 
-@dataclass(frozen=True)
-class NoOtherBranch:
+class NoOtherBranch(Finding):
     """The other branches are singular, beyond a limit or out of reach there too."""
 
-    code: Literal["no_other_branch"] = "no_other_branch"
 
-
-@dataclass(frozen=True)
-class NoShiftKeepsDistance:
+class NoShiftKeepsDistance(Finding):
     """No shift of the tool point keeps the distance."""
 
     up_to_mm: float
-    code: Literal["no_shift_keeps_distance"] = "no_shift_keeps_distance"
 
 
-@dataclass(frozen=True)
-class NoTiltKeepsDistance:
+class NoTiltKeepsDistance(Finding):
     """No tilt of the tool keeps the distance."""
 
     up_to_deg: float
-    code: Literal["no_tilt_keeps_distance"] = "no_tilt_keeps_distance"
 
 
-@dataclass(frozen=True)
-class BentPathSingular:
+class BentPathSingular(Finding):
     """The bent path runs into another singular region."""
 
-    code: Literal["bent_path_singular"] = "bent_path_singular"
 
-
-@dataclass(frozen=True)
-class NoDampingSuffices:
+class NoDampingSuffices(Finding):
     """No damping keeps the joint speeds within their limits at the programmed pace."""
-
-    code: Literal["no_damping_suffices"] = "no_damping_suffices"
 
 
 PathUnfit = NothingToAvoid | NoSingularRegion | BeginsOutOfReach | EndsOutOfReach | PartlyOutOfReach
@@ -120,37 +84,29 @@ NoWay = NoShiftKeepsDistance | NoTiltKeepsDistance | BentPathSingular | NoDampin
 NotPossible = PathUnfit | RegionUnfit | NoWay
 
 
-@dataclass(frozen=True)
-class PathNotFinished:
+class PathNotFinished(Finding):
     """Only a part of the path is done."""
 
     done: float
-    code: Literal["path_not_finished"] = "path_not_finished"
 
 
-@dataclass(frozen=True)
-class EndsOffPath:
+class EndsOffPath(Finding):
     """The motion ends elsewhere than the path."""
 
     distance_mm: float
     angle_deg: float
-    code: Literal["ends_off_path"] = "ends_off_path"
 
 
-@dataclass(frozen=True)
-class SpeedExceeded:
+class SpeedExceeded(Finding):
     """A joint needs so many times its maximum speed."""
 
     ratio: float
-    code: Literal["speed_exceeded"] = "speed_exceeded"
 
 
-@dataclass(frozen=True)
-class AccelerationExceeded:
+class AccelerationExceeded(Finding):
     """A joint needs so many times its maximum acceleration."""
 
     ratio: float
-    code: Literal["acceleration_exceeded"] = "acceleration_exceeded"
 
 
 AT_REST = 1e-6  # rad

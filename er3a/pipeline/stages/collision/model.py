@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import Finding
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -13,8 +14,7 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 
 
-@dataclass(frozen=True)
-class NeverFree:
+class NeverFree(Finding, code="collision.never_free"):
     """Pairs that overlap in every joint vector within the limits, proven: the arm can't be used like this.
 
     ``assumed``: whether the shapes are, so that nothing is proven of the arm itself.
@@ -22,38 +22,30 @@ class NeverFree:
 
     pairs: tuple[Pair, ...]
     assumed: bool
-    code: Literal["collision.never_free"] = "collision.never_free"
 
 
-@dataclass(frozen=True)
-class ShapesOverlap:
+class ShapesOverlap(Finding, code="collision.shapes_overlap"):
     """Pairs whose shapes overlap in every joint vector for no reason; ``free_ratio``: of joint space, without them."""
 
     pairs: tuple[Pair, ...]
     free_ratio: float
-    code: Literal["collision.shapes_overlap"] = "collision.shapes_overlap"
 
 
-@dataclass(frozen=True)
-class BaseInSolid:
+class BaseInSolid(Finding, code="collision.base_in_solid"):
     """The base stands inside solids, in every pose."""
 
     solids: tuple[str, ...]
-    code: Literal["collision.base_in_solid"] = "collision.base_in_solid"
 
 
-@dataclass(frozen=True)
-class HomeCollides:
+class HomeCollides(Finding, code="collision.home_collides"):
     """At home, all joints at 0 or as near to it as the limits allow, something overlaps."""
 
     pair: Pair
     depth_mm: float
     free_ratio: float
-    code: Literal["collision.home_collides"] = "collision.home_collides"
 
 
-@dataclass(frozen=True)
-class FreeSpace:
+class FreeSpace(Finding, code="collision.free_space"):
     """How much of joint space and of the reached places is free.
 
     Attributes
@@ -69,7 +61,6 @@ class FreeSpace:
     joined: int
     undecided: int
     assumed: bool = False
-    code: Literal["collision.free_space"] = "collision.free_space"
 
 
 @dataclass(frozen=True)

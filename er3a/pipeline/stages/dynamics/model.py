@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from er3a.by_value import Finding
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
 from er3a.numerics.arrays import Reals
@@ -33,13 +34,11 @@ Need = (
 )
 
 
-@dataclass(frozen=True)
-class DataOpen:
+class DataOpen(Finding, code="dynamics.unknown"):
     """Something that the files leave open, with the joints or links concerned; none: all."""
 
     what: Need
     numbers: tuple[int, ...] = ()
-    code: Literal["dynamics.unknown"] = "dynamics.unknown"
 
 
 @dataclass(frozen=True)
@@ -67,16 +66,13 @@ class Use:
         return self.asked / self.allowed
 
 
-@dataclass(frozen=True)
-class NoData:
+class NoData(Finding, code="dynamics.no_data"):
     """Neither masses nor a load on a wrist with limits: nothing can be said."""
 
     needs: tuple[DataOpen, ...]
-    code: Literal["dynamics.no_data"] = "dynamics.no_data"
 
 
-@dataclass(frozen=True)
-class NoLimits:
+class NoLimits(Finding, code="dynamics.no_limits"):
     """Torques are known, and no limit that they could be compared with: the largest one.
 
     Attributes
@@ -99,7 +95,6 @@ class NoLimits:
     doubts: int
     grade: Grade | None
     held: HoldingTorque | None = None
-    code: Literal["dynamics.no_limits"] = "dynamics.no_limits"
 
 
 @dataclass(frozen=True)
@@ -125,25 +120,16 @@ class Compared:
     grade: Grade | None
 
 
-@dataclass(frozen=True)
-class AllWithin(Compared):
+class AllWithin(Compared, Finding, code="dynamics.fits"):
     """All is within its limits, tolerances included."""
 
-    code: Literal["dynamics.fits"] = "dynamics.fits"
 
-
-@dataclass(frozen=True)
-class Marginal(Compared):
+class Marginal(Compared, Finding, code="dynamics.marginal"):
     """All is within the limits that are known: not with the tolerances of the masses, or not all was examined."""
 
-    code: Literal["dynamics.marginal"] = "dynamics.marginal"
 
-
-@dataclass(frozen=True)
-class Overload(Compared):
+class Overload(Compared, Finding, code="dynamics.overload"):
     """Something is beyond its limit."""
-
-    code: Literal["dynamics.overload"] = "dynamics.overload"
 
 
 @dataclass(frozen=True)

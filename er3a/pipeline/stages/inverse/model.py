@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import Finding
 from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
@@ -17,50 +18,38 @@ from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
 from er3a.selection.rule_names import RuleName
 
 
-@dataclass(frozen=True)
-class NothingFound:
+class NothingFound(Finding):
     """Iteration found no solution."""
 
-    code: Literal["nothing_found"] = "nothing_found"
 
-
-@dataclass(frozen=True)
-class TiltMissing:
+class TiltMissing(Finding):
     """The wrist would have to tilt further, by the branch that comes nearest."""
 
     angle_deg: float
-    code: Literal["tilt_missing"] = "tilt_missing"
 
 
-@dataclass(frozen=True)
-class ReachMissing:
+class ReachMissing(Finding):
     """The wrist centre is out of reach, of the branch that comes nearest."""
 
     gap_mm: float
-    code: Literal["reach_missing"] = "reach_missing"
 
 
-@dataclass(frozen=True)
-class BranchesLeaveLimits:
+class BranchesLeaveLimits(Finding):
     """So many branches reach the target, all outside the limits."""
 
     count: int
-    code: Literal["branches_leave_limits"] = "branches_leave_limits"
 
 
-@dataclass(frozen=True)
-class BranchesCollide:
+class BranchesCollide(Finding):
     """So many branches reach the target within the limits, and all collide."""
 
     count: int
-    code: Literal["branches_collide"] = "branches_collide"
 
 
 Obstacle = NothingFound | TiltMissing | ReachMissing | BranchesLeaveLimits | BranchesCollide
 
 
-@dataclass(frozen=True)
-class TurnTool:
+class TurnTool(Finding):
     """Turning the tool helps: part of random orientations that have a solution, and the smallest turn found.
 
     Attributes
@@ -74,77 +63,57 @@ class TurnTool:
     to_deg: tuple[float, float, float]
     margin_deg: float
     clearance_mm: float
-    code: Literal["turn_tool"] = "turn_tool"
 
 
-@dataclass(frozen=True)
-class TurningDoesNotHelp:
+class TurningDoesNotHelp(Finding):
     """No orientation tried at this position has a solution."""
 
-    code: Literal["turning_does_not_help"] = "turning_does_not_help"
 
-
-@dataclass(frozen=True)
-class ShiftTool:
+class ShiftTool(Finding):
     """Moving the part or the base helps: the smallest shift of the tool found, and where it ends; see `TurnTool`."""
 
     shift_mm: float
     to_mm: tuple[float, float, float]
     margin_deg: float
     clearance_mm: float
-    code: Literal["shift_tool"] = "shift_tool"
 
 
-@dataclass(frozen=True)
-class ShiftingDoesNotHelp:
+class ShiftingDoesNotHelp(Finding):
     """No position tried has a solution with this orientation."""
 
-    code: Literal["shifting_does_not_help"] = "shifting_does_not_help"
 
-
-@dataclass(frozen=True)
-class MoveObstacle:
+class MoveObstacle(Finding):
     """Only what is around the arm is in the way: without it a solution keeps its margins."""
 
-    code: Literal["move_obstacle"] = "move_obstacle"
 
-
-@dataclass(frozen=True)
-class AtSingularity:
+class AtSingularity(Finding):
     """The arm taken is at a singularity."""
 
     kind: Literal["wrist", "elbow", "shoulder"]
-    code: Literal["at_singularity"] = "at_singularity"
 
 
-@dataclass(frozen=True)
-class NearLimit:
+class NearLimit(Finding):
     """A joint of the arm taken is near its limit."""
 
     margin_deg: float
-    code: Literal["near_limit"] = "near_limit"
 
 
 Advice = TurnTool | TurningDoesNotHelp | ShiftTool | ShiftingDoesNotHelp | MoveObstacle | AtSingularity | NearLimit
 
 
-@dataclass(frozen=True)
-class UnsolvedTarget:
+class UnsolvedTarget(Finding):
     """A target without an admissible solution."""
 
     name: str
     obstacle: Obstacle
-    code: Literal["unsolved_target"] = "unsolved_target"
 
 
-@dataclass(frozen=True)
-class NotReproduced:
+class NotReproduced(Finding, code="inverse.not_reproduced"):
     """The solver misses poses that it says it solves, or loses joint angles that made a pose."""
 
     worst_mm: float
     worst_deg: float
     lost: int
-    code: Literal["inverse.not_reproduced"] = "inverse.not_reproduced"
 
 
 @dataclass(frozen=True)
@@ -162,25 +131,16 @@ class TargetCounts:
     demonstrations: tuple[Demonstration, ...]
 
 
-@dataclass(frozen=True)
-class AllSolved(TargetCounts):
+class AllSolved(TargetCounts, Finding, code="inverse.all_solved"):
     """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``)."""
 
-    code: Literal["inverse.all_solved"] = "inverse.all_solved"
 
-
-@dataclass(frozen=True)
-class SomeUnsolved(TargetCounts):
+class SomeUnsolved(TargetCounts, Finding, code="inverse.some_unsolved"):
     """Some targets have no admissible solution."""
 
-    code: Literal["inverse.some_unsolved"] = "inverse.some_unsolved"
 
-
-@dataclass(frozen=True)
-class NoneSolved(TargetCounts):
+class NoneSolved(TargetCounts, Finding, code="inverse.none_solved"):
     """No target has an admissible solution."""
-
-    code: Literal["inverse.none_solved"] = "inverse.none_solved"
 
 
 ToolOrientation = Literal["tool_down", "tool_level"]

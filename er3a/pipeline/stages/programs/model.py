@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+from er3a.by_value import Finding
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
@@ -30,32 +30,20 @@ class ProgramCounts:
     not_examined: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class AllProgramsPass(ProgramCounts):
+class AllProgramsPass(ProgramCounts, Finding, code="programs.pass"):
     """Every program passes."""
 
-    code: Literal["programs.pass"] = "programs.pass"
 
-
-@dataclass(frozen=True)
-class SomeProgramsCaution(ProgramCounts):
+class SomeProgramsCaution(ProgramCounts, Finding, code="programs.caution"):
     """No program fails, but some are to be looked at."""
 
-    code: Literal["programs.caution"] = "programs.caution"
 
-
-@dataclass(frozen=True)
-class SomeProgramsFail(ProgramCounts):
+class SomeProgramsFail(ProgramCounts, Finding, code="programs.fail"):
     """Some programs can't be carried out as they are written."""
 
-    code: Literal["programs.fail"] = "programs.fail"
 
-
-@dataclass(frozen=True)
-class NoPrograms:
+class NoPrograms(Finding, code="programs.none"):
     """The robot's file of programs names none."""
-
-    code: Literal["programs.none"] = "programs.none"
 
 
 @dataclass(frozen=True)

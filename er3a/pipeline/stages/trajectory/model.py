@@ -57,25 +57,16 @@ class PathCounts:
     not_followed: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class AllSafe(PathCounts):
+class AllSafe(PathCounts, Finding, code="trajectory.safe"):
     """Every path is safe."""
 
-    code: Literal["trajectory.safe"] = "trajectory.safe"
 
-
-@dataclass(frozen=True)
-class SomeUnsafe(PathCounts):
+class SomeUnsafe(PathCounts, Finding, code="trajectory.some_unsafe"):
     """Some paths are safe."""
 
-    code: Literal["trajectory.some_unsafe"] = "trajectory.some_unsafe"
 
-
-@dataclass(frozen=True)
-class NoneSafe(PathCounts):
+class NoneSafe(PathCounts, Finding, code="trajectory.none_safe"):
     """No path counts as safe."""
-
-    code: Literal["trajectory.none_safe"] = "trajectory.none_safe"
 
 
 @dataclass(frozen=True)
@@ -143,23 +134,19 @@ class Jump:
     angle_deg: float
 
 
-@dataclass(frozen=True)
-class PairTouches:
+class PairTouches(Finding):
     """Two bodies that overlap: from when on, and by how much at most, at what time."""
 
     pair: Pair
     t0_s: float
     depth_mm: float
     t_s: float
-    code: Literal["pair_touches"] = "pair_touches"
 
 
-@dataclass(frozen=True)
-class BodiesOverlap:
+class BodiesOverlap(Finding):
     """What overlaps, the first to touch first."""
 
     touches: tuple[PairTouches, ...]
-    code: Literal["bodies_overlap"] = "bodies_overlap"
 
     @property
     def pairs(self) -> tuple[Pair, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import Finding
 from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import Held, LevelName
 from er3a.collision.pairs import Pair
@@ -27,54 +28,43 @@ from er3a.vision.vision_findings import (
 )
 
 
-@dataclass(frozen=True)
-class CalibrationImpossible:
+class CalibrationImpossible(Finding):
     """The samples don't determine where the camera is."""
 
     why: NotCalibratable
-    code: Literal["calibration_impossible"] = "calibration_impossible"
 
 
-@dataclass(frozen=True)
-class CalibrationDoubtful:
+class CalibrationDoubtful(Finding):
     """The samples contradict each other, or this robot's table."""
 
     warnings: tuple[CalibrationWarning, ...]
-    code: Literal["calibration_doubtful"] = "calibration_doubtful"
 
 
-@dataclass(frozen=True)
-class DirectionContradicted:
+class DirectionContradicted(Finding):
     """The samples fit far better with one of the streams inverted."""
 
     flange_inverted: bool
     target_inverted: bool
     rms_mm: float
     rms_given_mm: float
-    code: Literal["direction_contradicted"] = "direction_contradicted"
 
 
-@dataclass(frozen=True)
-class TouchContradicts:
+class TouchContradicts(Finding):
     """Touched points, held out of the calibration, are not where it puts them."""
 
     points: int
     largest_mm: float
     probability: float
-    code: Literal["touch_contradicts"] = "touch_contradicts"
 
 
-@dataclass(frozen=True)
-class NotGraspedObject:
+class NotGraspedObject(Finding):
     """An object that the arm can't grasp."""
 
     name: str
     why: GraspRefusal
-    code: Literal["not_grasped_object"] = "not_grasped_object"
 
 
-@dataclass(frozen=True)
-class GraspCounts:
+class GraspCounts(Finding):
     """What came of the objects that are to be grasped.
 
     Attributes
@@ -94,7 +84,6 @@ class GraspCounts:
     demonstrations: tuple[Demonstration, ...]
     simulated: bool
     assumed: tuple[str, ...] = ()
-    code: Literal["grasp_counts"] = "grasp_counts"
 
 
 Three = tuple[float, float, float]

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import Finding
 from er3a.collision.pairs import Pair
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
@@ -33,27 +34,20 @@ from er3a.workspace.tool_inverse import MapsMissing
 from er3a.workspace.voids import Hull, Void, VoidKind
 
 
-@dataclass(frozen=True)
-class Flat:
+class Flat(Finding, code="workspace.flat"):
     """The tool point moves on a line or not at all."""
 
-    code: Literal["workspace.flat"] = "workspace.flat"
 
-
-@dataclass(frozen=True)
-class OnSurface:
+class OnSurface(Finding, code="workspace.on_surface"):
     """The tool point moves on a surface; its area as :class:`er3a.workspace.general_proof.Surface` has it."""
 
     surface: Surface
-    code: Literal["workspace.on_surface"] = "workspace.on_surface"
 
 
-@dataclass(frozen=True)
-class Undersampled:
+class Undersampled(Finding, code="workspace.undersampled"):
     """Too few samples for the cells, without a proof."""
 
     unseen_percent: float
-    code: Literal["workspace.undersampled"] = "workspace.undersampled"
 
 
 @dataclass(frozen=True)
@@ -66,37 +60,27 @@ class VoidFound:
     z_mm: float
 
 
-@dataclass(frozen=True)
-class VoidUnexpected(VoidFound):
+class VoidUnexpected(VoidFound, Finding, code="workspace.void_unexpected"):
     """An enclosed void away from the shoulder, proven empty."""
 
     cause: VoidCause
     single_changes: tuple[SingleChange, ...] = ()
-    code: Literal["workspace.void_unexpected"] = "workspace.void_unexpected"
 
 
-@dataclass(frozen=True)
-class VoidUncertain(VoidFound):
+class VoidUncertain(VoidFound, Finding, code="workspace.void_uncertain"):
     """An enclosed void away from the shoulder that only samples suggest."""
 
-    code: Literal["workspace.void_uncertain"] = "workspace.void_uncertain"
 
-
-@dataclass(frozen=True)
-class VoidAtShoulder(VoidFound):
+class VoidAtShoulder(VoidFound, Finding, code="workspace.void_at_shoulder"):
     """An enclosed void about the shoulder, as every arm leaves that can't fold onto itself."""
 
-    code: Literal["workspace.void_at_shoulder"] = "workspace.void_at_shoulder"
 
-
-@dataclass(frozen=True)
-class NoVoid:
+class NoVoid(Finding, code="workspace.no_void"):
     """No enclosed void, by the proof or by samples alone; ``undecided_percent`` is what the general proof leaves
     undecided of the volume."""
 
     proven: bool
     undecided_percent: float | None = None
-    code: Literal["workspace.no_void"] = "workspace.no_void"
 
 
 WorkspaceFinding = Flat | OnSurface | Undersampled | VoidUnexpected | VoidUncertain | VoidAtShoulder | NoVoid
@@ -440,12 +424,10 @@ class CapabilitySummary:
     clear: ClearSummary
 
 
-@dataclass(frozen=True)
-class CapabilityMissing:
+class CapabilityMissing(Finding, code="workspace.capability_missing"):
     """Capability and placement were not computed, and why."""
 
     lacks: MapsMissing
-    code: Literal["workspace.capability_missing"] = "workspace.capability_missing"
 
 
 @dataclass(frozen=True)
@@ -460,21 +442,17 @@ class TaskSummary:
     clear_of_axis_mm: float
 
 
-@dataclass(frozen=True)
-class ToolPointsElsewhere:
+class ToolPointsElsewhere(Finding, code="workspace.tool_points_elsewhere"):
     """The box is nowhere served: the tool points along ``direction`` and can't tilt, which is not what is asked."""
 
     task: TaskSummary
     direction: Triple
-    code: Literal["workspace.tool_points_elsewhere"] = "workspace.tool_points_elsewhere"
 
 
-@dataclass(frozen=True)
-class PlacementTooLong:
+class PlacementTooLong(Finding, code="workspace.placement_too_long"):
     """Places were not looked for: with what a pose takes this arm, the lattice would have to be wider than the box."""
 
     task: TaskSummary
-    code: Literal["workspace.placement_too_long"] = "workspace.placement_too_long"
 
 
 @dataclass(frozen=True)
