@@ -15,9 +15,9 @@ library. Every sheet is short however much the object holds.
 
 What computation finds: codes with typed parameters, from which sentences are made elsewhere.
 
-A finding is a frozen dataclass whose last field is ``code: Literal["some_code"] = "some_code"``; its other fields are
-the parameters, plain or findings themselves, with the unit in the name. Several kinds of finding in one place are a
-union. Nothing decides by a sentence: code asks for the type or the code.
+A finding is a frozen dataclass whose last field is ``code: Literal["some_code"] = "some_code"`` (:class:`Coded`
+makes one); its other fields are the parameters, plain or findings themselves, with the unit in the name. Several kinds
+of finding in one place are a union. Nothing decides by a sentence: code asks for the type or the code.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from functools import cached_property
 from html import escape
 from itertools import islice
 from types import MethodType
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, Protocol, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -266,3 +266,22 @@ class Finding(Protocol):
     def code(self) -> str:
         """What was found: the stable identifier that summaries hold."""
         ...
+
+
+@dataclass_transform(frozen_default=True)
+class Coded:
+    """Base of findings, which makes frozen dataclasses of its subclasses, with ``code`` as the last field::
+
+        class ReachMissing(Coded, code="reach_missing"):
+            gap_mm: float
+
+    A subclass without a code holds what several findings share.
+    """
+
+    code: str
+
+    def __init_subclass__(cls, code: str = "") -> None:
+        if code:
+            cls.__annotations__["code"] = Literal[code]
+            cls.code = code
+        dataclass(frozen=True)(cls)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+from er3a.by_value import Coded
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.say import texts
 from er3a.pipeline.results import Figure, Results, Summary, Verdict, write_results
@@ -20,26 +21,21 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 ROBOT = "er3_600"
 
 
-@dataclass(frozen=True)
-class Hollow:
+class Hollow(Coded, code="made.hollow"):
     """A finding of the stage below."""
 
     volume_m3: float
-    code: Literal["made.hollow"] = "made.hollow"
 
 
-@dataclass(frozen=True)
-class Solid:
+class Solid(Coded, code="made.solid"):
     """Another, which may hold one."""
 
     apart_from: Hollow | None
-    code: Literal["made.solid"] = "made.solid"
 
 
 TEXTS = texts({"made.hollow": "A hollow (空洞) of {volume_m3:.2f} m³.", "made.solid": "All is solid."})
 
 
-@dataclass(frozen=True)
 class MadeSummary(Summary):
     """With a key of its own."""
 
@@ -47,7 +43,6 @@ class MadeSummary(Summary):
     reach_m: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
 class Rows(Table):
     """One column of each kind."""
 
@@ -58,7 +53,6 @@ class Rows(Table):
     point_mm: Reals = vector("{}_mm", "where")
 
 
-@dataclass(frozen=True, eq=False)
 class MadeResults(Results[MadeSummary]):
     """A summary and a table."""
 

@@ -23,12 +23,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Literal, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_args, get_origin
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from er3a.by_value import ByValue, Finding
+from er3a.by_value import ByValue, Coded, Finding
 from er3a.collision.pairs import Pair, PairsUnexamined, ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
@@ -214,17 +214,16 @@ class LeftOut:
     amount: int | float | None = None
 
 
-@dataclass(frozen=True)
-class NoPass:
+class NoPass(Coded, code="no_pass"):
     """What was not examined and may turn a verdict, which therefore is no pass."""
 
     missed: tuple[LeftOut, ...]
-    code: Literal["no_pass"] = "no_pass"
 
 
+@dataclass_transform(frozen_default=True)
 @dataclass(frozen=True)
 class Summary:
-    """What all summaries begin with; a stage's own says what its verdict can be.
+    """What all summaries begin with; a stage's own, a frozen dataclass like this one, says what its verdict can be.
 
     ``not_examined``: what settings, inputs and limits leave out of the verdict. ``decisive``: subjects of these without
     which the stage's verdict is no pass.
@@ -236,6 +235,9 @@ class Summary:
     figures: tuple[Figure, ...]
     not_examined: tuple[LeftOut, ...] = field(default=(), kw_only=True)
 
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
+
     def __post_init__(self) -> None:
         missed = tuple(each for each in self.not_examined if each.subject in self.decisive)
         object.__setattr__(self, "verdict", self.verdict.short_of(missed))
@@ -245,11 +247,15 @@ SummaryT = TypeVar("SummaryT", bound=Summary)
 ResultsT = TypeVar("ResultsT", bound="Results[Any]")
 
 
+@dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
 class Results(ByValue, Generic[SummaryT]):
-    """A stage's results: its summary, and the tables that a subclass adds."""
+    """A stage's results: its summary, and the tables that a subclass, a frozen dataclass like this one, adds."""
 
     summary: SummaryT
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, eq=False)(cls)
 
 
 @dataclass(frozen=True)
@@ -294,15 +300,12 @@ class Stored(ByValue, Generic[ResultsT]):
         return self.results.summary.verdict.status
 
 
-@dataclass(frozen=True)
-class NotComputed:
+class NotComputed(Coded, code="stage.not_computed"):
     """A stage could not be computed for a robot."""
 
     reason: str
-    code: Literal["stage.not_computed"] = "stage.not_computed"
 
 
-@dataclass(frozen=True, eq=False)
 class AbsentResults(Results[Summary]):
     """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 

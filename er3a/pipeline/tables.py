@@ -2,7 +2,6 @@
 
 A table is a frozen dataclass of equally long arrays::
 
-    @dataclass(frozen=True, eq=False)
     class Samples(Table):
         path: Texts = column("name of the path")
         t_s: Reals = column("time since the path's start")
@@ -23,7 +22,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform, get_args, get_type_hints
 
 import numpy as np
 import pyarrow as pa
@@ -152,14 +151,18 @@ def _numbered(name: str) -> str:
     return f"{stem}{{}}_{unit}" if unit else f"{stem}{{}}"
 
 
+@dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
 class Table(ByValue):
-    """Base of all tables; see the module."""
+    """Base of all tables, which makes frozen dataclasses of its subclasses; see the module."""
 
     joints: ClassVar[int] = 6
     """Columns of a group that counts joints, in a table without rows."""
     slides: ClassVar[tuple[bool, ...]] = ()
     """Which joints are distances, whose columns are in mm; of a table of its own by :meth:`of_joints`."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, eq=False)(cls)
 
     def __post_init__(self) -> None:
         lengths = {}

@@ -15,8 +15,7 @@ from testing.small_study import STUDY
 FILES = {
     "pipeline/stages/toy/__init__.py": '"""How long the arm is."""\n',
     "pipeline/stages/toy/entry.py": '''"""The stage in the registry."""
-from dataclasses import dataclass
-from typing import Literal
+from er3a.by_value import Coded
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.stages.stage import Stage
 
@@ -24,11 +23,9 @@ class ToySettings(StrictModel):
     """``factor``: how many arms in a row."""
     factor: int = 2
 
-@dataclass(frozen=True)
-class TooLong:
+class TooLong(Coded, code="toy.too_long"):
     """A link is too long for this stage."""
     length_m: float
-    code: Literal["toy.too_long"] = "toy.too_long"
 
 def applies(robot):
     return TooLong(robot.a.max()) if robot.a.max() > 0.4 else None
@@ -37,29 +34,23 @@ STAGE = Stage(name="toy", title="toy", question="How long?", settings={"toy": To
               applies=applies, absences=(TooLong,))
 ''',
     "pipeline/stages/toy/model.py": '''"""What the stage finds."""
-from dataclasses import dataclass
-from typing import Literal
+from er3a.by_value import Coded
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.tables import Table, column
 
-@dataclass(frozen=True)
-class Long:
+class Long(Coded, code="toy.long"):
     """A length."""
     length_m: float
-    code: Literal["toy.long"] = "toy.long"
 
-@dataclass(frozen=True)
 class ToySummary(Summary):
     """Nothing more."""
     verdict: Verdict[Long]
 
-@dataclass(frozen=True, eq=False)
 class Lengths(Table):
     """Each length."""
     a_m: Reals = column("length of a link")
 
-@dataclass(frozen=True, eq=False)
 class ToyResults(Results[ToySummary]):
     """With a table."""
     lengths: Lengths

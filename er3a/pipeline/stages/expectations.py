@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
+from er3a.by_value import Coded
 from er3a.kinematics.solutions import TargetOutcome
 from er3a.planning.names import PathVerdict
 from er3a.programs.syntax import ProgramOutcome
@@ -14,32 +14,26 @@ from er3a.vision.vision_findings import GraspOutcome
 Outcome = TargetOutcome | PathVerdict | ProgramOutcome | GraspOutcome
 
 
-@dataclass(frozen=True)
-class UnmetExpectation:
+class UnmetExpectation(Coded, code="unmet_expectation"):
     """Something came to another end than the file expects."""
 
     name: str
     expected: Outcome
     found: Outcome
-    code: Literal["unmet_expectation"] = "unmet_expectation"
 
 
-@dataclass(frozen=True)
-class Demonstration:
+class Demonstration(Coded, code="demonstration"):
     """A target, a path or an object that fails as it is meant to."""
 
     name: str
     found: Outcome
-    code: Literal["demonstration"] = "demonstration"
 
 
-@dataclass(frozen=True)
-class ExpectationsUnmet:
+class ExpectationsUnmet(Coded, code="expectations_unmet"):
     """Of so many expectations these are not met."""
 
     expectations: int
     unmet: tuple[UnmetExpectation, ...]
-    code: Literal["expectations_unmet"] = "expectations_unmet"
 
 
 class Judged(Protocol):

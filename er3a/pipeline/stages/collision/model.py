@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import Coded
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -13,8 +14,7 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 
 
-@dataclass(frozen=True)
-class NeverFree:
+class NeverFree(Coded, code="collision.never_free"):
     """Pairs that overlap in every joint vector within the limits, proven: the arm can't be used like this.
 
     ``assumed``: whether the shapes are, so that nothing is proven of the arm itself.
@@ -22,38 +22,30 @@ class NeverFree:
 
     pairs: tuple[Pair, ...]
     assumed: bool
-    code: Literal["collision.never_free"] = "collision.never_free"
 
 
-@dataclass(frozen=True)
-class ShapesOverlap:
+class ShapesOverlap(Coded, code="collision.shapes_overlap"):
     """Pairs whose shapes overlap in every joint vector for no reason; ``free_ratio``: of joint space, without them."""
 
     pairs: tuple[Pair, ...]
     free_ratio: float
-    code: Literal["collision.shapes_overlap"] = "collision.shapes_overlap"
 
 
-@dataclass(frozen=True)
-class BaseInSolid:
+class BaseInSolid(Coded, code="collision.base_in_solid"):
     """The base stands inside solids, in every pose."""
 
     solids: tuple[str, ...]
-    code: Literal["collision.base_in_solid"] = "collision.base_in_solid"
 
 
-@dataclass(frozen=True)
-class HomeCollides:
+class HomeCollides(Coded, code="collision.home_collides"):
     """At home, all joints at 0 or as near to it as the limits allow, something overlaps."""
 
     pair: Pair
     depth_mm: float
     free_ratio: float
-    code: Literal["collision.home_collides"] = "collision.home_collides"
 
 
-@dataclass(frozen=True)
-class FreeSpace:
+class FreeSpace(Coded, code="collision.free_space"):
     """How much of joint space and of the reached places is free.
 
     Attributes
@@ -69,7 +61,6 @@ class FreeSpace:
     joined: int
     undecided: int
     assumed: bool = False
-    code: Literal["collision.free_space"] = "collision.free_space"
 
 
 @dataclass(frozen=True)
@@ -117,7 +108,6 @@ class Closest:
     to_mm: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
 class CollisionSummary(Summary):
     """What the stage found.
 
@@ -143,7 +133,6 @@ class CollisionSummary(Summary):
     closest: tuple[Closest, ...]
 
 
-@dataclass(frozen=True, eq=False)
 class MatrixRows(Table):
     """The allowed collision matrix: one row for each pair of links, and of a link with what is carried."""
 
@@ -158,7 +147,6 @@ class MatrixRows(Table):
     reason: Texts = column("what the person who decided on the pair wrote")
 
 
-@dataclass(frozen=True, eq=False)
 class PairShares(Table):
     """How often each pair overlaps among random joint vectors."""
 
@@ -170,7 +158,6 @@ class PairShares(Table):
     always: Flags = column("whether they overlap in every joint vector, proven")
 
 
-@dataclass(frozen=True, eq=False)
 class PlaceRows(Table):
     """Cells that the tool point was brought to."""
 
@@ -181,7 +168,6 @@ class PlaceRows(Table):
     witness_deg: Reals = per_joint("the first such arm; NaN where none was found")
 
 
-@dataclass(frozen=True, eq=False)
 class TargetClearances(Table):
     """Clearance of each target's solutions within the limits."""
 
@@ -193,7 +179,6 @@ class TargetClearances(Table):
     between: Texts = column("what is nearest to what")
 
 
-@dataclass(frozen=True, eq=False)
 class PathClearances(Table):
     """Clearance over time of each path, with the points of both bodies that are nearest."""
 
@@ -206,7 +191,6 @@ class PathClearances(Table):
     to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body")
 
 
-@dataclass(frozen=True, eq=False)
 class CollisionResults(Results[CollisionSummary]):
     """The stage's results."""
 

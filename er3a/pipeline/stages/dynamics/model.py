@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from er3a.by_value import Coded
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
 from er3a.numerics.arrays import Reals
@@ -33,13 +34,11 @@ Need = (
 )
 
 
-@dataclass(frozen=True)
-class DataOpen:
+class DataOpen(Coded, code="dynamics.unknown"):
     """Something that the files leave open, with the joints or links concerned; none: all."""
 
     what: Need
     numbers: tuple[int, ...] = ()
-    code: Literal["dynamics.unknown"] = "dynamics.unknown"
 
 
 @dataclass(frozen=True)
@@ -67,16 +66,13 @@ class Use:
         return self.asked / self.allowed
 
 
-@dataclass(frozen=True)
-class NoData:
+class NoData(Coded, code="dynamics.no_data"):
     """Neither masses nor a load on a wrist with limits: nothing can be said."""
 
     needs: tuple[DataOpen, ...]
-    code: Literal["dynamics.no_data"] = "dynamics.no_data"
 
 
-@dataclass(frozen=True)
-class NoLimits:
+class NoLimits(Coded, code="dynamics.no_limits"):
     """Torques are known, and no limit that they could be compared with: the largest one.
 
     Attributes
@@ -99,11 +95,9 @@ class NoLimits:
     doubts: int
     grade: Grade | None
     held: HoldingTorque | None = None
-    code: Literal["dynamics.no_limits"] = "dynamics.no_limits"
 
 
-@dataclass(frozen=True)
-class Compared:
+class Compared(Coded):
     """So much was compared with limits; ``tightest`` is what is nearest to its limit, or farthest beyond it.
 
     Attributes
@@ -125,25 +119,16 @@ class Compared:
     grade: Grade | None
 
 
-@dataclass(frozen=True)
-class AllWithin(Compared):
+class AllWithin(Compared, code="dynamics.fits"):
     """All is within its limits, tolerances included."""
 
-    code: Literal["dynamics.fits"] = "dynamics.fits"
 
-
-@dataclass(frozen=True)
-class Marginal(Compared):
+class Marginal(Compared, code="dynamics.marginal"):
     """All is within the limits that are known: not with the tolerances of the masses, or not all was examined."""
 
-    code: Literal["dynamics.marginal"] = "dynamics.marginal"
 
-
-@dataclass(frozen=True)
-class Overload(Compared):
+class Overload(Compared, code="dynamics.overload"):
     """Something is beyond its limit."""
-
-    code: Literal["dynamics.overload"] = "dynamics.overload"
 
 
 @dataclass(frozen=True)
@@ -341,7 +326,6 @@ class MotorNeed:
     rated_limit: float | None
 
 
-@dataclass(frozen=True)
 class DynamicsSummary(Summary):
     """Head, masses, paths, drives and wrist.
 
@@ -367,7 +351,6 @@ class DynamicsSummary(Summary):
     power_imbalance: float | None
 
 
-@dataclass(frozen=True, eq=False)
 class TorqueRows(Table):
     """Torques along the paths that the arm can follow, N m (N for prismatic joints)."""
 
@@ -384,7 +367,6 @@ class TorqueRows(Table):
     power_w: Reals = per_joint("power of the drive", heading=N_("drive power"))
 
 
-@dataclass(frozen=True, eq=False)
 class DiagramRows(Table):
     """The load diagram: how far from the last axis a point load's centre may be; NaN where it may nowhere."""
 
@@ -395,7 +377,6 @@ class DiagramRows(Table):
     across_mm: Reals = column("greatest distance of its centre from the last axis", heading=N_("from the last axis"))
 
 
-@dataclass(frozen=True, eq=False)
 class DynamicsResults(Results[DynamicsSummary]):
     """Summary and tables of the stage."""
 

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.by_value import Coded
 from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
@@ -17,50 +18,38 @@ from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
 from er3a.selection.rule_names import RuleName
 
 
-@dataclass(frozen=True)
-class NothingFound:
+class NothingFound(Coded, code="nothing_found"):
     """Iteration found no solution."""
 
-    code: Literal["nothing_found"] = "nothing_found"
 
-
-@dataclass(frozen=True)
-class TiltMissing:
+class TiltMissing(Coded, code="tilt_missing"):
     """The wrist would have to tilt further, by the branch that comes nearest."""
 
     angle_deg: float
-    code: Literal["tilt_missing"] = "tilt_missing"
 
 
-@dataclass(frozen=True)
-class ReachMissing:
+class ReachMissing(Coded, code="reach_missing"):
     """The wrist centre is out of reach, of the branch that comes nearest."""
 
     gap_mm: float
-    code: Literal["reach_missing"] = "reach_missing"
 
 
-@dataclass(frozen=True)
-class BranchesLeaveLimits:
+class BranchesLeaveLimits(Coded, code="branches_leave_limits"):
     """So many branches reach the target, all outside the limits."""
 
     count: int
-    code: Literal["branches_leave_limits"] = "branches_leave_limits"
 
 
-@dataclass(frozen=True)
-class BranchesCollide:
+class BranchesCollide(Coded, code="branches_collide"):
     """So many branches reach the target within the limits, and all collide."""
 
     count: int
-    code: Literal["branches_collide"] = "branches_collide"
 
 
 Obstacle = NothingFound | TiltMissing | ReachMissing | BranchesLeaveLimits | BranchesCollide
 
 
-@dataclass(frozen=True)
-class TurnTool:
+class TurnTool(Coded, code="turn_tool"):
     """Turning the tool helps: part of random orientations that have a solution, and the smallest turn found.
 
     Attributes
@@ -74,81 +63,60 @@ class TurnTool:
     to_deg: tuple[float, float, float]
     margin_deg: float
     clearance_mm: float
-    code: Literal["turn_tool"] = "turn_tool"
 
 
-@dataclass(frozen=True)
-class TurningDoesNotHelp:
+class TurningDoesNotHelp(Coded, code="turning_does_not_help"):
     """No orientation tried at this position has a solution."""
 
-    code: Literal["turning_does_not_help"] = "turning_does_not_help"
 
-
-@dataclass(frozen=True)
-class ShiftTool:
+class ShiftTool(Coded, code="shift_tool"):
     """Moving the part or the base helps: the smallest shift of the tool found, and where it ends; see `TurnTool`."""
 
     shift_mm: float
     to_mm: tuple[float, float, float]
     margin_deg: float
     clearance_mm: float
-    code: Literal["shift_tool"] = "shift_tool"
 
 
-@dataclass(frozen=True)
-class ShiftingDoesNotHelp:
+class ShiftingDoesNotHelp(Coded, code="shifting_does_not_help"):
     """No position tried has a solution with this orientation."""
 
-    code: Literal["shifting_does_not_help"] = "shifting_does_not_help"
 
-
-@dataclass(frozen=True)
-class MoveObstacle:
+class MoveObstacle(Coded, code="move_obstacle"):
     """Only what is around the arm is in the way: without it a solution keeps its margins."""
 
-    code: Literal["move_obstacle"] = "move_obstacle"
 
-
-@dataclass(frozen=True)
-class AtSingularity:
+class AtSingularity(Coded, code="at_singularity"):
     """The arm taken is at a singularity."""
 
     kind: Literal["wrist", "elbow", "shoulder"]
-    code: Literal["at_singularity"] = "at_singularity"
 
 
-@dataclass(frozen=True)
-class NearLimit:
+class NearLimit(Coded, code="near_limit"):
     """A joint of the arm taken is near its limit."""
 
     margin_deg: float
-    code: Literal["near_limit"] = "near_limit"
 
 
 Advice = TurnTool | TurningDoesNotHelp | ShiftTool | ShiftingDoesNotHelp | MoveObstacle | AtSingularity | NearLimit
 
 
-@dataclass(frozen=True)
-class UnsolvedTarget:
+class UnsolvedTarget(Coded, code="unsolved_target"):
     """A target without an admissible solution."""
 
     name: str
     obstacle: Obstacle
-    code: Literal["unsolved_target"] = "unsolved_target"
 
 
-@dataclass(frozen=True)
-class NotReproduced:
+class NotReproduced(Coded, code="inverse.not_reproduced"):
     """The solver misses poses that it says it solves, or loses joint angles that made a pose."""
 
     worst_mm: float
     worst_deg: float
     lost: int
-    code: Literal["inverse.not_reproduced"] = "inverse.not_reproduced"
 
 
-@dataclass(frozen=True)
-class TargetCounts:
+class TargetCounts(Coded):
     """How many targets have an admissible solution, and which have none.
 
     ``collisions``: a scene was given, so that the solutions touch nothing of it. The arm never touches itself.
@@ -162,25 +130,16 @@ class TargetCounts:
     demonstrations: tuple[Demonstration, ...]
 
 
-@dataclass(frozen=True)
-class AllSolved(TargetCounts):
+class AllSolved(TargetCounts, code="inverse.all_solved"):
     """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``)."""
 
-    code: Literal["inverse.all_solved"] = "inverse.all_solved"
 
-
-@dataclass(frozen=True)
-class SomeUnsolved(TargetCounts):
+class SomeUnsolved(TargetCounts, code="inverse.some_unsolved"):
     """Some targets have no admissible solution."""
 
-    code: Literal["inverse.some_unsolved"] = "inverse.some_unsolved"
 
-
-@dataclass(frozen=True)
-class NoneSolved(TargetCounts):
+class NoneSolved(TargetCounts, code="inverse.none_solved"):
     """No target has an admissible solution."""
-
-    code: Literal["inverse.none_solved"] = "inverse.none_solved"
 
 
 ToolOrientation = Literal["tool_down", "tool_level"]
@@ -302,7 +261,6 @@ class RoundTrips:
     counts_within_limits: tuple[int, ...]
 
 
-@dataclass(frozen=True)
 class InverseSummary(Summary):
     """What the stage found.
 
@@ -323,7 +281,6 @@ class InverseSummary(Summary):
     round_trips: RoundTrips | None
 
 
-@dataclass(frozen=True, eq=False)
 class SolutionRows(Table):
     """One row for each solution of each target, turns included."""
 
@@ -349,7 +306,6 @@ class SolutionRows(Table):
     distance_deg: Reals = column("root of the summed squares of the joint moves")
 
 
-@dataclass(frozen=True, eq=False)
 class RankingRows(Table):
     """Place and measure, by each rule, of each branch's best solution within the limits."""
 
@@ -361,7 +317,6 @@ class RankingRows(Table):
     place: Integers = column("1 is the best; 0 for solutions that collide")
 
 
-@dataclass(frozen=True, eq=False)
 class MapRows(Table):
     """Number of solutions of tool poses on a grid in the vertical plane through axis 1 (y = 0 of the base)."""
 
@@ -375,7 +330,6 @@ class MapRows(Table):
     )
 
 
-@dataclass(frozen=True, eq=False)
 class InverseResults(Results[InverseSummary]):
     """The stage's results; the map is empty for arms without a closed form."""
 

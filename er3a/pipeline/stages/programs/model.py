@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
+from er3a.by_value import Coded
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
@@ -14,8 +14,7 @@ from er3a.program_check.program_check_findings import CheckFinding, Level
 from er3a.programs.syntax import LanguageName, ProgramOutcome
 
 
-@dataclass(frozen=True)
-class ProgramCounts:
+class ProgramCounts(Coded):
     """How many programs there are, how many pass, and the names of the others.
 
     ``demonstrations``, programs that fail as they are meant to, count for none of these. ``not_examined``: names of
@@ -30,32 +29,20 @@ class ProgramCounts:
     not_examined: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class AllProgramsPass(ProgramCounts):
+class AllProgramsPass(ProgramCounts, code="programs.pass"):
     """Every program passes."""
 
-    code: Literal["programs.pass"] = "programs.pass"
 
-
-@dataclass(frozen=True)
-class SomeProgramsCaution(ProgramCounts):
+class SomeProgramsCaution(ProgramCounts, code="programs.caution"):
     """No program fails, but some are to be looked at."""
 
-    code: Literal["programs.caution"] = "programs.caution"
 
-
-@dataclass(frozen=True)
-class SomeProgramsFail(ProgramCounts):
+class SomeProgramsFail(ProgramCounts, code="programs.fail"):
     """Some programs can't be carried out as they are written."""
 
-    code: Literal["programs.fail"] = "programs.fail"
 
-
-@dataclass(frozen=True)
-class NoPrograms:
+class NoPrograms(Coded, code="programs.none"):
     """The robot's file of programs names none."""
-
-    code: Literal["programs.none"] = "programs.none"
 
 
 @dataclass(frozen=True)
@@ -112,7 +99,6 @@ class ProgramSummary:
     not_examined: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
 class ProgramsSummary(Summary):
     """Head and programs; ``scene`` is its title, None where the study names none."""
 
@@ -122,7 +108,6 @@ class ProgramsSummary(Summary):
     programs: tuple[ProgramSummary, ...]
 
 
-@dataclass(frozen=True, eq=False)
 class Lines(Table):
     """The programs' text."""
 
@@ -131,7 +116,6 @@ class Lines(Table):
     text: Texts = column("the line")
 
 
-@dataclass(frozen=True, eq=False)
 class Instructions(Table):
     """Motion instructions of the programs with their verdicts."""
 
@@ -146,7 +130,6 @@ class Instructions(Table):
     end_deg: Reals = per_joint("joint angle at its first end; NaN where unknown", name="q_deg")
 
 
-@dataclass(frozen=True, eq=False)
 class ProgramMotion(Table):
     """The arm along the way with the most motions through each program."""
 
@@ -158,7 +141,6 @@ class ProgramMotion(Table):
     xyz_mm: Reals = vector("{}_mm", "tool point in the base frame")
 
 
-@dataclass(frozen=True, eq=False)
 class ProgramsResults(Results[ProgramsSummary]):
     """Summary and tables of the stage."""
 

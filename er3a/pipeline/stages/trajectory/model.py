@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded, Finding
 from er3a.collision.pairs import Pair, PairOverlaps, PairTooNear, ShapesAssumed
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
@@ -34,8 +34,7 @@ SAME_SPEED = 1e-9
 CauseT = TypeVar("CauseT", bound=Finding)
 
 
-@dataclass(frozen=True)
-class PathCounts:
+class PathCounts(Coded):
     """How many paths there are, how many are safe, and the names of the others by their verdict.
 
     Paths as near to assumed shapes as these may be wrong count as none of these, and neither do ``demonstrations``,
@@ -57,25 +56,16 @@ class PathCounts:
     not_followed: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class AllSafe(PathCounts):
+class AllSafe(PathCounts, code="trajectory.safe"):
     """Every path is safe."""
 
-    code: Literal["trajectory.safe"] = "trajectory.safe"
 
-
-@dataclass(frozen=True)
-class SomeUnsafe(PathCounts):
+class SomeUnsafe(PathCounts, code="trajectory.some_unsafe"):
     """Some paths are safe."""
 
-    code: Literal["trajectory.some_unsafe"] = "trajectory.some_unsafe"
 
-
-@dataclass(frozen=True)
-class NoneSafe(PathCounts):
+class NoneSafe(PathCounts, code="trajectory.none_safe"):
     """No path counts as safe."""
-
-    code: Literal["trajectory.none_safe"] = "trajectory.none_safe"
 
 
 @dataclass(frozen=True)
@@ -143,23 +133,19 @@ class Jump:
     angle_deg: float
 
 
-@dataclass(frozen=True)
-class PairTouches:
+class PairTouches(Coded, code="pair_touches"):
     """Two bodies that overlap: from when on, and by how much at most, at what time."""
 
     pair: Pair
     t0_s: float
     depth_mm: float
     t_s: float
-    code: Literal["pair_touches"] = "pair_touches"
 
 
-@dataclass(frozen=True)
-class BodiesOverlap:
+class BodiesOverlap(Coded, code="bodies_overlap"):
     """What overlaps, the first to touch first."""
 
     touches: tuple[PairTouches, ...]
-    code: Literal["bodies_overlap"] = "bodies_overlap"
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -354,7 +340,6 @@ def is_safe(path: PathSummary, shapes: ShapesAssumed | None) -> bool:
     return path.verdict == "safe" and not (shapes and path.name in shapes.near)
 
 
-@dataclass(frozen=True)
 class TrajectorySummary(Summary):
     """Head, limits and paths.
 
@@ -375,7 +360,6 @@ class TrajectorySummary(Summary):
     not_followed: tuple[PathNotFollowed, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
 class MotionRows(Table):
     """Motions of the arm; joint columns are NaN where the path can't be reached."""
 
@@ -390,7 +374,6 @@ class MotionRows(Table):
     smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
 
 
-@dataclass(frozen=True, eq=False)
 class Samples(MotionRows):
     """The paths' own points."""
 
@@ -404,14 +387,12 @@ class Samples(MotionRows):
     near_singular: Flags = column("whether the pose is nearer to a singular set than its threshold")
 
 
-@dataclass(frozen=True, eq=False)
 class PathChecks(Samples):
     """The paths' own points, those checked between them, and the closest passes."""
 
     sample: Flags = column("whether the point is one of the path's own")
 
 
-@dataclass(frozen=True, eq=False)
 class Clearances(Table):
     """Times at which the clearance was measured in full; NaN where the path can't be reached."""
 
@@ -421,7 +402,6 @@ class Clearances(Table):
     between: Texts = column("the two bodies nearest to each other")
 
 
-@dataclass(frozen=True, eq=False)
 class AvoidanceRows(MotionRows):
     """Motions of the strategies, and of each path at its fastest (``fastest``)."""
 
@@ -430,7 +410,6 @@ class AvoidanceRows(MotionRows):
     deviation_deg: Reals = column("angle of the tool to the path's")
 
 
-@dataclass(frozen=True, eq=False)
 class ProgramFiles(Table):
     """Programs of the safe paths for controllers; of others only where the study asks for that, and the motion that
     repairs them as a table in csv."""
@@ -442,7 +421,6 @@ class ProgramFiles(Table):
     assumed_speed: Texts = column("greatest joint speeds that are assumed and that its speeds were written with")
 
 
-@dataclass(frozen=True, eq=False)
 class TrajectoryResults(Results[TrajectorySummary]):
     """Summary and tables of the stage."""
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar, Literal, Self, get_args
 
+from er3a.by_value import Coded
 from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import CalibrationConclusion, Held, LevelName, MorePositions, NotCalibrated
 from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, RankedHypothesis, TooSmallToTell
@@ -42,108 +43,80 @@ SelfChecked = Literal[
 ]
 
 
-@dataclass(frozen=True)
-class SelfCheck(Subject):
+class SelfCheck(Coded, Subject, code="self_check"):
     """A check of the model that needs no document."""
 
     quantity: SelfChecked
-    code: Literal["self_check"] = "self_check"
 
 
-@dataclass(frozen=True)
-class WholeGroup(Subject):
+class WholeGroup(Coded, Subject, code="whole_group"):
     """All that references of a group could say."""
 
     group: str
-    code: Literal["whole_group"] = "whole_group"
 
 
 CheckSubject = ReferenceSubject | SelfCheck | WholeGroup
 
 
-@dataclass(frozen=True)
-class NamedPose:
+class NamedPose(Coded, code="named_pose"):
     """A pose by the name that its source gives it."""
 
     name: str
-    code: Literal["named_pose"] = "named_pose"
 
 
 KeyPose = NamedPose | DrawingCorner | DrawingExtent | Reach
 
 
-@dataclass(frozen=True)
-class NotInRobotFile:
+class NotInRobotFile(Coded, code="not_in_robot_file"):
     """The robot's file gives no value."""
 
-    code: Literal["not_in_robot_file"] = "not_in_robot_file"
 
-
-@dataclass(frozen=True)
-class SourceGivesNone:
+class SourceGivesNone(Coded, code="source_gives_none"):
     """The source says that it gives no value."""
 
-    code: Literal["source_gives_none"] = "source_gives_none"
 
-
-@dataclass(frozen=True)
-class NotOfThisArm:
+class NotOfThisArm(Coded, code="not_of_this_arm"):
     """The arm does not have what the reference is about, which was set aside."""
 
     reason: NotOfArm
     joints: int
-    code: Literal["not_of_this_arm"] = "not_of_this_arm"
 
 
-@dataclass(frozen=True)
-class TooUncertain:
+class TooUncertain(Coded, code="too_uncertain"):
     """The model is within what the source leaves open, which is as much as ``undecided_from`` or more: a value taken at
     random would be so as often as not."""
 
     uncertainty: float
     undecided_from: float
-    code: Literal["too_uncertain"] = "too_uncertain"
 
 
-@dataclass(frozen=True)
-class SetHasNoData:
+class SetHasNoData(Coded, code="set_has_no_data"):
     """A reference set says nothing about it."""
 
     reference_set: str
-    code: Literal["set_has_no_data"] = "set_has_no_data"
 
 
-@dataclass(frozen=True)
-class InNoSet:
+class InNoSet(Coded, code="in_no_set"):
     """None of the robot's reference sets says anything about it."""
 
-    code: Literal["in_no_set"] = "in_no_set"
 
-
-@dataclass(frozen=True)
-class NumbersMissing:
+class NumbersMissing(Coded, code="numbers_missing"):
     """The table lacks numbers, so nothing can be computed from it."""
 
-    code: Literal["numbers_missing"] = "numbers_missing"
 
-
-@dataclass(frozen=True)
-class NoClosedForm:
+class NoClosedForm(Coded, code="no_closed_form"):
     """The arm has no closed-form inverse."""
 
     missing: ClosedFormMissing
-    code: Literal["no_closed_form"] = "no_closed_form"
 
 
-@dataclass(frozen=True)
-class NearSingularLeftOut:
+class NearSingularLeftOut(Coded, code="near_singular_left_out"):
     """Joint errors are judged of those random poses only that are not near a singularity."""
 
     judged: int
     poses: int
     wrist_deg: float
     shoulder_mm: float
-    code: Literal["near_singular_left_out"] = "near_singular_left_out"
 
 
 Note = (
@@ -163,29 +136,24 @@ Note = (
 LikelyFault = MostLikelyFault | MainFault | TooSmallToTell
 
 
-@dataclass(frozen=True)
-class Contradiction:
+class Contradiction(Coded, code="contradiction"):
     """References that no model can meet all: the first such number, and how many more there are."""
 
     subject: ReferenceSubject
     unit: str
     stated: tuple[float, ...]
     more: int
-    code: Literal["contradiction"] = "contradiction"
 
 
-@dataclass(frozen=True)
-class Claims:
+class Claims(Coded, code="claims"):
     """How many of a set's claims fail."""
 
     reference_set: str
     claims: int
     failed: int
-    code: Literal["claims"] = "claims"
 
 
-@dataclass(frozen=True)
-class JudgedTable:
+class JudgedTable(Coded):
     """What every verdict holds.
 
     Attributes
@@ -203,17 +171,14 @@ class JudgedTable:
     own_text: tuple[InconsistentWithOwnText, ...]
 
 
-@dataclass(frozen=True)
-class Confirmed(JudgedTable):
+class Confirmed(JudgedTable, code="validation.confirmed"):
     """The model meets all that it can, and independent documents settle all that moves the tool."""
 
     grades: tuple[Grade, ...]
     contradiction: Contradiction | None
-    code: Literal["validation.confirmed"] = "validation.confirmed"
 
 
-@dataclass(frozen=True)
-class PartFound:
+class PartFound(Coded, code="part_found"):
     """What is known of a part of the table.
 
     Attributes
@@ -233,11 +198,9 @@ class PartFound:
     contradicted: tuple[str, ...]
     open: tuple[str, ...]
     off: ToolOff
-    code: Literal["part_found"] = "part_found"
 
 
-@dataclass(frozen=True)
-class LeftOpen(JudgedTable):
+class LeftOpen(JudgedTable, code="validation.left_open"):
     """Nothing contradicts the table, but independent documents don't settle all that moves the tool.
 
     Attributes
@@ -257,27 +220,20 @@ class LeftOpen(JudgedTable):
     unbounded: tuple[str, ...]
     next_measurement: Proposal | None
     contradiction: Contradiction | None
-    code: Literal["validation.left_open"] = "validation.left_open"
 
 
-@dataclass(frozen=True)
-class NothingToCompare(JudgedTable):
+class NothingToCompare(JudgedTable, code="validation.no_reference"):
     """No authoritative document speaks about the model."""
 
-    code: Literal["validation.no_reference"] = "validation.no_reference"
 
-
-@dataclass(frozen=True)
-class ModelUnsound(JudgedTable):
+class ModelUnsound(JudgedTable, code="validation.model_unsound"):
     """The model fails a check that needs no document."""
 
     check: SelfCheck
     measured: float
     unit: str
-    code: Literal["validation.model_unsound"] = "validation.model_unsound"
 
 
-@dataclass(frozen=True)
 class _Missed(JudgedTable):
     """The model fails checks against documents; ``check`` is the one to quote.
 
@@ -298,26 +254,18 @@ class _Missed(JudgedTable):
     contradicted: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Contradicted(_Missed):
+class Contradicted(_Missed, code="validation.contradicted"):
     """The model contradicts documents about its arm."""
 
-    code: Literal["validation.contradicted"] = "validation.contradicted"
 
-
-@dataclass(frozen=True)
-class AnotherArm(_Missed):
+class AnotherArm(_Missed, code="validation.another_arm"):
     """The documents describe another arm; ``described``: what no one or two corrections remove."""
 
     described: NotTheRobotDescribed | None
-    code: Literal["validation.another_arm"] = "validation.another_arm"
 
 
-@dataclass(frozen=True)
-class DefinedOtherwise(_Missed):
+class DefinedOtherwise(_Missed, code="validation.defined_otherwise"):
     """The documents describe this arm, with zeros, directions, base or flange that ``diagnosis`` names."""
-
-    code: Literal["validation.defined_otherwise"] = "validation.defined_otherwise"
 
 
 Validated = Confirmed | LeftOpen | NothingToCompare | ModelUnsound | Contradicted | AnotherArm | DefinedOtherwise
@@ -475,7 +423,6 @@ class SetDiagnosis:
     corrected: CorrectedTable | None
 
 
-@dataclass(frozen=True, eq=False)
 class Residuals(Table):
     """Residuals before and after the best hypothesis, worst first, for sets with something to explain."""
 
@@ -515,7 +462,6 @@ class SetCalibration:
     result: Calibrated | NotCalibrated
 
 
-@dataclass(frozen=True, eq=False)
 class Corrections(Table):
     """Estimated corrections to the table's entries, of the sets whose positions they meet."""
 
@@ -623,7 +569,6 @@ class TableEvidence:
     other: OtherTableFound | None
 
 
-@dataclass(frozen=True)
 class ValidationSummary(Summary):
     """The stage's summary.
 
@@ -654,7 +599,6 @@ class ValidationSummary(Summary):
         return not same and any(found.another_arm for found in self.sets)
 
 
-@dataclass(frozen=True, eq=False)
 class Checks(Table):
     """The summary's checks as a table."""
 
@@ -678,7 +622,6 @@ class Checks(Table):
         return cls.of_rows(tuple(getattr(check, name) for name in cls.columns()) for check in checks)
 
 
-@dataclass(frozen=True, eq=False)
 class Axes(Table):
     """Each stated axis line in the zero pose beside the model's, in the base frame."""
 
@@ -701,7 +644,6 @@ class Axes(Table):
         return (self.distance_mm > self.uncertainty_mm) | (self.angle_deg > self.uncertainty_deg)
 
 
-@dataclass(frozen=True, eq=False)
 class KeyPoses(Table):
     """Poses at which references look at the arm, the zero pose first, with the stated point and the model's (base
     frame)."""
@@ -718,7 +660,6 @@ class KeyPoses(Table):
     deviation_mm: Reals = column("distance of the two points")
 
 
-@dataclass(frozen=True, eq=False)
 class Section(Table):
     """The wrist centre in the side view (joint 1 at 0) over a grid of joints 2 and 3 within their limits."""
 
@@ -730,7 +671,6 @@ class Section(Table):
     on_q3_line: Flags = column("on a line of constant q3 where the region can end")
 
 
-@dataclass(frozen=True, eq=False)
 class ValidationResults(Results[ValidationSummary]):
     """The stage's results."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from er3a.by_value import Coded
 from er3a.calibration.calibrate import Close
 from er3a.calibration.outcomes import Held, LevelName
 from er3a.collision.pairs import Pair
@@ -27,54 +28,43 @@ from er3a.vision.vision_findings import (
 )
 
 
-@dataclass(frozen=True)
-class CalibrationImpossible:
+class CalibrationImpossible(Coded, code="calibration_impossible"):
     """The samples don't determine where the camera is."""
 
     why: NotCalibratable
-    code: Literal["calibration_impossible"] = "calibration_impossible"
 
 
-@dataclass(frozen=True)
-class CalibrationDoubtful:
+class CalibrationDoubtful(Coded, code="calibration_doubtful"):
     """The samples contradict each other, or this robot's table."""
 
     warnings: tuple[CalibrationWarning, ...]
-    code: Literal["calibration_doubtful"] = "calibration_doubtful"
 
 
-@dataclass(frozen=True)
-class DirectionContradicted:
+class DirectionContradicted(Coded, code="direction_contradicted"):
     """The samples fit far better with one of the streams inverted."""
 
     flange_inverted: bool
     target_inverted: bool
     rms_mm: float
     rms_given_mm: float
-    code: Literal["direction_contradicted"] = "direction_contradicted"
 
 
-@dataclass(frozen=True)
-class TouchContradicts:
+class TouchContradicts(Coded, code="touch_contradicts"):
     """Touched points, held out of the calibration, are not where it puts them."""
 
     points: int
     largest_mm: float
     probability: float
-    code: Literal["touch_contradicts"] = "touch_contradicts"
 
 
-@dataclass(frozen=True)
-class NotGraspedObject:
+class NotGraspedObject(Coded, code="not_grasped_object"):
     """An object that the arm can't grasp."""
 
     name: str
     why: GraspRefusal
-    code: Literal["not_grasped_object"] = "not_grasped_object"
 
 
-@dataclass(frozen=True)
-class GraspCounts:
+class GraspCounts(Coded, code="grasp_counts"):
     """What came of the objects that are to be grasped.
 
     Attributes
@@ -94,7 +84,6 @@ class GraspCounts:
     demonstrations: tuple[Demonstration, ...]
     simulated: bool
     assumed: tuple[str, ...] = ()
-    code: Literal["grasp_counts"] = "grasp_counts"
 
 
 Three = tuple[float, float, float]
@@ -324,7 +313,6 @@ class ObjectResult:
     followed: int
 
 
-@dataclass(frozen=True)
 class VisionSummary(Summary):
     """What the stage found; ``calibration`` is None where the samples determine none.
 
@@ -346,7 +334,6 @@ class VisionSummary(Summary):
     objects: tuple[ObjectResult, ...]
 
 
-@dataclass(frozen=True, eq=False)
 class SampleRows(Table):
     """One row for each sample of the calibration."""
 
@@ -363,7 +350,6 @@ class SampleRows(Table):
     q_deg: Reals = per_joint("joint angle; NaN where poses were recorded")
 
 
-@dataclass(frozen=True, eq=False)
 class CornerRows(Table):
     """Corners of the board in the images; none where poses were recorded."""
 
@@ -375,7 +361,6 @@ class CornerRows(Table):
     by_arm_px: Reals = vector("by_arm_{}_px", "where the arm and the calibration put it", parts="xy")
 
 
-@dataclass(frozen=True, eq=False)
 class ErrorMapRows(Table):
     """Errors of the first object's grasp, held at each cell of a square at the objects' mean height.
 
@@ -392,7 +377,6 @@ class ErrorMapRows(Table):
     together_deg: Reals = column("turn, from all of them")
 
 
-@dataclass(frozen=True, eq=False)
 class PathRows(Table):
     """Joint angles along the way to each object grasped, and away from it."""
 
@@ -403,7 +387,6 @@ class PathRows(Table):
     q_deg: Reals = per_joint("joint angle")
 
 
-@dataclass(frozen=True, eq=False)
 class GraspPrograms(Table):
     """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
 
@@ -413,7 +396,6 @@ class GraspPrograms(Table):
     text: Texts = column("what the file holds")
 
 
-@dataclass(frozen=True, eq=False)
 class VisionResults(Results[VisionSummary]):
     """The stage's results; without a calibration the tables are empty."""
 

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
@@ -33,31 +34,23 @@ from er3a.workspace.tool_inverse import MapsMissing
 from er3a.workspace.voids import Hull, Void, VoidKind
 
 
-@dataclass(frozen=True)
-class Flat:
+class Flat(Coded, code="workspace.flat"):
     """The tool point moves on a line or not at all."""
 
-    code: Literal["workspace.flat"] = "workspace.flat"
 
-
-@dataclass(frozen=True)
-class OnSurface:
+class OnSurface(Coded, code="workspace.on_surface"):
     """The tool point moves on a surface; its area as :class:`er3a.workspace.general_proof.Surface` has it."""
 
     surface: Surface
-    code: Literal["workspace.on_surface"] = "workspace.on_surface"
 
 
-@dataclass(frozen=True)
-class Undersampled:
+class Undersampled(Coded, code="workspace.undersampled"):
     """Too few samples for the cells, without a proof."""
 
     unseen_percent: float
-    code: Literal["workspace.undersampled"] = "workspace.undersampled"
 
 
-@dataclass(frozen=True)
-class VoidFound:
+class VoidFound(Coded):
     """How large an enclosed void is, and where its middle lies."""
 
     litres: float
@@ -66,37 +59,27 @@ class VoidFound:
     z_mm: float
 
 
-@dataclass(frozen=True)
-class VoidUnexpected(VoidFound):
+class VoidUnexpected(VoidFound, code="workspace.void_unexpected"):
     """An enclosed void away from the shoulder, proven empty."""
 
     cause: VoidCause
     single_changes: tuple[SingleChange, ...] = ()
-    code: Literal["workspace.void_unexpected"] = "workspace.void_unexpected"
 
 
-@dataclass(frozen=True)
-class VoidUncertain(VoidFound):
+class VoidUncertain(VoidFound, code="workspace.void_uncertain"):
     """An enclosed void away from the shoulder that only samples suggest."""
 
-    code: Literal["workspace.void_uncertain"] = "workspace.void_uncertain"
 
-
-@dataclass(frozen=True)
-class VoidAtShoulder(VoidFound):
+class VoidAtShoulder(VoidFound, code="workspace.void_at_shoulder"):
     """An enclosed void about the shoulder, as every arm leaves that can't fold onto itself."""
 
-    code: Literal["workspace.void_at_shoulder"] = "workspace.void_at_shoulder"
 
-
-@dataclass(frozen=True)
-class NoVoid:
+class NoVoid(Coded, code="workspace.no_void"):
     """No enclosed void, by the proof or by samples alone; ``undecided_percent`` is what the general proof leaves
     undecided of the volume."""
 
     proven: bool
     undecided_percent: float | None = None
-    code: Literal["workspace.no_void"] = "workspace.no_void"
 
 
 WorkspaceFinding = Flat | OnSurface | Undersampled | VoidUnexpected | VoidUncertain | VoidAtShoulder | NoVoid
@@ -105,7 +88,6 @@ WorkspaceFinding = Flat | OnSurface | Undersampled | VoidUnexpected | VoidUncert
 Singles = NDArray[np.float32]
 
 
-@dataclass(frozen=True, eq=False)
 class Cells(Table):
     """Touched cells of the grid, and untouched ones inside the hull."""
 
@@ -115,7 +97,6 @@ class Cells(Table):
     void: NDArray[np.int32] = column("number of the sampled void from 1, -1 in the hull but in no void, 0 touched")
 
 
-@dataclass(frozen=True, eq=False)
 class SectionCells(Table):
     """Cells of the side section about axis 1 that were touched or are cut off by touched ones."""
 
@@ -125,7 +106,6 @@ class SectionCells(Table):
     void: Flags = column("whether touched cells cut it off")
 
 
-@dataclass(frozen=True, eq=False)
 class SideViewCells(Table):
     """Touched cells of the side views in the arm's plane."""
 
@@ -136,7 +116,6 @@ class SideViewCells(Table):
     point: Texts = column("tool_point or wrist_centre")
 
 
-@dataclass(frozen=True, eq=False)
 class GrowthCurve(Table):
     """Touched volume after each block of samples, at several cell sizes."""
 
@@ -145,7 +124,6 @@ class GrowthCurve(Table):
     touched_m3: Reals = column("volume of the touched cells", heading=N_("volume"))
 
 
-@dataclass(frozen=True, eq=False)
 class Cloud(Table):
     """The first samples of each block."""
 
@@ -153,7 +131,6 @@ class Cloud(Table):
     manipulability_m3: Reals = column("|det J|")
 
 
-@dataclass(frozen=True, eq=False)
 class HullVertices(Table):
     """Corners of the convex hull."""
 
@@ -161,14 +138,12 @@ class HullVertices(Table):
     q_deg: Reals = per_joint("joint angle that reaches the corner")
 
 
-@dataclass(frozen=True, eq=False)
 class HullTriangles(Table):
     """Faces of the convex hull, counter-clockwise from outside."""
 
     corners: Integers = vector("{}", "row of the corner among the hull's vertices", parts="abc")
 
 
-@dataclass(frozen=True, eq=False)
 class ProofCells(Table):
     """Cells of the proof: rings about axis 1, or bars along a first prismatic joint (``proof.bars`` of the summary,
     with the frame); of these rho is x, and 360 deg are their length."""
@@ -185,7 +160,6 @@ class ProofCells(Table):
     q_deg: Reals = per_joint("joint angle that reaches into the cell, NaN if none is known")
 
 
-@dataclass(frozen=True, eq=False)
 class Border(Table):
     """Exact borders as arcs, with the joint values that make them."""
 
@@ -200,7 +174,6 @@ class Border(Table):
     view: Texts = column("section (folded about axis 1) or side")
 
 
-@dataclass(frozen=True, eq=False)
 class Drawing(Table):
     """Labels of the manufacturer's drawing of the wrist centre's envelope: extents (one coordinate) and corners."""
 
@@ -211,7 +184,6 @@ class Drawing(Table):
     q3_deg: Reals = column("joint 3 at a corner, else NaN")
 
 
-@dataclass(frozen=True, eq=False)
 class VoidVertices(Table):
     """Corners of the voids' surfaces."""
 
@@ -219,7 +191,6 @@ class VoidVertices(Table):
     void: NDArray[np.int32] = column("number of the void from 1, as in the summary")
 
 
-@dataclass(frozen=True, eq=False)
 class VoidTriangles(Table):
     """Faces of the voids' surfaces."""
 
@@ -227,7 +198,6 @@ class VoidTriangles(Table):
     void: NDArray[np.int32] = column("number of the void from 1, as in the summary")
 
 
-@dataclass(frozen=True, eq=False)
 class CapabilityCells(Table):
     """Reached cells of the section, by sector of azimuth; or bars along a first prismatic joint (``bar_m`` of the
     summary), of which rho is x, and 360 deg are their length."""
@@ -249,7 +219,6 @@ class CapabilityCells(Table):
     )
 
 
-@dataclass(frozen=True, eq=False)
 class BoxPlaces(Table):
     """Positions of the box on the lattice that pass, the better of both turns at each."""
 
@@ -440,12 +409,10 @@ class CapabilitySummary:
     clear: ClearSummary
 
 
-@dataclass(frozen=True)
-class CapabilityMissing:
+class CapabilityMissing(Coded, code="workspace.capability_missing"):
     """Capability and placement were not computed, and why."""
 
     lacks: MapsMissing
-    code: Literal["workspace.capability_missing"] = "workspace.capability_missing"
 
 
 @dataclass(frozen=True)
@@ -460,21 +427,17 @@ class TaskSummary:
     clear_of_axis_mm: float
 
 
-@dataclass(frozen=True)
-class ToolPointsElsewhere:
+class ToolPointsElsewhere(Coded, code="workspace.tool_points_elsewhere"):
     """The box is nowhere served: the tool points along ``direction`` and can't tilt, which is not what is asked."""
 
     task: TaskSummary
     direction: Triple
-    code: Literal["workspace.tool_points_elsewhere"] = "workspace.tool_points_elsewhere"
 
 
-@dataclass(frozen=True)
-class PlacementTooLong:
+class PlacementTooLong(Coded, code="workspace.placement_too_long"):
     """Places were not looked for: with what a pose takes this arm, the lattice would have to be wider than the box."""
 
     task: TaskSummary
-    code: Literal["workspace.placement_too_long"] = "workspace.placement_too_long"
 
 
 @dataclass(frozen=True)
@@ -597,7 +560,6 @@ class PlacementSummary:
 Placement = PlacementSummary | ToolPointsElsewhere | PlacementTooLong
 
 
-@dataclass(frozen=True)
 class WorkspaceSummary(Summary):
     """The stage's summary; ``pocket_block_m`` is the edge of the blocks that open pockets were looked for on.
 
@@ -632,7 +594,6 @@ class WorkspaceSummary(Summary):
         return [void for void in self.voids if void.kind == "enclosed"]
 
 
-@dataclass(frozen=True, eq=False)
 class WorkspaceResults(Results[WorkspaceSummary]):
     """The stage's results; each table is written under its attribute's name."""
 
