@@ -668,17 +668,12 @@ def section(found: tally.TouchedSection) -> SectionCells:
 
 def side_view(views: Sequence[SideView]) -> SideViewCells:
     """The side views, one after another."""
-    return SideViewCells.stacked(
-        SideViewCells(view.x, view.z, np.full(len(view.x), view.cell), view.samples, _repeated(view.point, len(view.x)))
-        for view in views
-    )
+    return SideViewCells.stacked(SideViewCells.of(view) for view in views)
 
 
 def curve(growth: Sequence[tally.Growth]) -> GrowthCurve:
     """Growth of the touched volume, one cell size after another."""
-    return GrowthCurve.stacked(
-        GrowthCurve(np.full(len(part.samples), part.cell * 1000), part.samples, part.volume) for part in growth
-    )
+    return GrowthCurve.stacked(GrowthCurve.of(part, touched_m3=part.volume) for part in growth)
 
 
 def cloud(robot: Robot, q: Reals) -> Cloud:
@@ -698,12 +693,12 @@ def hull_vertices(robot: Robot, hull: Hull, q_extreme: Reals) -> HullVertices:
 def proof(proven: Proven) -> ProofCells:
     """All cells of a proof."""
     found = proven.proof
-    return ProofCells(
+    return ProofCells.of(
         rho_m=found.cells[:, :2],
         z_m=found.cells[:, 2:],
         volume_m3=found.volumes,
         level=found.level.astype(np.int16),
-        status=_texts(proven.cell_states()),
+        status=proven.cell_states(),
         filled_ratio=1 - found.unfilled_ratio,
         empty_ratio=found.empty_ratio,
         empty_arcs_deg=_arcs(found.empty),
@@ -715,16 +710,8 @@ def proof(proven: Proven) -> ProofCells:
 def border(lines: Sequence[BorderLine]) -> Border:
     """The points of border lines, one line after another."""
     return Border.stacked(
-        Border(
-            rho_m=line.points[:, 0],
-            z_m=line.points[:, 1],
-            q2_deg=np.degrees(line.q[:, 0]),
-            q3_deg=np.degrees(line.q[:, 1]),
-            tilt_deg=np.degrees(line.tilt),
-            arc=np.full(len(line.tilt), line.number),
-            point=_repeated(line.point, len(line.tilt)),
-            sweeps=_repeated(line.sweeps, len(line.tilt)),
-            view=_repeated(line.view, len(line.tilt)),
+        Border.of(
+            line, rho_m=line.points[:, 0], z_m=line.points[:, 1], q2=line.q[:, 0], q3=line.q[:, 1], arc=line.number
         )
         for line in lines
     )
@@ -734,8 +721,8 @@ def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:
     """The surfaces of voids, numbered from 1."""
     numbered = list(enumerate(voids, start=1))
     return (
-        VoidVertices.stacked(VoidVertices(void.vertices, np.full(len(void.vertices), n)) for n, void in numbered),
-        VoidTriangles.stacked(VoidTriangles(void.triangles, np.full(len(void.triangles), n)) for n, void in numbered),
+        VoidVertices.stacked(VoidVertices.of(point_m=void.vertices, void=n) for n, void in numbered),
+        VoidTriangles.stacked(VoidTriangles.of(corners=void.triangles, void=n) for n, void in numbered),
     )
 
 
@@ -762,18 +749,6 @@ def places(found: Places) -> BoxPlaces:
     return BoxPlaces.of(found, manipulability_m3=found.least, limit_margin=margin)
 
 
-def _repeated(text: str, count: int) -> Texts:
-    return np.full(count, text, dtype=object)
-
-
-def _texts(values: Sequence[str]) -> Texts:
-    array = np.empty(len(values), dtype=object)
-    array[:] = values
-    return array
-
-
-def _arcs(rows: Reals) -> Texts:
+def _arcs(rows: Reals) -> list[list[float]]:
     """Arcs (n, arcs, 2), rad, unused ones NaN, as lists of their ends in deg."""
-    array = np.empty(len(rows), dtype=object)
-    array[:] = [np.degrees(row[np.isfinite(row[:, 0])]).ravel().tolist() for row in rows]
-    return array
+    return [np.degrees(row[np.isfinite(row[:, 0])]).ravel().tolist() for row in rows]
