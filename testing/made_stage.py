@@ -36,7 +36,6 @@ class Solid(Finding, code="made.solid"):
 TEXTS = texts({"made.hollow": "A hollow (空洞) of {volume_m3:.2f} m³.", "made.solid": "All is solid."})
 
 
-@dataclass(frozen=True)
 class MadeSummary(Summary):
     """With a key of its own."""
 
@@ -44,7 +43,6 @@ class MadeSummary(Summary):
     reach_m: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
 class Rows(Table):
     """One column of each kind."""
 
@@ -55,7 +53,6 @@ class Rows(Table):
     point_mm: Reals = vector("{}_mm", "where")
 
 
-@dataclass(frozen=True, eq=False)
 class MadeResults(Results[MadeSummary]):
     """A summary and a table."""
 

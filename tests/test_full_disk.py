@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,6 @@ from er3a.pipeline.tables import Table, vector
 from er3a.pipeline.viewing.recording import recording
 
 
-@dataclass(frozen=True, eq=False)
 class Points(Table):
     """Many points."""
 

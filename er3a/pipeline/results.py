@@ -23,7 +23,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Literal, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_args, get_origin
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -220,9 +220,10 @@ class NoPass(Finding):
     missed: tuple[LeftOut, ...]
 
 
+@dataclass_transform(frozen_default=True)
 @dataclass(frozen=True)
 class Summary:
-    """What all summaries begin with; a stage's own says what its verdict can be.
+    """What all summaries begin with; a stage's own, a frozen dataclass like this one, says what its verdict can be.
 
     ``not_examined``: what settings, inputs and limits leave out of the verdict. ``decisive``: subjects of these without
     which the stage's verdict is no pass.
@@ -234,6 +235,9 @@ class Summary:
     figures: tuple[Figure, ...]
     not_examined: tuple[LeftOut, ...] = field(default=(), kw_only=True)
 
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
+
     def __post_init__(self) -> None:
         missed = tuple(each for each in self.not_examined if each.subject in self.decisive)
         object.__setattr__(self, "verdict", self.verdict.short_of(missed))
@@ -243,11 +247,15 @@ SummaryT = TypeVar("SummaryT", bound=Summary)
 ResultsT = TypeVar("ResultsT", bound="Results[Any]")
 
 
+@dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
 class Results(ByValue, Generic[SummaryT]):
-    """A stage's results: its summary, and the tables that a subclass adds."""
+    """A stage's results: its summary, and the tables that a subclass, a frozen dataclass like this one, adds."""
 
     summary: SummaryT
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, eq=False)(cls)
 
 
 @dataclass(frozen=True)
@@ -298,7 +306,6 @@ class NotComputed(Finding, code="stage.not_computed"):
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
 class AbsentResults(Results[Summary]):
     """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 

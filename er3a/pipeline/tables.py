@@ -1,8 +1,8 @@
 """Tables of results: typed columns with unit and meaning, kept as Parquet.
 
-A table is a frozen dataclass of equally long arrays::
+A table is a frozen dataclass of equally long arrays, made from arrays, sequences, and texts or numbers that stand in
+every row::
 
-    @dataclass(frozen=True, eq=False)
     class Samples(Table):
         path: Texts = column("name of the path")
         t_s: Reals = column("time since the path's start")
@@ -23,7 +23,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform, get_args, get_type_hints
 
 import numpy as np
 import pyarrow as pa
@@ -152,25 +152,29 @@ def _numbered(name: str) -> str:
     return f"{stem}{{}}_{unit}" if unit else f"{stem}{{}}"
 
 
+@dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
 class Table(ByValue):
-    """Base of all tables; see the module."""
+    """Base of all tables, which makes frozen dataclasses of its subclasses; see the module."""
 
     joints: ClassVar[int] = 6
     """Columns of a group that counts joints, in a table without rows."""
     slides: ClassVar[tuple[bool, ...]] = ()
     """Which joints are distances, whose columns are in mm; of a table of its own by :meth:`of_joints`."""
 
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, eq=False)(cls)
+
     def __post_init__(self) -> None:
-        lengths = {}
+        arrays = {name: _array(getattr(self, name), spec) for name, spec in self.columns().items()}
+        lengths = {name: len(array) for name, array in arrays.items() if array.ndim}
+        if len(set(lengths.values())) != 1:
+            raise ValueError(f"{type(self).__name__}: columns of different lengths: {lengths}")
         for name, spec in self.columns().items():
-            array = np.asarray(getattr(self, name), dtype=spec.dtype)
+            array = arrays[name] if arrays[name].ndim else np.full(lengths[min(lengths)], arrays[name][()], spec.dtype)
             if array.ndim != (2 if spec.is_group else 1):
                 raise ValueError(f"{type(self).__name__}.{name} has shape {array.shape}")
             object.__setattr__(self, name, array)
-            lengths[name] = len(array)
-        if len(set(lengths.values())) > 1:
-            raise ValueError(f"{type(self).__name__}: columns of different lengths: {lengths}")
 
     def of_joints(self, slides: Iterable[bool]) -> Self:
         """The same table, of an arm whose joints are prismatic where ``slides`` (n,); one without rows gets n
@@ -216,21 +220,14 @@ class Table(ByValue):
 
     @classmethod
     def of(cls, found: object = None, /, **given: Any) -> Self:
-        """A table filled with what the library found, as :func:`er3a.numerics.si_units.stated` fills a dataclass.
-
-        A single text or number that is given stands in every row.
-        """
-        values = filled(cls, found, given)
-        rows = max(len(value) for value in values.values() if np.ndim(value))
-        return cls(**{name: value if np.ndim(value) else _repeated(value, rows) for name, value in values.items()})
+        """A table filled with what the library found, as :func:`er3a.numerics.si_units.stated` fills a dataclass."""
+        return cls(**filled(cls, found, given))
 
     @classmethod
     def of_rows(cls, rows: Iterable[tuple[Any, ...]]) -> Self:
         """A table from rows in the order of the attributes."""
         listed = list(rows)
-        if not listed:
-            return cls.empty()
-        return cls(**{name: _array(values, spec) for (name, spec), values in zip(cls.columns().items(), zip(*listed))})
+        return cls(**dict(zip(cls.columns(), zip(*listed)))) if listed else cls.empty()
 
     def __len__(self) -> int:
         return len(getattr(self, fields(self)[0].name))
@@ -289,20 +286,17 @@ class Table(ByValue):
             parts = [_values(stored[part], spec) for part in names]
             arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
             if spec.kind:
-                arrays[name] = _array(tuple(_decoded(spec.kind, text) for text in parts[0]), spec)
+                arrays[name] = [_decoded(spec.kind, text) for text in parts[0]]
         found = cls(**arrays)
         if slides:
             object.__setattr__(found, "slides", slides)
         return found
 
 
-def _repeated(value: Any, rows: int) -> NDArray[Any]:
-    return np.full(rows, value, object if isinstance(value, str) else None)
-
-
-def _array(values: tuple[Any, ...], spec: Column) -> NDArray[Any]:
-    if spec.dtype != object or spec.is_group:
-        return np.array(values, spec.dtype)
+def _array(values: Any, spec: Column) -> NDArray[Any]:
+    """A column from an array, a sequence, or what stands in every row."""
+    if spec.dtype != object or spec.is_group or not isinstance(values, list | tuple):
+        return np.asarray(values, spec.dtype)
     array = np.empty(len(values), object)
     array[:] = values
     return array

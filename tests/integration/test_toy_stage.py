@@ -34,7 +34,6 @@ STAGE = Stage(name="toy", title="toy", question="How long?", settings={"toy": To
               applies=applies, absences=(TooLong,))
 ''',
     "pipeline/stages/toy/model.py": '''"""What the stage finds."""
-from dataclasses import dataclass
 from er3a.by_value import Finding
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.numerics.arrays import Reals
@@ -44,17 +43,14 @@ class Long(Finding, code="toy.long"):
     """A length."""
     length_m: float
 
-@dataclass(frozen=True)
 class ToySummary(Summary):
     """Nothing more."""
     verdict: Verdict[Long]
 
-@dataclass(frozen=True, eq=False)
 class Lengths(Table):
     """Each length."""
     a_m: Reals = column("length of a link")
 
-@dataclass(frozen=True, eq=False)
 class ToyResults(Results[ToySummary]):
     """With a table."""
     lengths: Lengths

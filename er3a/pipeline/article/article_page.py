@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -250,22 +250,6 @@ ROLES = {
 }
 
 
-@dataclass(frozen=True)
-class ArticleRow:
-    """An item as the page shows it; ``status``: code of the agreement, ``badge``: class of its mark."""
-
-    number: int
-    code: str
-    title: str
-    says: str
-    finds: Markup
-    how: str
-    why: str
-    status: str
-    badge: str
-    page: str
-
-
 def write_article(study: Study, results: Path, folder: Path) -> None:
     """Compute the numbers, keep them as ``article.json`` below ``results``, and write the page in each language."""
     numbers = article_numbers(study, results)
@@ -309,7 +293,7 @@ def _write(
             seed=study.seed,
         ),
         others=[(code, Locale(code).display_name, name) for code, name in others.items()],
-        counts=[(status, BADGES[status], sum(row.status == status for row in rows)) for status in AGREEMENT],
+        counts=[(status, BADGES[status], sum(row["status"] == status for row in rows)) for status in AGREEMENT],
         agreement_words=AGREEMENT,
         sections=[(code, title, [rows[k] for k in _of_section(code)]) for code, title in SECTIONS.items()],
         compared=_compared(numbers),
@@ -329,21 +313,22 @@ def _of_section(section: str) -> list[int]:
     return [k for k, item in enumerate(ITEMS) if item.section == section]
 
 
-def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str, int]) -> Iterator[ArticleRow]:
+def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str, int]) -> Iterator[dict[str, Any]]:
     found, parts = agreements(numbers), _parts(study, results, numbers, places)
     for place, item in enumerate(ITEMS, start=1):
         status = found.get(item.code) or _status_of_stage(study, results, item)
-        yield ArticleRow(
-            place,
-            item.code,
-            tr(item.title),
-            tr(item.says),
-            _with_code(parts.get(f"instead_{item.code}") or tr(item.finds, **parts)),
-            item.how,
-            tr(item.why, **parts) if item.why and status != "agrees" and f"instead_{item.code}" not in parts else "",
-            status,
-            BADGES[status],
-            _page_on(study.article, item.code) if study.article else "",
+        instead = parts.get(f"instead_{item.code}")
+        yield dict(
+            number=place,
+            code=item.code,
+            title=tr(item.title),
+            says=tr(item.says),
+            finds=_with_code(instead or tr(item.finds, **parts)),
+            how=item.how,
+            why=tr(item.why, **parts) if item.why and status != "agrees" and instead is None else "",
+            status=status,
+            badge=BADGES[status],
+            page=_page_on(study.article, item.code) if study.article else "",
         )
 
 

@@ -215,10 +215,17 @@ def escaped(text: str) -> str:
     return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
 
 
-def under_verdict(note: str, stored: Stored[Any]) -> str:
-    """A note with what the stage found, and on what that rests, below its heading."""
-    heading, rest = note.split("\n", 1)
-    return f"{heading}\n{escaped(say_all(stored.results.summary.verdict.findings))}\n{rest}"
+def record_stage(study: Study, stored: Stored[Any], output: Path, note: str, **shown: Any) -> None:
+    """Write the recording of a stage.
+
+    Parameters
+    ----------
+    note : with places for the robot's ``title`` and the verdict's ``findings``
+    shown : what else :class:`Recorded` holds
+    """
+    robot, findings = study.robot(stored.robot), say_all(stored.results.summary.verdict.findings)
+    text = note.format(title=escaped(robot.title), findings=escaped(findings))
+    write_recording(Recorded(robot, stored.robot, stored.stage, text, **shown), output)
 
 
 def _end(run: Run) -> float:

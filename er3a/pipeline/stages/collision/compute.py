@@ -42,15 +42,14 @@ def target_clearances(robot: Robot, bodies: Bodies, file: str) -> tuple[model.Ta
         if not rows.size:
             continue
         distance, pair = bodies.min_distance_of_turns(solutions.q[rows])
-        between = [bodies.pairs[k].label if k >= 0 else "" for k in pair]
         tables.append(
-            model.TargetClearances(
-                target=np.full(len(rows), target.name, object),
+            model.TargetClearances.of(
+                target=target.name,
                 branch=solutions.branch[rows],
                 label=solutions.label[rows],
                 q_deg=shown(robot, solutions.q[rows]),
                 clearance_mm=distance * 1000,
-                between=np.array(between, object),
+                between=[bodies.pairs[k].label if k >= 0 else "" for k in pair],
             )
         )
         chosen = nearest(robot, solutions, target.q_ref, refusals_of(bodies, solutions)).chosen
@@ -81,12 +80,12 @@ def path_clearances(
         for row in np.flatnonzero(pair >= 0):
             near[row] = bodies.surface_points(q[row], pair[row])
         tables.append(
-            model.PathClearances(
-                path=np.full(len(q), entry.name, object),
+            model.PathClearances.of(
+                path=entry.name,
                 t_s=along.t,
                 q_deg=shown(bodies.robot, q),
                 clearance_mm=along.distance * 1000,
-                between=np.array([bodies.pairs[k].label if k >= 0 else "" for k in pair], object),
+                between=[bodies.pairs[k].label if k >= 0 else "" for k in pair],
                 from_mm=near[:, 0] * 1000,
                 to_mm=near[:, 1] * 1000,
             )

@@ -108,7 +108,6 @@ class Closest:
     to_mm: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
 class CollisionSummary(Summary):
     """What the stage found.
 
@@ -134,7 +133,6 @@ class CollisionSummary(Summary):
     closest: tuple[Closest, ...]
 
 
-@dataclass(frozen=True, eq=False)
 class MatrixRows(Table):
     """The allowed collision matrix: one row for each pair of links, and of a link with what is carried."""
 
@@ -149,7 +147,6 @@ class MatrixRows(Table):
     reason: Texts = column("what the person who decided on the pair wrote")
 
 
-@dataclass(frozen=True, eq=False)
 class PairShares(Table):
     """How often each pair overlaps among random joint vectors."""
 
@@ -161,7 +158,6 @@ class PairShares(Table):
     always: Flags = column("whether they overlap in every joint vector, proven")
 
 
-@dataclass(frozen=True, eq=False)
 class PlaceRows(Table):
     """Cells that the tool point was brought to."""
 
@@ -172,7 +168,6 @@ class PlaceRows(Table):
     witness_deg: Reals = per_joint("the first such arm; NaN where none was found")
 
 
-@dataclass(frozen=True, eq=False)
 class TargetClearances(Table):
     """Clearance of each target's solutions within the limits."""
 
@@ -184,7 +179,6 @@ class TargetClearances(Table):
     between: Texts = column("what is nearest to what")
 
 
-@dataclass(frozen=True, eq=False)
 class PathClearances(Table):
     """Clearance over time of each path, with the points of both bodies that are nearest."""
 
@@ -197,7 +191,6 @@ class PathClearances(Table):
     to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body")
 
 
-@dataclass(frozen=True, eq=False)
 class CollisionResults(Results[CollisionSummary]):
     """The stage's results."""
 

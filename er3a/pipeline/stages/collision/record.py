@@ -15,12 +15,13 @@ from er3a.pipeline.stages.collision.played import events, nearest
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import body_shape
 from er3a.pipeline.viewing.palette import JOINTS, MODEL, MUTED, VERDICTS, rgb
-from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, under_verdict, write_recording
+from er3a.pipeline.viewing.recording import Curves, Logged, Run, escaped, record_stage
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 BODY_ALPHA = 70
 NOTE = """# Where it is free of collisions
+{findings}
 
 **Look first** at the points: places that the tool can be brought to.
 
@@ -39,11 +40,11 @@ def record(study: Study, stored: Stored[CollisionResults], output: Path) -> None
     """Write the recording from the stage's results."""
     name, results = stored.robot, stored.results
     robot = study.robot(name)
-    shown = Recorded(
-        robot=robot,
-        name=name,
-        stage=stored.stage,
-        note=under_verdict(NOTE, stored),
+    record_stage(
+        study,
+        stored,
+        output,
+        NOTE,
         runs=[_run(robot, results, path) for path in dict.fromkeys(results.paths.path.tolist())],
         curves=[Curves("clearance", "Clearance (mm)", ["clearance"], [MODEL], whole=True)],
         scene=study.scene(name, stored.stage),
@@ -52,7 +53,6 @@ def record(study: Study, stored: Stored[CollisionResults], output: Path) -> None
         shapes=_bodies(robot) | _places(results),
         now="This path",
     )
-    write_recording(shown, output)
 
 
 def _bodies(robot: Robot) -> dict[str, Logged]:

@@ -290,8 +290,8 @@ def path_torques(
         program_load_kg=named.mass if isinstance(named := program_load(motion), MassBody) else None,
         program_load_open=named if isinstance(named, str) else "",
     )
-    rows = model.TorqueRows(
-        path=np.full(len(t), entry.name, object),
+    rows = model.TorqueRows.of(
+        path=entry.name,
         t_s=t,
         q=shown(arm.robot, q),
         torque=tau,

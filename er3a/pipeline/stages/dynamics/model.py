@@ -327,7 +327,6 @@ class MotorNeed:
     rated_limit: float | None
 
 
-@dataclass(frozen=True)
 class DynamicsSummary(Summary):
     """Head, masses, paths, drives and wrist.
 
@@ -353,7 +352,6 @@ class DynamicsSummary(Summary):
     power_imbalance: float | None
 
 
-@dataclass(frozen=True, eq=False)
 class TorqueRows(Table):
     """Torques along the paths that the arm can follow, N m (N for prismatic joints)."""
 
@@ -370,7 +368,6 @@ class TorqueRows(Table):
     power_w: Reals = per_joint("power of the drive", heading=N_("drive power"))
 
 
-@dataclass(frozen=True, eq=False)
 class DiagramRows(Table):
     """The load diagram: how far from the last axis a point load's centre may be; NaN where it may nowhere."""
 
@@ -381,7 +378,6 @@ class DiagramRows(Table):
     across_mm: Reals = column("greatest distance of its centre from the last axis", heading=N_("from the last axis"))
 
 
-@dataclass(frozen=True, eq=False)
 class DynamicsResults(Results[DynamicsSummary]):
     """Summary and tables of the stage."""
 

@@ -9,14 +9,13 @@ import rerun as rr
 
 from er3a.kinematics.chain import ALONG_Z, link_parts
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.say import say_all
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.model import FORCE, TORQUE, DynamicsResults, TorqueRows, shared_unit
 from er3a.pipeline.stages.dynamics.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.palette import JOINTS, rgb
-from er3a.pipeline.viewing.recording import Curves, Recorded, Run, escaped, write_recording
+from er3a.pipeline.viewing.recording import Curves, Run, escaped, record_stage
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
@@ -24,7 +23,7 @@ LONGEST = 0.35  # of the arm's size, the arrow of the maximum torque
 WIDTH = 0.012  # of the arm's size
 CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
 NOTE = """# {title}: torques
-{finding}
+{findings}
 
 **Look first** at the arrow that is longest while the arm runs: that joint's drive needs the most torque.
 
@@ -40,11 +39,11 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
     titles = {path.name: path.title for path in results.summary.paths}
     unit = shared_unit(FORCE if slides else TORQUE for slides in robot.slides)
     scale = _arrow_scales(robot, results.torques.torque)
-    shown = Recorded(
-        robot=robot,
-        name=stored.robot,
-        stage=stored.stage,
-        note=NOTE.format(title=escaped(robot.title), finding=say_all(results.summary.verdict.findings)),
+    record_stage(
+        study,
+        stored,
+        output,
+        NOTE,
         runs=[_run(robot, motion, titles[motion.name], results, scale) for motion in motions(robot, results)],
         curves=[
             Curves("torque", f"Drive torque ({unit})"),
@@ -54,7 +53,6 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
         views={"Arm and torques": ["**"]},
         now="This path",
     )
-    write_recording(shown, output)
 
 
 def _arrow_scales(robot: Robot, torques: Reals) -> Reals:

@@ -139,13 +139,11 @@ def _rows(
     back = forward(robot, q)
     rank = np.zeros(count, dtype=int)
     rank[choice.order] = np.arange(1, len(choice.order) + 1)
-    why = np.full(count, None, dtype=object)
-    why[:] = refused
     return model.SolutionRows.of(
         solutions,
         target=target.name,
         q_deg=shown(robot, q) + 0.0,
-        refusal=why,
+        refusal=refused,
         rank=rank,
         first_of_branch=_first_of_branch(solutions.branch, rank),
         position_residual=np.linalg.norm(back[:, :3, 3] - T[:3, 3], axis=1),
@@ -270,11 +268,8 @@ def rankings(
     rows = np.flatnonzero(solved.rows.first_of_branch & solved.rows.within_limits)
     few = solved.solutions.take(rows)
     free = ~collides(solved.rows)[rows]
-    names = np.full(len(rows), target.name, dtype=object)
     return model.RankingRows.stacked(
-        model.RankingRows(
-            names, few.branch, few.label, np.full(len(rows), rule, dtype=object), measure, _places(cost, free)
-        )
+        model.RankingRows.of(few, target=target.name, rule=rule, measure=measure, place=_places(cost, free))
         for rule, measure, cost in _measured(robot, few.q, target.q_ref, scene, mix, free)
     )
 
@@ -355,8 +350,8 @@ def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows
         slot, pose = np.nonzero(clear.T)
         clear[pose, slot] = bodies.free(found.q[pose, slot])
         tables.append(
-            model.MapRows(
-                orientation=np.full(len(x), orientation, dtype=object),
+            model.MapRows.of(
+                orientation=orientation,
                 x_mm=x * 1000,
                 z_mm=z * 1000,
                 solutions=found.solved.sum(axis=1),

@@ -262,7 +262,6 @@ class RoundTrips:
     counts_within_limits: tuple[int, ...]
 
 
-@dataclass(frozen=True)
 class InverseSummary(Summary):
     """What the stage found.
 
@@ -283,7 +282,6 @@ class InverseSummary(Summary):
     round_trips: RoundTrips | None
 
 
-@dataclass(frozen=True, eq=False)
 class SolutionRows(Table):
     """One row for each solution of each target, turns included."""
 
@@ -309,7 +307,6 @@ class SolutionRows(Table):
     distance_deg: Reals = column("root of the summed squares of the joint moves")
 
 
-@dataclass(frozen=True, eq=False)
 class RankingRows(Table):
     """Place and measure, by each rule, of each branch's best solution within the limits."""
 
@@ -321,7 +318,6 @@ class RankingRows(Table):
     place: Integers = column("1 is the best; 0 for solutions that collide")
 
 
-@dataclass(frozen=True, eq=False)
 class MapRows(Table):
     """Number of solutions of tool poses on a grid in the vertical plane through axis 1 (y = 0 of the base)."""
 
@@ -335,7 +331,6 @@ class MapRows(Table):
     )
 
 
-@dataclass(frozen=True, eq=False)
 class InverseResults(Results[InverseSummary]):
     """The stage's results; the map is empty for arms without a closed form."""
 

@@ -16,11 +16,12 @@ from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, Tar
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES, capsules
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
-from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, under_verdict, write_recording
+from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
 from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
 from er3a.robots.robot import Robot
 
 NOTE = """# Joint solutions of each target
+{findings}
 
 **Look first** at how differently the arm can reach one and the same tool pose. Each target has one second: drag the
 time, or press play.
@@ -40,11 +41,11 @@ def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
     """Write the recording from the stage's results."""
     name, solutions = stored.robot, stored.results.solutions
     robot, targets = study.robot(name), shown_targets(stored.results.summary.targets)
-    shown = Recorded(
-        robot=robot,
-        name=name,
-        stage=stored.stage,
-        note=under_verdict(NOTE, stored),
+    record_stage(
+        study,
+        stored,
+        output,
+        NOTE,
         runs=[
             _run(robot, target, solutions.take((solutions.target == target.name) & solutions.first_of_branch))
             for target in targets
@@ -54,7 +55,6 @@ def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
         points=[np.array([target.xyz_mm for target in targets]) / 1000],
         now="This target",
     )
-    write_recording(shown, output)
 
 
 def _run(robot: Robot, target: TargetResult, branches: SolutionRows) -> Run:

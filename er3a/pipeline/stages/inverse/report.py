@@ -344,27 +344,6 @@ NO_BREAK_SPACE = "\u00a0"
 MOST_SELF_MOTIONS = 6
 
 
-@dataclass(frozen=True)
-class TargetSection:
-    """What the page says about a target, in words; the worst residuals are None where nothing solves it."""
-
-    target: model.TargetResult
-    picture: Picture
-    position: str
-    orientation: str
-    reference: str
-    reason: str
-    advice: list[str]
-    joints: list[str]
-    method: str
-    families: list[str]
-    unsolved: str
-    rows: list[list[str]]
-    rules: list[list[str]]
-    residual_mm: float | None
-    residual_deg: float | None
-
-
 def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
@@ -442,11 +421,11 @@ def _section(
     rules: list[str],
     correction: Correction | None,
     contradicted: bool,
-) -> TargetSection:
+) -> dict[str, Any]:
     rows = results.solutions.take(results.solutions.target == target.name)
     branches = best_of_branches(rows)
     own = [tr("Evidence contradicts this table: move nothing because of what it says here.")] if target.advice else []
-    return TargetSection(
+    return dict(
         target=target,
         picture=overlay(robot, target, branches),
         position=_listed(target.xyz_mm),

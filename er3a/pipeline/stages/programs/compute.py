@@ -191,7 +191,7 @@ def _without_path(finding: CheckFinding) -> CheckFinding:
 
 def _lines(name: str, check: ProgramCheck) -> model.Lines:
     text = check.execution.program.lines
-    return model.Lines(np.full(len(text), name, object), np.arange(1, len(text) + 1), np.array([*text], object))
+    return model.Lines.of(program=name, line=np.arange(1, len(text) + 1), text=text)
 
 
 def _instructions(name: str, check: ProgramCheck, joints: int) -> model.Instructions:
@@ -200,21 +200,16 @@ def _instructions(name: str, check: ProgramCheck, joints: int) -> model.Instruct
         if motion.end is not None:
             ends.setdefault(check.execution.steps[number].place, motion.end)
     unknown = np.full(joints, np.nan)
-    verdicts = check.verdicts
-
-    def reals(values: list[float | None]) -> Reals:
-        return np.array([np.nan if value is None else value for value in values], float)
-
-    return model.Instructions(
-        program=np.full(len(verdicts), name, object),
-        line=np.array([each.line for each in verdicts], int),
-        element=np.array([each.place.element for each in verdicts], object),
-        kind=np.array([each.kind for each in verdicts], object),
-        level=np.array([each.level for each in verdicts], object),
-        times=np.array([each.times for each in verdicts], int),
-        duration_s=reals([each.duration_s for each in verdicts]),
-        clearance_mm=reals([each.least_clearance_mm for each in verdicts]),
-        end_deg=np.degrees([ends.get(each.place, unknown) for each in verdicts]).reshape(len(verdicts), joints),
+    return model.Instructions.of(
+        program=name,
+        line=[each.line for each in check.verdicts],
+        element=[each.place.element for each in check.verdicts],
+        kind=[each.kind for each in check.verdicts],
+        level=[each.level for each in check.verdicts],
+        times=[each.times for each in check.verdicts],
+        duration_s=[each.duration_s for each in check.verdicts],
+        clearance_mm=[each.least_clearance_mm for each in check.verdicts],
+        end_deg=np.degrees([ends.get(each.place, unknown) for each in check.verdicts]).reshape(-1, joints),
     )
 
 
@@ -251,11 +246,11 @@ def _motion(name: str, check: ProgramCheck, joints: int) -> tuple[model.ProgramM
         lines += [check.execution.own_line(step)] * len(t)
         step_levels += [levels[step.place]] * len(t)
         now += motion.way.law.duration if motion.way else 0.0
-    kept = model.ProgramMotion(
-        program=np.full(len(lines), name, object),
+    kept = model.ProgramMotion.of(
+        program=name,
         t_s=np.concatenate(times),
-        line=np.array(lines, int),
-        level=np.array(step_levels, object),
+        line=lines,
+        level=step_levels,
         q_deg=np.degrees(np.concatenate(angles)),
         xyz_mm=np.concatenate(points) * 1000,
     )

@@ -100,7 +100,6 @@ class ProgramSummary:
     not_examined: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
 class ProgramsSummary(Summary):
     """Head and programs; ``scene`` is its title, None where the study names none."""
 
@@ -110,7 +109,6 @@ class ProgramsSummary(Summary):
     programs: tuple[ProgramSummary, ...]
 
 
-@dataclass(frozen=True, eq=False)
 class Lines(Table):
     """The programs' text."""
 
@@ -119,7 +117,6 @@ class Lines(Table):
     text: Texts = column("the line")
 
 
-@dataclass(frozen=True, eq=False)
 class Instructions(Table):
     """Motion instructions of the programs with their verdicts."""
 
@@ -134,7 +131,6 @@ class Instructions(Table):
     end_deg: Reals = per_joint("joint angle at its first end; NaN where unknown", name="q_deg")
 
 
-@dataclass(frozen=True, eq=False)
 class ProgramMotion(Table):
     """The arm along the way with the most motions through each program."""
 
@@ -146,7 +142,6 @@ class ProgramMotion(Table):
     xyz_mm: Reals = vector("{}_mm", "tool point in the base frame")
 
 
-@dataclass(frozen=True, eq=False)
 class ProgramsResults(Results[ProgramsSummary]):
     """Summary and tables of the stage."""
 

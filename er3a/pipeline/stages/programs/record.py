@@ -11,14 +11,14 @@ import rerun as rr
 
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.programs import cycle_text, level_word
-from er3a.pipeline.messages.say import say, say_all
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import PlayedEvent
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.stages.programs.played import WEIGHTS, of_line, stretches, touching
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.palette import VERDICTS, rgb
-from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, write_recording
+from er3a.pipeline.viewing.recording import Curves, Logged, Run, escaped, record_stage
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.languages import LANGUAGES
 
@@ -38,12 +38,12 @@ the text beside it shows the line that it is at.
 
 def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
     """Write the recording of a robot's programs."""
-    robot, results = study.robot(stored.robot), stored.results
-    shown = Recorded(
-        robot=robot,
-        name=stored.robot,
-        stage=stored.stage,
-        note=NOTE.format(title=escaped(robot.title), findings=say_all(results.summary.verdict.findings)),
+    results = stored.results
+    record_stage(
+        study,
+        stored,
+        output,
+        NOTE,
         runs=[_run(results, program) for program in results.summary.programs],
         curves=[Curves("angle", "Joint angle (deg)")],
         scene=study.scene(stored.robot, "trajectory"),  # the stage whose scene counts here too
@@ -51,7 +51,6 @@ def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
         points=[results.motion.xyz_mm / 1000],
         now="This line",
     )
-    write_recording(shown, output)
 
 
 def _run(results: ProgramsResults, program: ProgramSummary) -> Run:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -36,38 +36,6 @@ AROUND = 3  # lines around those with motions or findings, in a longer listing
 STATUSES: dict[Level, str] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
 
 
-@dataclass(frozen=True)
-class ListingLine:
-    """A line of a listing with what was found there and what to do about it.
-
-    ``stretch`` and ``moment`` lead the player to where its first motion ends, if it moves.
-    """
-
-    number: int
-    id: str
-    text: str
-    level: Level | None
-    word: str
-    remarks: list[Markup]
-    remedies: list[str]
-    facts: str
-    stretch: Markup
-    moment: Markup
-    skipped: bool = False
-
-
-@dataclass(frozen=True)
-class ProgramSection:
-    """A program on the page, and what it says in the page's language."""
-
-    program: model.ProgramSummary
-    status: str
-    language: str
-    cycle: str
-    lines: list[ListingLine]
-    elsewhere: list[list[str]]
-
-
 def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
     """Write the page of a robot's programs."""
     robot, results = study.robot(stored.robot), stored.results
@@ -87,7 +55,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
     )
 
 
-def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> ProgramSection:
+def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:
     own = Path(program.file).name
     found: dict[int, list[model.FindingAt]] = defaultdict(list)
     elsewhere = []
@@ -101,9 +69,14 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> P
     text = results.lines.take(results.lines.program == program.name)
     rows = results.instructions.take(results.instructions.program == program.name)
     motion = results.motion.take(results.motion.program == program.name)
-    lines = _listing(program, text, rows, motion, found)
-    status = STATUSES[program.outcome]
-    return ProgramSection(program, status, LANGUAGES[program.language].title, cycle_text(program), lines, elsewhere)
+    return dict(
+        program=program,
+        status=STATUSES[program.outcome],
+        language=LANGUAGES[program.language].title,
+        cycle=cycle_text(program),
+        lines=_listing(program, text, rows, motion, found),
+        elsewhere=elsewhere,
+    )
 
 
 def _remark(name: str, each: model.FindingAt) -> Markup:
@@ -125,7 +98,7 @@ def _listing(
     rows: model.Instructions,
     motion: model.ProgramMotion,
     found: dict[int, list[model.FindingAt]],
-) -> list[ListingLine]:
+) -> list[dict[str, Any]]:
     name = program.name
     moves: dict[int, list[int]] = defaultdict(list)
     played = {line: (t0, t1) for line, _, t0, t1 in reversed(stretches(motion))}  # the first time counts
@@ -139,7 +112,7 @@ def _listing(
         urgent = sorted({*moves, *found}, key=lambda line: heaviest.get(line, (1, line)))
         marked = urgent[: MOST_LINES // (2 * AROUND + 1)]
         kept = {line + k for line in marked for k in range(-AROUND, AROUND + 1)} & kept
-    lines: list[ListingLine] = []
+    lines: list[dict[str, Any]] = []
     skipped = False
     for number, words in zip(text.line.tolist(), text.text.tolist()):
         if number not in kept:
@@ -148,24 +121,23 @@ def _listing(
         here = found.get(number, [])
         levels: list[Level] = [*(each.level for each in here), *rows.level[moves[number]].tolist()]
         level = worst_of(levels) if levels else None
-        remarks, to_do = [_remark(name, each) for each in here], remedies(here, program.findings)
         leads = Markup(), Markup()
         if number in played:
             t0, t1 = played[number]
             leads = stretch(name, t0, t1), moment(name, t1, str(number))
-        word = "" if level is None else level_word(level)
         lines.append(
-            ListingLine(
-                number,
-                line_id(name, number),
-                words,
-                level,
-                word,
-                remarks,
-                to_do,
-                _facts(rows, moves[number]),
-                *leads,
-                skipped,
+            dict(
+                number=number,
+                id=line_id(name, number),
+                text=words,
+                level=level,
+                word="" if level is None else level_word(level),
+                remarks=[_remark(name, each) for each in here],
+                remedies=remedies(here, program.findings),
+                facts=_facts(rows, moves[number]),
+                stretch=leads[0],
+                moment=leads[1],
+                skipped=skipped,
             )
         )
         skipped = False

@@ -202,9 +202,9 @@ class AvoidanceTask:
         q, velocity, acceleration = timed.curve.rates(times)
         distance, angle = (np.interp(times, timed.t, part) for part in deviations or (np.zeros(len(timed.t)),) * 2)
         measures = conditioning(self.robot, q, characteristic_length(self.robot))
-        return model.AvoidanceRows(
-            path=np.full(len(times), path, object),
-            strategy=np.full(len(times), strategy, object),
+        return model.AvoidanceRows.of(
+            path=path,
+            strategy=strategy,
             t_s=times,
             q_deg=shown(self.robot, q),
             q_deg_s=shown(self.robot, velocity),
@@ -480,8 +480,8 @@ def _checks(
     part = conditioning(robot, found.q[reached], characteristic_length(robot))
     measures[reached] = np.stack([part.manipulability, part.condition_number, part.smallest_singular_value], axis=1)
     factors = factors_where_defined(robot, found.q)
-    return model.PathChecks(
-        path=np.full(len(found.times), motion.entry.name, object),
+    return model.PathChecks.of(
+        path=motion.entry.name,
         t_s=found.times,
         s_m=motion.way(found.times),
         q_deg=shown(robot, found.q),

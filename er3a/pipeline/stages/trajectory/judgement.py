@@ -295,9 +295,5 @@ def clear_until(
 
 def clearance_rows(name: str, along: ClearanceAlong) -> model.Clearances:
     """One row per time at which the clearance was measured in full; NaN where the path can't be reached."""
-    return model.Clearances(
-        path=np.full(len(along.t), name, object),
-        t_s=along.t,
-        clearance_mm=along.distance * 1000,
-        between=np.array([pair.label if pair else "" for pair in along.pair], object),
-    )
+    between = [pair.label if pair else "" for pair in along.pair]
+    return model.Clearances.of(path=name, t_s=along.t, clearance_mm=along.distance * 1000, between=between)

@@ -341,7 +341,6 @@ def is_safe(path: PathSummary, shapes: ShapesAssumed | None) -> bool:
     return path.verdict == "safe" and not (shapes and path.name in shapes.near)
 
 
-@dataclass(frozen=True)
 class TrajectorySummary(Summary):
     """Head, limits and paths.
 
@@ -362,7 +361,6 @@ class TrajectorySummary(Summary):
     not_followed: tuple[PathNotFollowed, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
 class MotionRows(Table):
     """Motions of the arm; joint columns are NaN where the path can't be reached."""
 
@@ -377,7 +375,6 @@ class MotionRows(Table):
     smallest_singular_value: Reals = column("smallest singular value of the scaled Jacobian")
 
 
-@dataclass(frozen=True, eq=False)
 class Samples(MotionRows):
     """The paths' own points."""
 
@@ -391,14 +388,12 @@ class Samples(MotionRows):
     near_singular: Flags = column("whether the pose is nearer to a singular set than its threshold")
 
 
-@dataclass(frozen=True, eq=False)
 class PathChecks(Samples):
     """The paths' own points, those checked between them, and the closest passes."""
 
     sample: Flags = column("whether the point is one of the path's own")
 
 
-@dataclass(frozen=True, eq=False)
 class Clearances(Table):
     """Times at which the clearance was measured in full; NaN where the path can't be reached."""
 
@@ -408,7 +403,6 @@ class Clearances(Table):
     between: Texts = column("the two bodies nearest to each other")
 
 
-@dataclass(frozen=True, eq=False)
 class AvoidanceRows(MotionRows):
     """Motions of the strategies, and of each path at its fastest (``fastest``)."""
 
@@ -417,7 +411,6 @@ class AvoidanceRows(MotionRows):
     deviation_deg: Reals = column("angle of the tool to the path's")
 
 
-@dataclass(frozen=True, eq=False)
 class ProgramFiles(Table):
     """Programs of the safe paths for controllers; of others only where the study asks for that, and the motion that
     repairs them as a table in csv."""
@@ -429,7 +422,6 @@ class ProgramFiles(Table):
     assumed_speed: Texts = column("greatest joint speeds that are assumed and that its speeds were written with")
 
 
-@dataclass(frozen=True, eq=False)
 class TrajectoryResults(Results[TrajectorySummary]):
     """Summary and tables of the stage."""
 

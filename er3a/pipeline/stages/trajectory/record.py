@@ -14,7 +14,6 @@ from matplotlib.colors import LogNorm
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.say import say_all
 from er3a.pipeline.messages.trajectory import advice, event_word, path_text
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import MotionRows, PathChecks, PathSummary, TrajectoryResults
@@ -22,7 +21,7 @@ from er3a.pipeline.stages.trajectory.played import WEIGHTS, contact, events
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import LABEL
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import Curves, Logged, Recorded, Run, escaped, write_recording
+from er3a.pipeline.viewing.recording import Curves, Logged, Run, escaped, record_stage
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
@@ -55,11 +54,11 @@ Press play: the arm runs along one path after another.
 def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
     """Write the trajectory recording of a robot."""
     robot, results = study.robot(stored.robot), stored.results
-    shown = Recorded(
-        robot=robot,
-        name=stored.robot,
-        stage=stored.stage,
-        note=NOTE.format(title=escaped(robot.title), findings=say_all(results.summary.verdict.findings)),
+    record_stage(
+        study,
+        stored,
+        output,
+        NOTE,
         runs=[run for path in results.summary.paths for run in _runs(robot, results, path)],
         curves=CURVES,
         scene=study.scene(stored.robot, stored.stage),
@@ -67,7 +66,6 @@ def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> Non
         points=[results.checks.xyz_mm / 1000],
         now="This path",
     )
-    write_recording(shown, output)
 
 
 def _runs(robot: Robot, results: TrajectoryResults, path: PathSummary) -> Iterator[Run]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -49,52 +48,6 @@ MOST_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: a
 AT_ANY_PACE = ("leaves limits", "collides", "unreachable", "none found")  # verdicts of paths that fail however slow
 
 
-@dataclass(frozen=True)
-class PathDrawing:
-    """A drawn image: address, what it shows, what to conclude, width in inches, where its curves over time are, and
-    what the pointer reads in it."""
-
-    uri: str
-    alt: str
-    caption: str
-    inches: float
-    panels: list[list[float]]
-    readings: list[dict[str, Any]]
-
-
-@dataclass(frozen=True)
-class ProgramLink:
-    """A program of a path, to save: its file's name, its text by :func:`packed_text`, and whether there is none;
-    the joint speeds that are assumed in it."""
-
-    file: str
-    packed: str
-    empty: bool
-    assumed: str
-
-
-@dataclass(frozen=True)
-class PathSection:
-    """A path on the page: the record, and what it says in the page's language."""
-
-    path: model.PathSummary
-    status: str
-    verdict: str
-    kind: str
-    text: str
-    advice: str | None
-    near: str
-    branches: list[str]
-    speed: str
-    events: list[list[str]]
-    faults: list[list[str]]
-    strategies: list[list[str]]
-    programs: list[ProgramLink]
-    repaired: list[ProgramLink]
-    shortest: str
-    figure: PathDrawing | None
-
-
 def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) -> None:
     """Write the trajectory page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
@@ -130,25 +83,25 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     )
 
 
-def _programs(rows: model.ProgramFiles) -> list[ProgramLink]:
+def _programs(rows: model.ProgramFiles) -> list[dict[str, Any]]:
     speeds = [
         ", ".join(with_unit(*speed.split(" ", 1)) for speed in text.split(", ") if speed)
         for text in rows.assumed_speed.tolist()
     ]
     texts = zip(rows.file.tolist(), rows.text.tolist(), speeds)
-    return [ProgramLink(file, packed_text(text), not text, speed) for file, text, speed in texts]
+    return [dict(file=file, packed=packed_text(text), empty=not text, assumed=speed) for file, text, speed in texts]
 
 
 def _section(
     path: model.PathSummary,
     rows: model.PathChecks,
-    figure: PathDrawing | None,
-    programs: list[ProgramLink],
+    figure: dict[str, Any] | None,
+    programs: list[dict[str, Any]],
     summary: model.TrajectorySummary,
-) -> PathSection:
+) -> dict[str, Any]:
     near = near_assumed(path, summary)
     status, verdict = shown_verdict(path, near)
-    return PathSection(
+    return dict(
         path=path,
         status=status.replace("plain", "pass"),
         verdict=verdict,
@@ -173,8 +126,8 @@ def _shortest(path: model.PathSummary) -> float | None:
     return None if path.verdict in AT_ANY_PACE else path.fastest_s
 
 
-def _repairs(path: model.PathSummary, program: ProgramLink) -> bool:
-    return program.file.rpartition(".")[0] == repair_name(path.name)
+def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
+    return bool(program["file"].rpartition(".")[0] == repair_name(path.name))
 
 
 def _figure(
@@ -184,7 +137,7 @@ def _figure(
     rows: model.PathChecks,
     motions: model.AvoidanceRows,
     near: model.NearThresholds,
-) -> PathDrawing:
+) -> dict[str, Any]:
     alt = tr(
         "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
         "condition number, manipulability; the path in space; joint speeds against their limits. {finding}.",
@@ -192,8 +145,10 @@ def _figure(
         finding=path_text(path),
     )
     uri = figure.draw(robot, path, _drawn(path, rows), motions, near)
-    width = float(figure.figure.get_figwidth())
-    return PathDrawing(uri, alt, _conclusion(path, rows), width, figure.panels(), readings(figure.figure))
+    inches, caption = float(figure.figure.get_figwidth()), _conclusion(path, rows)
+    return dict(
+        uri=uri, alt=alt, caption=caption, inches=inches, panels=figure.panels(), readings=readings(figure.figure)
+    )
 
 
 def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:

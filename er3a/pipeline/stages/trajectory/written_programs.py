@@ -114,13 +114,7 @@ def program_files(
             files, said = _repair(robot, motion, repaired, language, speed)
             own = repair_name(motion.entry.name)
             rows += [(language, own + suffix, text, _assumed(said)) for suffix, text in files.items()]
-    return ProgramFiles(
-        path=np.full(len(rows), motion.entry.name, object),
-        language=np.array([row[0] for row in rows], object),
-        file=np.array([row[1] for row in rows], object),
-        text=np.array([row[2] for row in rows], object),
-        assumed_speed=np.array([row[3] for row in rows], object),
-    )
+    return ProgramFiles.of_rows((motion.entry.name, *row) for row in rows)
 
 
 def _assumed(findings: tuple[WriteFinding, ...]) -> str:

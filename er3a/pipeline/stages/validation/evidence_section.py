@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from math import pi
+from typing import Any
 
 from markupsafe import Markup
 
@@ -78,55 +79,9 @@ OTHER_TEXTS = {
 }
 
 
-@dataclass(frozen=True)
-class EntryCell:
-    """An entry in the table: its name, its value, a mark and a class for its status, and its title."""
-
-    entry: str
-    value: str
-    status: Status
-    mark: str
-    title: str
-
-
-@dataclass(frozen=True)
-class OtherSection:
-    """Another table: its title, a text, columns, and by joint its values and whether they differ from the robot's.
-
-    ``page`` : the address of the page on it; empty where it is no robot of the study.
-    """
-
-    title: str
-    text: str
-    page: str
-    columns: list[str]
-    rows: list[tuple[int, list[tuple[str, bool]]]]
-
-
-@dataclass(frozen=True)
-class EvidenceSection:
-    """The table by rows (a cell is None where the table has no such entry), its legend, and the entries in words.
-
-    Rows of entries begin with the entry's name, which is its address on the page. ``off_rows`` are of entries that the
-    evidence contradicts: what is stated, what is supported, and the difference.
-    """
-
-    columns: list[str]
-    rows: list[tuple[int, list[EntryCell | None]]]
-    legend: list[tuple[str, str, str, str]]
-    off_columns: list[str]
-    off_rows: list[list[str]]
-    open_columns: list[str]
-    open_rows: list[list[str]]
-    settled_columns: list[str]
-    settled_rows: list[list[str]]
-    tolerance: str
-    unmet: bool
-    other: OtherSection | None
-
-
-def evidence_section(evidence: TableEvidence | None) -> EvidenceSection | None:
-    """What the page shows of a table's evidence."""
+def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
+    """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
+    legend, and the entries in words; rows of entries begin with the name, which is the address on the page."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in evidence.entries}
@@ -137,7 +92,7 @@ def evidence_section(evidence: TableEvidence | None) -> EvidenceSection | None:
     left = [each for each in numbers if each.status not in SETTLED]
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = dict.fromkeys(each.status for each in numbers)
-    return EvidenceSection(
+    return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
         rows=[(joint, [_cell(by_name.get(f"{kind}{joint}")) for kind in kinds]) for joint in joints],
         legend=[
@@ -159,7 +114,7 @@ def evidence_section(evidence: TableEvidence | None) -> EvidenceSection | None:
     )
 
 
-def _other(evidence: TableEvidence) -> OtherSection | None:
+def _other(evidence: TableEvidence) -> dict[str, Any] | None:
     found = evidence.other
     if found is None:
         return None
@@ -181,7 +136,7 @@ def _other(evidence: TableEvidence) -> OtherSection | None:
             cells.append((_plain(value), abs(value - given) > DIFFERS))
         rows.append((joint, cells))
     title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
-    return OtherSection(title, text, "", [tr(COLUMNS[kind]) for kind in kinds], rows)
+    return dict(title=title, text=text, page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows)
 
 
 def _limit(each: EntryEvidence) -> float:
@@ -199,11 +154,9 @@ def _roundest(value: float, each: EntryEvidence) -> float:
     return next((rounded for k in range(3) if low <= (rounded := round(value, k)) <= high), round(value, 3))
 
 
-def table_to_use(robot: Robot, other: Robot) -> OtherSection:
-    """The whole table of another robot of the study, limits included, as its file gives it.
-
-    What differs is marked where both tables are of one convention.
-    """
+def table_to_use(robot: Robot, other: Robot) -> dict[str, Any]:
+    """The whole table of another robot of the study, limits included, as its file gives it: by joint its values, and
+    whether they differ, which is marked where both tables are of one convention."""
     kinds = [kind for kind in OTHER_COLUMNS if kind != "beta" or other.beta.any()]
     comparable = robot.convention == other.convention and robot.rows == other.rows and robot.joints == other.joints
     rows = []
@@ -222,12 +175,12 @@ def table_to_use(robot: Robot, other: Robot) -> OtherSection:
     parts = [tr("Source: {source}.", source=own_title(source.source))] if source else []
     if comparable:
         parts.append(tr("What differs is marked."))
-    return OtherSection(
-        tr("The table to use: {robot}", robot=other.name),
-        joined(parts, " "),
-        f"../{other.name}/validation.html",
-        [tr(COLUMNS[kind]) for kind in (*kinds, *LIMITS)],
-        rows,
+    return dict(
+        title=tr("The table to use: {robot}", robot=other.name),
+        text=joined(parts, " "),
+        page=f"../{other.name}/validation.html",
+        columns=[tr(COLUMNS[kind]) for kind in (*kinds, *LIMITS)],
+        rows=rows,
     )
 
 
@@ -236,11 +189,11 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(each: EntryEvidence | None) -> EntryCell | None:
+def _cell(each: EntryEvidence | None) -> dict[str, Any] | None:
     if each is None or each.value is None:
         return None
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
-    return EntryCell(each.entry, _value(each), each.status, MARKS[each.status], title)
+    return dict(entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title)
 
 
 def _status(status: Status) -> str:

@@ -43,13 +43,13 @@ SelfChecked = Literal[
 ]
 
 
-class SelfCheck(Subject, Finding):
+class SelfCheck(Finding, Subject, code="self_check"):
     """A check of the model that needs no document."""
 
     quantity: SelfChecked
 
 
-class WholeGroup(Subject, Finding):
+class WholeGroup(Finding, Subject, code="whole_group"):
     """All that references of a group could say."""
 
     group: str
@@ -425,7 +425,6 @@ class SetDiagnosis:
     corrected: CorrectedTable | None
 
 
-@dataclass(frozen=True, eq=False)
 class Residuals(Table):
     """Residuals before and after the best hypothesis, worst first, for sets with something to explain."""
 
@@ -465,7 +464,6 @@ class SetCalibration:
     result: Calibrated | NotCalibrated
 
 
-@dataclass(frozen=True, eq=False)
 class Corrections(Table):
     """Estimated corrections to the table's entries, of the sets whose positions they meet."""
 
@@ -573,7 +571,6 @@ class TableEvidence:
     other: OtherTableFound | None
 
 
-@dataclass(frozen=True)
 class ValidationSummary(Summary):
     """The stage's summary.
 
@@ -604,7 +601,6 @@ class ValidationSummary(Summary):
         return not same and any(found.another_arm for found in self.sets)
 
 
-@dataclass(frozen=True, eq=False)
 class Checks(Table):
     """The summary's checks as a table."""
 
@@ -628,7 +624,6 @@ class Checks(Table):
         return cls.of_rows(tuple(getattr(check, name) for name in cls.columns()) for check in checks)
 
 
-@dataclass(frozen=True, eq=False)
 class Axes(Table):
     """Each stated axis line in the zero pose beside the model's, in the base frame."""
 
@@ -651,7 +646,6 @@ class Axes(Table):
         return (self.distance_mm > self.uncertainty_mm) | (self.angle_deg > self.uncertainty_deg)
 
 
-@dataclass(frozen=True, eq=False)
 class KeyPoses(Table):
     """Poses at which references look at the arm, the zero pose first, with the stated point and the model's (base
     frame)."""
@@ -668,7 +662,6 @@ class KeyPoses(Table):
     deviation_mm: Reals = column("distance of the two points")
 
 
-@dataclass(frozen=True, eq=False)
 class Section(Table):
     """The wrist centre in the side view (joint 1 at 0) over a grid of joints 2 and 3 within their limits."""
 
@@ -680,7 +673,6 @@ class Section(Table):
     on_q3_line: Flags = column("on a line of constant q3 where the region can end")
 
 
-@dataclass(frozen=True, eq=False)
 class ValidationResults(Results[ValidationSummary]):
     """The stage's results."""
 

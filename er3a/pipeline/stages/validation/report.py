@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -53,18 +54,6 @@ COLUMNS = (
 Judged = model.ModelCheck | model.ReferenceCheck
 
 
-@dataclass(frozen=True)
-class GroupRow:
-    """One set and group: counts by status, and the check that comes nearest to failing or fails worst."""
-
-    set: str
-    group: str
-    status: str
-    counts: tuple[int, int, int]
-    worst: str
-    difference: str
-
-
 def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
     """Checks by the set that they come from, as the page names it."""
     found: dict[str, list[Judged]] = {}
@@ -83,7 +72,7 @@ def by_kind(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
     return found
 
 
-def group_rows(checks: Iterable[Judged]) -> list[GroupRow]:
+def group_rows(checks: Iterable[Judged]) -> list[dict[str, Any]]:
     """A row for each set and group."""
     rows = []
     for title, own in by_set(checks).items():
@@ -93,7 +82,7 @@ def group_rows(checks: Iterable[Judged]) -> list[GroupRow]:
             status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
             worst = max(part, key=lambda check: check.tolerances_off)
             rows.append(
-                GroupRow(
+                dict(
                     set=title,
                     group=word("group", GROUPS, group),
                     status=status,
@@ -250,24 +239,6 @@ SEGMENTS = {
 }
 
 
-@dataclass(frozen=True)
-class SetStory:
-    """What the page says about one reference set; counts, groups, segments, points and statements in words."""
-
-    found: model.SetSummary
-    counted: str
-    is_authoritative: bool
-    conflicting: int
-    statements: list[str]
-    telling: list[list[str]]
-    failed_groups: str
-    held_groups: str
-    zero_model: str
-    zero_stated: str
-    segments: str
-    segments_hold: bool
-
-
 def report(study: Study, stored: Stored[model.ValidationResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
@@ -334,7 +305,7 @@ def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:
     return replace(head, text=text, links={instead: f"../{instead}/validation.html"} if instead else {})
 
 
-def _set_story(found: model.SetSummary, checks: Iterable[Judged], poses: model.KeyPoses) -> SetStory:
+def _set_story(found: model.SetSummary, checks: Iterable[Judged], poses: model.KeyPoses) -> dict[str, Any]:
     own = [check for check in checks if isinstance(check, model.ReferenceCheck) and check.reference_set == found.name]
     failed = {check.group for check in own if check.status == "fail"}
     held = {check.group for check in own if check.status == "pass"} - failed
@@ -342,7 +313,7 @@ def _set_story(found: model.SetSummary, checks: Iterable[Judged], poses: model.K
     at_zero = (poses.reference_set == found.name) & (poses.group == "zero_pose") & (poses.point == "flange")
     zero = poses.take(np.flatnonzero(at_zero)[:1])
     claims, weighing = found.counts.claims, (found.counts.independent, found.counts.consistency)
-    return SetStory(
+    return dict(
         found=found,
         counted=counted_checks(found.counts)
         if found.is_authoritative

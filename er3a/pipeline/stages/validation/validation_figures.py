@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes as PlotAxes
@@ -256,57 +257,21 @@ SHOWN_RESIDUALS = 12
 LEAST_DRAWN = 1e-3
 
 
-@dataclass(frozen=True)
-class DiagnosisStory:
-    """What the page says about a reference set's diagnosis.
-
-    Attributes
-    ----------
-    own_claims : whether the set holds only what the table's author claims of it; others : rows of the next-best
-        hypotheses
-    """
-
-    reference_set: str
-    own_claims: bool
-    text: str
-    against: str
-    to_decide: str
-    others_title: str
-    others: list[list[str]]
-    hypotheses_tried: int
-    picture: Picture | None
-
-
-@dataclass(frozen=True)
-class CalibrationStory:
-    """What the page says about a reference set's calibration; ``found`` is None where there is none."""
-
-    reference_set: str
-    found: model.Calibrated | None
-    text: str
-    level: str
-    held: list[str]
-    close: list[str]
-    more: str
-    picture: Picture | None
-    rows: list[list[str]]
-
-
-def diagnosis_stories(summary: model.ValidationSummary, residuals: model.Residuals) -> list[DiagnosisStory]:
+def diagnosis_stories(summary: model.ValidationSummary, residuals: model.Residuals) -> list[dict[str, Any]]:
     """Per reference set: what the diagnosis says, the next-best hypotheses, and the residuals as a figure."""
     claims = {found.name for found in summary.sets if not found.is_authoritative}
     return [_diagnosis_story(each, residuals, each.reference_set in claims) for each in summary.diagnoses]
 
 
-def correction_stories(summary: model.ValidationSummary, corrections: model.Corrections) -> list[CalibrationStory]:
+def correction_stories(summary: model.ValidationSummary, corrections: model.Corrections) -> list[dict[str, Any]]:
     """Per reference set: what its positions say about the table's entries, with the figure."""
     return [_calibration_story(calibration, corrections) for calibration in summary.calibrations]
 
 
-def _diagnosis_story(diagnosis: model.SetDiagnosis, residuals: model.Residuals, own_claims: bool) -> DiagnosisStory:
+def _diagnosis_story(diagnosis: model.SetDiagnosis, residuals: model.Residuals, own_claims: bool) -> dict[str, Any]:
     named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault | TooSmallToTell)
     best = diagnosis.hypotheses[0] if named else None
-    return DiagnosisStory(
+    return dict(
         reference_set=diagnosis.reference_set,
         own_claims=own_claims,
         text=typographic(say(diagnosis.conclusion)),
@@ -339,12 +304,12 @@ def _measured_against(diagnosis: model.SetDiagnosis) -> str:
     return text
 
 
-def _calibration_story(calibration: model.SetCalibration, corrections: model.Corrections) -> CalibrationStory:
+def _calibration_story(calibration: model.SetCalibration, corrections: model.Corrections) -> dict[str, Any]:
     found = calibration.result if isinstance(calibration.result, model.Calibrated) else None
     text = typographic(say(found.conclusion if found else calibration.result))
     own = corrections.take(corrections.reference_set == calibration.reference_set)
     alt = tr("Correction of each estimated entry of the table with its 95 % interval, lengths and angles apart.")
-    return CalibrationStory(
+    return dict(
         reference_set=calibration.reference_set,
         found=found,
         text=text,

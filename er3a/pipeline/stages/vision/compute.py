@@ -149,12 +149,7 @@ def grasp_programs(
             options = WriteOptions(robot, home, head=head, assumed_speed=speed)
             files = dict(write_program(_listing(robot, own, home, chosen), language, options).files)
         rows += [(language, own + suffix, text) for suffix, text in files.items()]
-    return model.GraspPrograms(
-        target=np.full(len(rows), name, object),
-        language=np.array([row[0] for row in rows], object),
-        file=np.array([row[1] for row in rows], object),
-        text=np.array([row[2] for row in rows], object),
-    )
+    return model.GraspPrograms.of_rows((name, *row) for row in rows)
 
 
 def _listing(robot: Robot, name: str, home: Reals, chosen: ChosenGrasp) -> instructions.Listing:
@@ -288,8 +283,8 @@ def sample_rows(found: HandEye, joints: int) -> model.SampleRows:
     seen = (samples.flange if in_hand else np.eye(4)) @ found.X @ samples.target
     predicted = np.broadcast_to(found.Y, seen.shape) if in_hand else samples.flange @ found.Y
     others = np.where(np.eye(count, dtype=bool) | ~found.used, np.nan, found.mismatch)
-    return model.SampleRows(
-        sample=np.array(samples.names, object),
+    return model.SampleRows.of(
+        sample=samples.names,
         used=found.used,
         residual_mm=1000 * found.residual[:, :3],
         residual_deg=np.degrees(found.residual[:, 3:]),
@@ -310,17 +305,9 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
     for k, (name, points, seen, by_board) in enumerate(
         zip(images.names, views.points, views.corners, views.reprojected)
     ):
-        count = len(points)
-        tables.append(
-            model.CornerRows(
-                sample=np.full(count, found.samples.names[k], object),
-                image=np.full(count, name, object),
-                used=np.full(count, found.used[k]),
-                seen_px=seen,
-                by_board_px=by_board,
-                by_arm_px=projected(points, predicted[k], views.camera),
-            )
-        )
+        own = {"sample": found.samples.names[k], "image": name, "used": found.used[k]}
+        by_arm = projected(points, predicted[k], views.camera)
+        tables.append(model.CornerRows.of(**own, seen_px=seen, by_board_px=by_board, by_arm_px=by_arm))
     return model.CornerRows.stacked(tables)
 
 
@@ -613,8 +600,8 @@ def _ways(name: str, chosen: ChosenGrasp) -> model.PathRows:
         rows.append(q[first:])
         now += leg.duration
     part = np.array(parts, object)
-    return model.PathRows(
-        target=np.full(len(part), name, object),
+    return model.PathRows.of(
+        target=name,
         part=part,
         step=np.concatenate([np.arange((part == each).sum()) for each in PARTS]),
         t_s=np.concatenate(times),

@@ -313,7 +313,6 @@ class ObjectResult:
     followed: int
 
 
-@dataclass(frozen=True)
 class VisionSummary(Summary):
     """What the stage found; ``calibration`` is None where the samples determine none.
 
@@ -335,7 +334,6 @@ class VisionSummary(Summary):
     objects: tuple[ObjectResult, ...]
 
 
-@dataclass(frozen=True, eq=False)
 class SampleRows(Table):
     """One row for each sample of the calibration."""
 
@@ -352,7 +350,6 @@ class SampleRows(Table):
     q_deg: Reals = per_joint("joint angle; NaN where poses were recorded")
 
 
-@dataclass(frozen=True, eq=False)
 class CornerRows(Table):
     """Corners of the board in the images; none where poses were recorded."""
 
@@ -364,7 +361,6 @@ class CornerRows(Table):
     by_arm_px: Reals = vector("by_arm_{}_px", "where the arm and the calibration put it", parts="xy")
 
 
-@dataclass(frozen=True, eq=False)
 class ErrorMapRows(Table):
     """Errors of the first object's grasp, held at each cell of a square at the objects' mean height.
 
@@ -381,7 +377,6 @@ class ErrorMapRows(Table):
     together_deg: Reals = column("turn, from all of them")
 
 
-@dataclass(frozen=True, eq=False)
 class PathRows(Table):
     """Joint angles along the way to each object grasped, and away from it."""
 
@@ -392,7 +387,6 @@ class PathRows(Table):
     q_deg: Reals = per_joint("joint angle")
 
 
-@dataclass(frozen=True, eq=False)
 class GraspPrograms(Table):
     """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
 
@@ -402,7 +396,6 @@ class GraspPrograms(Table):
     text: Texts = column("what the file holds")
 
 
-@dataclass(frozen=True, eq=False)
 class VisionResults(Results[VisionSummary]):
     """The stage's results; without a calibration the tables are empty."""
 

@@ -19,7 +19,7 @@ from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, Sample
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import Logged, Recorded, Run, escaped, under_verdict, write_recording
+from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
@@ -27,6 +27,7 @@ MAGNIFIED = 50.0
 SIGHT = 0.35  # of the farthest distance, how far the drawn pyramid reaches
 STEP_S, SAMPLE_S = 0.1, 0.5
 NOTE = f"""# Camera, samples and grasps
+{{findings}}
 
 **Look first** at the arrows at the boards: they lead from where the arm puts the board to where the camera sees it,
 {MAGNIFIED:g} times as long as they are. Short arrows in all directions are noise; long ones, or all in one direction,
@@ -53,18 +54,17 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     for each in summary.objects:
         shapes |= _object(each, size)
     fixed = found is not None and found.setup == "eye_to_hand"
-    shown = Recorded(
-        robot=robot,
-        name=stored.robot,
-        stage=stored.stage,
-        note=under_verdict(NOTE, stored),
+    record_stage(
+        study,
+        stored,
+        output,
+        NOTE,
         runs=[_sampled(results.samples, home), *(_grasped(results, each, home) for each in summary.objects)],
         scene=study.scene(stored.robot, stored.stage),
         views={"Camera and grasps": ["**"]},
         shapes=shapes,
         points=[np.array([found.hand_eye.xyz_mm]) / 1000] if found is not None and fixed else [],
     )
-    write_recording(shown, output)
 
 
 def _placed(pose: PoseEstimate) -> Reals:

@@ -89,7 +89,6 @@ WorkspaceFinding = Flat | OnSurface | Undersampled | VoidUnexpected | VoidUncert
 Singles = NDArray[np.float32]
 
 
-@dataclass(frozen=True, eq=False)
 class Cells(Table):
     """Touched cells of the grid, and untouched ones inside the hull."""
 
@@ -99,7 +98,6 @@ class Cells(Table):
     void: NDArray[np.int32] = column("number of the sampled void from 1, -1 in the hull but in no void, 0 touched")
 
 
-@dataclass(frozen=True, eq=False)
 class SectionCells(Table):
     """Cells of the side section about axis 1 that were touched or are cut off by touched ones."""
 
@@ -109,7 +107,6 @@ class SectionCells(Table):
     void: Flags = column("whether touched cells cut it off")
 
 
-@dataclass(frozen=True, eq=False)
 class SideViewCells(Table):
     """Touched cells of the side views in the arm's plane."""
 
@@ -120,7 +117,6 @@ class SideViewCells(Table):
     point: Texts = column("tool_point or wrist_centre")
 
 
-@dataclass(frozen=True, eq=False)
 class GrowthCurve(Table):
     """Touched volume after each block of samples, at several cell sizes."""
 
@@ -129,7 +125,6 @@ class GrowthCurve(Table):
     touched_m3: Reals = column("volume of the touched cells", heading=N_("volume"))
 
 
-@dataclass(frozen=True, eq=False)
 class Cloud(Table):
     """The first samples of each block."""
 
@@ -137,7 +132,6 @@ class Cloud(Table):
     manipulability_m3: Reals = column("|det J|")
 
 
-@dataclass(frozen=True, eq=False)
 class HullVertices(Table):
     """Corners of the convex hull."""
 
@@ -145,14 +139,12 @@ class HullVertices(Table):
     q_deg: Reals = per_joint("joint angle that reaches the corner")
 
 
-@dataclass(frozen=True, eq=False)
 class HullTriangles(Table):
     """Faces of the convex hull, counter-clockwise from outside."""
 
     corners: Integers = vector("{}", "row of the corner among the hull's vertices", parts="abc")
 
 
-@dataclass(frozen=True, eq=False)
 class ProofCells(Table):
     """Cells of the proof: rings about axis 1, or bars along a first prismatic joint (``proof.bars`` of the summary,
     with the frame); of these rho is x, and 360 deg are their length."""
@@ -169,7 +161,6 @@ class ProofCells(Table):
     q_deg: Reals = per_joint("joint angle that reaches into the cell, NaN if none is known")
 
 
-@dataclass(frozen=True, eq=False)
 class Border(Table):
     """Exact borders as arcs, with the joint values that make them."""
 
@@ -184,7 +175,6 @@ class Border(Table):
     view: Texts = column("section (folded about axis 1) or side")
 
 
-@dataclass(frozen=True, eq=False)
 class Drawing(Table):
     """Labels of the manufacturer's drawing of the wrist centre's envelope: extents (one coordinate) and corners."""
 
@@ -195,7 +185,6 @@ class Drawing(Table):
     q3_deg: Reals = column("joint 3 at a corner, else NaN")
 
 
-@dataclass(frozen=True, eq=False)
 class VoidVertices(Table):
     """Corners of the voids' surfaces."""
 
@@ -203,7 +192,6 @@ class VoidVertices(Table):
     void: NDArray[np.int32] = column("number of the void from 1, as in the summary")
 
 
-@dataclass(frozen=True, eq=False)
 class VoidTriangles(Table):
     """Faces of the voids' surfaces."""
 
@@ -211,7 +199,6 @@ class VoidTriangles(Table):
     void: NDArray[np.int32] = column("number of the void from 1, as in the summary")
 
 
-@dataclass(frozen=True, eq=False)
 class CapabilityCells(Table):
     """Reached cells of the section, by sector of azimuth; or bars along a first prismatic joint (``bar_m`` of the
     summary), of which rho is x, and 360 deg are their length."""
@@ -233,7 +220,6 @@ class CapabilityCells(Table):
     )
 
 
-@dataclass(frozen=True, eq=False)
 class BoxPlaces(Table):
     """Positions of the box on the lattice that pass, the better of both turns at each."""
 
@@ -575,7 +561,6 @@ class PlacementSummary:
 Placement = PlacementSummary | ToolPointsElsewhere | PlacementTooLong
 
 
-@dataclass(frozen=True)
 class WorkspaceSummary(Summary):
     """The stage's summary; ``pocket_block_m`` is the edge of the blocks that open pockets were looked for on.
 
@@ -610,7 +595,6 @@ class WorkspaceSummary(Summary):
         return [void for void in self.voids if void.kind == "enclosed"]
 
 
-@dataclass(frozen=True, eq=False)
 class WorkspaceResults(Results[WorkspaceSummary]):
     """The stage's results; each table is written under its attribute's name."""
 
@@ -685,17 +669,12 @@ def section(found: tally.TouchedSection) -> SectionCells:
 
 def side_view(views: Sequence[SideView]) -> SideViewCells:
     """The side views, one after another."""
-    return SideViewCells.stacked(
-        SideViewCells(view.x, view.z, np.full(len(view.x), view.cell), view.samples, _repeated(view.point, len(view.x)))
-        for view in views
-    )
+    return SideViewCells.stacked(SideViewCells.of(view) for view in views)
 
 
 def curve(growth: Sequence[tally.Growth]) -> GrowthCurve:
     """Growth of the touched volume, one cell size after another."""
-    return GrowthCurve.stacked(
-        GrowthCurve(np.full(len(part.samples), part.cell * 1000), part.samples, part.volume) for part in growth
-    )
+    return GrowthCurve.stacked(GrowthCurve.of(part, touched_m3=part.volume) for part in growth)
 
 
 def cloud(robot: Robot, q: Reals) -> Cloud:
@@ -715,12 +694,12 @@ def hull_vertices(robot: Robot, hull: Hull, q_extreme: Reals) -> HullVertices:
 def proof(proven: Proven) -> ProofCells:
     """All cells of a proof."""
     found = proven.proof
-    return ProofCells(
+    return ProofCells.of(
         rho_m=found.cells[:, :2],
         z_m=found.cells[:, 2:],
         volume_m3=found.volumes,
         level=found.level.astype(np.int16),
-        status=_texts(proven.cell_states()),
+        status=proven.cell_states(),
         filled_ratio=1 - found.unfilled_ratio,
         empty_ratio=found.empty_ratio,
         empty_arcs_deg=_arcs(found.empty),
@@ -732,16 +711,8 @@ def proof(proven: Proven) -> ProofCells:
 def border(lines: Sequence[BorderLine]) -> Border:
     """The points of border lines, one line after another."""
     return Border.stacked(
-        Border(
-            rho_m=line.points[:, 0],
-            z_m=line.points[:, 1],
-            q2_deg=np.degrees(line.q[:, 0]),
-            q3_deg=np.degrees(line.q[:, 1]),
-            tilt_deg=np.degrees(line.tilt),
-            arc=np.full(len(line.tilt), line.number),
-            point=_repeated(line.point, len(line.tilt)),
-            sweeps=_repeated(line.sweeps, len(line.tilt)),
-            view=_repeated(line.view, len(line.tilt)),
+        Border.of(
+            line, rho_m=line.points[:, 0], z_m=line.points[:, 1], q2=line.q[:, 0], q3=line.q[:, 1], arc=line.number
         )
         for line in lines
     )
@@ -751,8 +722,8 @@ def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:
     """The surfaces of voids, numbered from 1."""
     numbered = list(enumerate(voids, start=1))
     return (
-        VoidVertices.stacked(VoidVertices(void.vertices, np.full(len(void.vertices), n)) for n, void in numbered),
-        VoidTriangles.stacked(VoidTriangles(void.triangles, np.full(len(void.triangles), n)) for n, void in numbered),
+        VoidVertices.stacked(VoidVertices.of(point_m=void.vertices, void=n) for n, void in numbered),
+        VoidTriangles.stacked(VoidTriangles.of(corners=void.triangles, void=n) for n, void in numbered),
     )
 
 
@@ -779,18 +750,6 @@ def places(found: Places) -> BoxPlaces:
     return BoxPlaces.of(found, manipulability_m3=found.least, limit_margin=margin)
 
 
-def _repeated(text: str, count: int) -> Texts:
-    return np.full(count, text, dtype=object)
-
-
-def _texts(values: Sequence[str]) -> Texts:
-    array = np.empty(len(values), dtype=object)
-    array[:] = values
-    return array
-
-
-def _arcs(rows: Reals) -> Texts:
+def _arcs(rows: Reals) -> list[list[float]]:
     """Arcs (n, arcs, 2), rad, unused ones NaN, as lists of their ends in deg."""
-    array = np.empty(len(rows), dtype=object)
-    array[:] = [np.degrees(row[np.isfinite(row[:, 0])]).ravel().tolist() for row in rows]
-    return array
+    return [np.degrees(row[np.isfinite(row[:, 0])]).ravel().tolist() for row in rows]

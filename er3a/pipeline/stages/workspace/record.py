@@ -10,15 +10,14 @@ import rerun as rr
 from matplotlib import colormaps
 
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.messages.say import say_all, word
+from er3a.pipeline.messages.say import word
 from er3a.pipeline.messages.workspace import VOID_STATUS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import Logged, Recorded, escaped, write_recording
-from er3a.robots.robot import Robot
+from er3a.pipeline.viewing.recording import Logged, record_stage
 
 POINT_SHARE = 0.16  # radius of a point of the cloud, of the mean distance between points
 DIMMEST = 0.4  # of the colour scale: darker points can't be seen on the viewer's ground
@@ -29,12 +28,12 @@ _NAMES = ("below_25_percent", "25_to_50_percent", "50_to_75_percent", "75_percen
 
 def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
     """Write the workspace recording of a robot from its results."""
-    robot, results = study.robot(stored.robot), stored.results
-    shown = Recorded(
-        robot=robot,
-        name=stored.robot,
-        stage=stored.stage,
-        note=_note(robot, results.summary),
+    results = stored.results
+    record_stage(
+        study,
+        stored,
+        output,
+        _note(results.summary),
         views={
             "Cloud, near half cut away": ["cloud/far/**"],
             "Reachability, places for the box": ["capability/far/**", "places/**"],
@@ -43,7 +42,6 @@ def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         shapes=_cloud(results) | _hull(results) | dict(_voids(results)) | dict(_capability(results)),
         points=[results.cloud.point_m],
     )
-    write_recording(shown, output)
 
 
 def _cloud(results: model.WorkspaceResults) -> dict[str, Logged]:
@@ -143,10 +141,10 @@ def _normals(corners: Reals, faces: Integers) -> Reals:
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
-def _note(robot: Robot, summary: model.WorkspaceSummary) -> str:
+def _note(summary: model.WorkspaceSummary) -> str:
     lines = [
-        f"# Workspace of {escaped(robot.title)}",
-        say_all(summary.verdict.findings),
+        "# Workspace of {title}",
+        "{findings}",
         "",
         "**Look first** at the voids inside the hull, below left: enclosed ones in magenta, open pockets in orange.",
         "",
