@@ -91,7 +91,7 @@ TEXTS = texts(
             "± {tolerance:.2g} {unit}, at J{joint}."
         ),
         "dynamics.no_limits#at_rest": (
-            "Holding still in the worst pose takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}: choose motors by "
+            "Holding still in the worst pose found takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}: choose motors by "
             "the greater."
         ),
         "dynamics.fits": "Fits: every quantity with a known limit is within it; highest utilisation: {use}.",
@@ -118,7 +118,7 @@ TEXTS = texts(
         ),
         "dynamics.inferred": "Masses are inferred: the results are orders of magnitude only.",
         "dynamics.graded": (
-            "The masses are {grade}, neither measured nor given by the manufacturer; the torques are no better."
+            "The masses are {grade}, neither measured nor given by the manufacturer, and the torques are as uncertain."
         ),
         "dynamics.not_run": Plural(
             "count",

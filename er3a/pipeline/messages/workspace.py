@@ -173,7 +173,9 @@ TEXTS = texts(
             "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, centre "
             "({centre}) mm."
         ),
-        "void.more": Plural("count", "There is {count} other enclosed void.", "There are {count} other enclosed voids."),
+        "void.more": Plural(
+            "count", "There is {count} other enclosed void.", "There are {count} other enclosed voids."
+        ),
         "box.size#turned": "{box} mm, turned by 90 deg (x, y, z: {xyz} mm)",
         "box.size#as_given": "{box} mm (x, y, z)",
         "box.unknown": "Box of {box} mm: {why}",

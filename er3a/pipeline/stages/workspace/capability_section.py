@@ -41,7 +41,7 @@ def best_text(summary: model.WorkspaceSummary, placement: model.PlacementSummary
     place = placement.best
     texts = [
         box_text(summary),
-        tr("Collisions are judged at samples.") if place.status == "proven" else "",
+        tr("Other collisions were checked at samples only.") if place.status == "proven" else "",
         tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
         _nearest_limit(place),
         _nearest_bodies(place),
