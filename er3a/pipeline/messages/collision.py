@@ -47,9 +47,10 @@ TEXTS = texts(
         "link_and_solid": "{link} and {solid}",
         "carried_and_link": "{link} and {carried}",
         "pairs_unexamined": "Collisions not examined, because the shapes overlap where no arm's can: {pairs}.",
-        "shapes_assumed#given": ("Link shapes are assumed (no authoritative source): real collisions may differ."),
+        "shapes_assumed#given": "Link shapes are assumed (no authoritative source): real collisions may differ.",
         "shapes_assumed#guessed": (
-            "Link shapes are capsules guessed from the table, as the robot's file gives none: real collisions may differ."
+            "Link shapes are capsules guessed from the table, as the robot's file gives none: real collisions may "
+            "differ."
         ),
         "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes, and so not settled: {names}.",
         "link#base": "base",

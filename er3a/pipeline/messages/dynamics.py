@@ -91,8 +91,8 @@ TEXTS = texts(
             "± {tolerance:.2g} {unit}, at J{joint}."
         ),
         "dynamics.no_limits#at_rest": (
-            "Holding still in the worst pose found takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}: choose motors by "
-            "the greater."
+            "Holding still in the worst pose found takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}: choose "
+            "motors by the greater."
         ),
         "dynamics.fits": "Fits: every quantity with a known limit is within it; highest utilisation: {use}.",
         "dynamics.unlimited": "Unknown, wholly or in part: {what}.",

@@ -72,8 +72,8 @@ GLOSSARY = {
         "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
     ),
     N_("up to signs"): N_(
-        "of a settled table entry: keep it; should an open entry turn out otherwise, another sign or half turn here may "
-        "fit as well"
+        "of a settled table entry: keep it; should an open entry turn out otherwise, another sign or half turn here "
+        "may fit as well"
     ),
     N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
     N_("margin"): N_("how far something is from a limit, in its unit"),

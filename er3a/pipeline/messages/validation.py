@@ -97,7 +97,8 @@ TEXTS = texts(
             "If an open or weak entry is wrong, the tool's position is right, but it is turned by up to {deg:.0f} deg."
         ),
         "validation.left_open#turned_at_least": (
-            "If an open or weak entry is wrong, the tool's position is right, but it is turned by {deg:.0f} deg or more."
+            "If an open or weak entry is wrong, the tool's position is right, but it is turned by {deg:.0f} deg or "
+            "more."
         ),
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
         "validation.left_open#uncontradicted": (

@@ -181,13 +181,13 @@ TEXTS = texts(
         "box.unknown": "Box of {box} mm: {why}",
         "box.nowhere": "Box of {box} mm: no place was found where the tool reaches all of it.",
         "box.put#on": (
-            "Put the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. Collisions with the box were not "
-            "checked."
+            "Put the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. Collisions with the box were "
+            "not checked."
         ),
         "box.put#over": (
             "Put the box on a stand {gap} mm high ({least} to {most} mm work too) on {name} (top at z = {height} mm), "
-            "its centre at ({centre}) mm. Box: {box}; {reached}. Directly on {none} no place works. Collisions with box "
-            "and stand were not checked."
+            "its centre at ({centre}) mm. Box: {box}; {reached}. Directly on {none} no place works. Collisions with "
+            "box and stand were not checked."
         ),
         "box.put#free": (
             "Put the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; {reached}. "
