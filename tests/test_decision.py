@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from er3a.pipeline.messages.pages import decision, next_step, what_it_can_do
+from er3a.pipeline.messages.pages import decision, next_step
 from er3a.pipeline.viewing.page import LED, led
 
 
@@ -28,12 +28,6 @@ def test_a_table_of_which_nothing_is_settled_is_told_from_one_that_is_nearly():
     assert decision("caution", [], unproven=True).startswith("Don't rely on it yet")
     assert decision("caution", []).startswith("Use it with care")
     assert decision("pass", [], unproven=True).startswith("Use it: ")
-
-
-def test_what_the_arm_can_do_names_each_stage_once_what_is_open_first():
-    said = what_it_can_do({"pass": ["b"], "fail": ["a"], "no_reference": ["c"], "not_computed": ["d"]})
-    assert said == "Fails: a. Nothing fails in b. Not known: c, d."
-    assert what_it_can_do({}) == ""
 
 
 @pytest.mark.parametrize(("end", "gap"), [(".", " "), (";", " "), ("。", ""), ("；", "")])

@@ -126,10 +126,11 @@ def test_part_of_a_study_has_verdicts_an_index_and_a_report(study, tmp_path, mon
     assert "Not examined yet: workspace, collision, inverse, trajectory, dynamics." in page
     assert re.findall(r'href="er3_600/(\w+)\.html', page) == [
         "validation",
+        "validation",
         "teach",
         "validation",
         "validation",
-    ]  # next, panel, table, cell
+    ]  # next, badge, panel, table, cell
     skipped = etree.parse(reports / "junit.xml").findall(".//skipped")
     assert len(skipped) == len(others)
 
@@ -206,7 +207,7 @@ def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tm
                 done = call("verdicts", "--study", tmp_path / "study.yaml", "--results", results, "--fail-on", level)
                 assert done.returncode == code, (name, level)
                 assert "neither passed nor failed: 2 not examined" in done.stderr
-        section = page.split(f'id="{name}"')[1].split("<section")[0]
+        section = page.split(f'id="{name}"')[1].split("<section")[0].split('class="cells"')[-1]
         (decided,) = (row for row in page.split("<tr>") if f'<a href="#{name}">' in row)
         assert ("See why programs fails" in decided) == bool(codes[1]), name
         cells = [each for each in section.split("<li>") if f'{name}/programs.html"' in each and "badge" in each]

@@ -51,7 +51,7 @@ def serious_faults(browser, **options) -> list[tuple[str, list[str]]]:
 @pytest.mark.long
 def test_index_leads_to_every_page(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
-    links = browser.execute_script("return [...document.querySelectorAll('.cells a, .panel-link a')].map(a => a.href)")
+    links = browser.execute_script("return [...document.querySelectorAll('.stages a')].map(a => a.href)")
     found = {link.rsplit("/", 2)[-2] + "/" + link.rsplit("/", 1)[-1] for link in links}
     assert found == set(PAGES) - set(OVER_ALL)
 

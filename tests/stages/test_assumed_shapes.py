@@ -48,7 +48,7 @@ def test_what_comes_near_to_assumed_shapes_is_a_caution(least, near):
     assert shapes.near == near
     verdict = Verdict("pass", FreeSpace(0.5, 10, 5, 5, 0)).resting_on(shapes)
     assert verdict.status == ("caution" if near else "pass")
-    assert say(verdict.findings[-1]).startswith("No document that verdicts rest on gives the shapes")
+    assert say(verdict.findings[-1]).startswith("Link shapes are assumed")
     assert ("not settled: a." in say(shapes)) == bool(near)
 
 

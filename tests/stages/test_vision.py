@@ -45,7 +45,7 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     assert summary.verdict.status == "pass"
     assert summary.verdict.finding.left_out == ("pose_12",)
     assert summary.verdict.finding.simulated
-    assert "The camera is simulated" in say(summary.verdict.finding)
+    assert "samples are simulated" in say(summary.verdict.finding)
     assert summary.verdict.shapes.near == ()
     left = {each.subject: each.names for each in summary.not_examined}
     assert left["left_out_samples"] == ("pose_12",)

@@ -130,7 +130,7 @@ def test_void_centres_have_no_inverse_solution(small_results, random):
     larger = replace(void, holds_shoulder=True, volume_m3=Bounds(0.5, 0.6))
     text = void_text(replace(summary, voids=(larger, *summary.voids)))
     assert "away from the shoulder" in text  # as the verdict has it
-    assert "1 other enclosed one" in text
+    assert "1 other enclosed void" in text
 
     def solvable(position):
         T = np.eye(4)

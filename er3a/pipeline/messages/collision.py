@@ -47,13 +47,10 @@ TEXTS = texts(
         "link_and_solid": "{link} and {solid}",
         "carried_and_link": "{link} and {carried}",
         "pairs_unexamined": "Collisions not examined, because the shapes overlap where no arm's can: {pairs}.",
-        "shapes_assumed#given": (
-            "No document that verdicts rest on gives the shapes of the arm's links: collisions are judged by assumed "
-            "shapes, and clear means clear of these."
-        ),
+        "shapes_assumed#given": "Link shapes are assumed (no authoritative source): real collisions may differ.",
         "shapes_assumed#guessed": (
-            "The robot's file gives no shapes: collisions are judged by capsules guessed from its table, and clear "
-            "means clear of these."
+            "Link shapes are capsules guessed from the table, as the robot's file gives none: real collisions may "
+            "differ."
         ),
         "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes, and so not settled: {names}.",
         "link#base": "base",
@@ -84,9 +81,9 @@ TEXTS = texts(
             "cells are lost to collisions."
         ),
         "collision.free_space#assumed": (
-            "{percent:.1f} % of the joint space is free of collisions of the assumed shapes. Of {places} cells "
-            "reached, {clear} are reachable without collision of these, {joined} of them by a motion from home that "
-            "is clear of them; at most {lost:.1f} % of the cells are lost to collisions."
+            "With the assumed shapes {percent:.1f} % of the joint space is collision-free. Of {places} cells reached, "
+            "{clear} are reachable without collision, {joined} of these by a collision-free motion from home; at most "
+            "{lost:.1f} % of the cells are lost to collisions."
         ),
         "collision.free_space#doubt": (
             "Pairs of links that may or may not collide, and are therefore checked: {undecided}."

@@ -91,8 +91,8 @@ TEXTS = texts(
             "± {tolerance:.2g} {unit}, at J{joint}."
         ),
         "dynamics.no_limits#at_rest": (
-            "At rest it takes up to {torque:.3g} ± {tolerance:.2g} {unit} elsewhere within the limits, at J{joint}: "
-            "choose motors by the greater."
+            "Holding still in the worst pose found takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}: choose "
+            "motors by the greater."
         ),
         "dynamics.fits": "Fits: every quantity with a known limit is within it; highest utilisation: {use}.",
         "dynamics.unlimited": "Unknown, wholly or in part: {what}.",
@@ -118,16 +118,15 @@ TEXTS = texts(
         ),
         "dynamics.inferred": "Masses are inferred: the results are orders of magnitude only.",
         "dynamics.graded": (
-            "The masses are {grade}, neither measured nor given by the manufacturer: all torques are as uncertain as "
-            "that."
+            "The masses are {grade}, neither measured nor given by the manufacturer, and the torques are as uncertain."
         ),
         "dynamics.not_run": Plural(
             "count",
             "{count} path may not be run as it is and counts for nothing: {names}.",
             "{count} paths may not be run as they are and count for nothing: {names}.",
         ),
-        "dynamics.unknown#joints": "{what}: J{numbers}",
-        "dynamics.unknown#links": "{what}: link {numbers}",
+        "dynamics.unknown#joints": "{what} (J{numbers})",
+        "dynamics.unknown#links": "{what} (link {numbers})",
         "missing_link": by(
             "singular",
             false="link {link}: no mass is given; it counts as massless",
@@ -153,11 +152,11 @@ TEXTS = texts(
             "{given_kg_m2:.3g} kg m² given, {about_centre_kg_m2:.3g} if so, {shape_kg_m2:.3g} by the link's shape"
         ),
         "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
-        "payload.bounded": "At most {kg:.3g} kg on the paths that may be run, by torques on {path}.",
-        "payload.partly": "Not counted, because not known: {what}.",
-        "payload.unknown": "None may be assumed. To know it, ask the manufacturer for: {what}.",
-        "payload.not_examined": "None may be assumed: whether the motors carry a load was not examined.",
-        "payload.rated": "Its file gives a rated payload of {kg:.3g} kg, which nothing here confirms.",
+        "payload.bounded": "At most {kg:.3g} kg on the paths that may be run, limited by torques on {path}.",
+        "payload.partly": "Left out, because not known: {what}.",
+        "payload.unknown": "Unknown, so assume none. Ask the manufacturer for: {what}.",
+        "payload.not_examined": "Unknown, so assume none: whether the motors carry a load was not examined.",
+        "payload.rated": "The robot's file gives a rated payload of {kg:.3g} kg; nothing here confirms it.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why})",
     }
 )

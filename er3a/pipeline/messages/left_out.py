@@ -11,16 +11,16 @@ from er3a.pipeline.results import LeftOut, LeftOutSubject, NoPass
 TEXTS = texts(
     {
         "left_out.obstacles": (
-            "obstacles: none are given, and the arm was checked against itself and what it carries only"
+            "obstacles: none are given, so the arm was checked only against itself and what it carries"
         ),
         "no_pass": "Not examined, and therefore no pass: {missed}.",
-        "left_out.bare_links": "what links hit to which no shape is given, and which lie within those of others",
+        "left_out.bare_links": "collisions of links without a shape that lie within the shapes of others",
         "left_out.uncovered_links": (
-            "what links hit that reach out of all shapes: they have none, or look larger than those that are checked"
+            "collisions of links that reach out of all shapes: they have none, or look larger than the shapes checked"
         ),
         "left_out.bare_tool": (
-            "what the tool, or a flange without one, hits: its point lies outside the last link's shapes, and the "
-            "scene gives it none"
+            "collisions of the tool (or bare flange): its point lies outside the last link's shapes, and the scene "
+            "gives it no shape"
         ),
         "left_out.allowed_contacts": "collisions that the scene's or the robot's file allows",
         "left_out.arm_errors": "what the arm's own errors add to a grasp's: the file states none",
@@ -34,29 +34,29 @@ TEXTS = texts(
         ),
         "left_out.scene_shapes": "whether what stands in the cell is shaped and placed as the scene's file says",
         "left_out.shallow_overlaps": "overlaps of less than {amount:g} mm between the points measured",
-        "left_out.own_speeds": "speeds that the joints can really do: no document gives them, and others are assumed",
-        "left_out.jerk": "jerk: nothing bounds it",
-        "left_out.torques": "torques, payload and what the arm bends: the stage dynamics examines torques and payload",
+        "left_out.own_speeds": "the joints' real speeds: no document gives them, so speeds are assumed",
+        "left_out.jerk": "jerk: no limit is given",
+        "left_out.torques": "torques, payload and deflection of the arm (torques and payload: see the stage dynamics)",
         "left_out.paths": "paths that were not followed to their end",
-        "left_out.path_stretches": "stretches that the bounds between the poses solved leave open",
+        "left_out.path_stretches": "stretches that the computed bounds can't decide",
         "left_out.strategies": "avoidance strategies that the study does not ask for",
         "left_out.program_lines": "lines of programs that were not examined, or not each time",
-        "left_out.program_rest": "lines of programs that may move the arm and that none of their paths holds",
+        "left_out.program_rest": "lines of programs that may move the arm but belong to no path checked",
         "left_out.given_rates": (
             "velocities, accelerations and efforts that trajectory files give: between the points, motions are laid "
             "by positions and times alone, and a controller that follows the given rates moves otherwise there"
         ),
         "left_out.program_starts": "motions from where the arm is not known to stand",
         "left_out.outer_axes": "axes beside the arm's, which are taken to be at rest",
-        "left_out.controller_language": "which robot language the controller takes",
+        "left_out.controller_language": "whether the controller takes this robot language",
         "left_out.controller_ramps": "the controller's own ramps and blends, which decide times and corners",
         "left_out.joint_vectors": "joint vectors other than {amount:,.0f} random ones: shares are estimates",
         "left_out.lost_cells": "whether {amount:,.0f} cells in which no clear arm was found are really blocked",
-        "left_out.link_masses": "what links without mass add to the torques; they count as massless",
+        "left_out.link_masses": "torques of links whose mass is not given; they count as massless",
         "left_out.peak_torques": "peak torques of drives whose limit no document gives",
         "left_out.rated_torques": "RMS and holding torques of drives whose rated torque no document gives",
-        "left_out.rotor_inertias": "what rotors add to the torques: their inertias are not known",
-        "left_out.friction": "what friction adds to the torques: it is not known",
+        "left_out.rotor_inertias": "torques of the rotors: their inertias are not known",
+        "left_out.friction": "friction in the joints: it is not known",
         "left_out.wrist_limits": "payload, moments and inertias that the wrist allows, where no document gives them",
         "left_out.load": "tool and payload: the study doesn't give their masses, or not all of them",
         "left_out.paths_not_run": "paths that may not be run as they are: motors and limits don't count them",
@@ -78,9 +78,9 @@ TEXTS = texts(
         "left_out.within_cells": "places within a cell of {amount:.0f} mm beside the one that an arm was found for",
         "left_out.targets": "targets without a solution within the limits",
         "left_out.turns": "other turns of the joints in solutions of targets, as there are many targets",
-        "left_out.carried": "what the flange carries hits: no shape of a tool or workpiece is given",
+        "left_out.carried": "collisions of a tool or workpiece: no shape of one is given",
         "left_out.carried_shapes": "whether what the flange carries is shaped and held as the scene's file says",
-        "left_out.tool": "a tool: none is given, and the flange's centre stands for its tip",
+        "left_out.tool": "the tool: none is given, so the flange's centre is taken as its tip",
         "left_out.plans": "motions for which the planner found none within its tries; there may be one",
         "left_out.references": "quantities that no reference states, or for which the robot's file gives no value",
         "left_out.loose_references": (
@@ -109,7 +109,7 @@ TEXTS = texts(
         "left_out.hidden_voids": (
             "what voids lie in the {amount:.0f} % of the volume that so few proof_cells leave undecided"
         ),
-        "left_out.area": "the area that the tool point reaches: none was computed, or one of its bounds",
+        "left_out.area": "the area that the tool point reaches, or one of its bounds",
         "left_out.sampled_voids": "whether {amount:.0f} voids that are known from samples only are empty",
         "left_out.tool_directions": "tool directions between the {amount:,.0f} that were asked in each cell",
         "left_out.capability": "tool directions, and where a box can stand",
@@ -120,7 +120,7 @@ TEXTS = texts(
             "points and directions between those asked, at {amount:,.0f} places for the box that pass by samples only"
         ),
         "left_out.between_places": "places for the box between grid points {amount:.0f} mm apart",
-        "left_out.base_contacts": "whether the base is mounted where it overlaps these solids, as is taken for granted",
+        "left_out.base_contacts": "whether the base is mounted where it overlaps these solids, as is assumed",
         "left_out.base_inside": "collisions of the base, whose middle lies in these solids: scene or base is misplaced",
         "left_out.box_directions": (
             "directions of the box's cone: the arm's joints don't set them all, and those that they don't are not asked"

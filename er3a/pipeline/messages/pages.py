@@ -17,7 +17,7 @@ FOUNDATIONS: Mapping[str, str] = {
         "Never use this table: evidence contradicts it. These results hold for the table, not for the robot: run no "
         "path, repair or program that was made by it."
     ),
-    "caution": N_("Validation leaves part of this D-H table open: these results are only as good as the table."),
+    "caution": N_("Part of this D-H table is not settled: these results are only as good as the table."),
     "no_reference": N_("This D-H table was compared with no data: these results are only as good as the table."),
     "not_computed": N_("This D-H table was not validated: these results are only as good as the table."),
 }
@@ -72,14 +72,14 @@ GLOSSARY = {
         "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
     ),
     N_("up to signs"): N_(
-        "of a settled table entry: to be kept as it is; only once an open entry is another one, another sign or half "
-        "turn here does as well"
+        "of a settled table entry: keep it; should an open entry turn out otherwise, another sign or half turn here "
+        "may fit as well"
     ),
     N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
     N_("margin"): N_("how far something is from a limit, in its unit"),
     N_("capability"): N_("what the tool can do at a place: share of directions, solutions, dexterity"),
     N_("void"): N_("a region that the tool point can't reach: enclosed, or an open pocket"),
-    N_("undecided"): N_("what the bounds between two solved poses can't decide; never called safe"),
+    N_("undecided"): N_("what the computed bounds can't decide; never called safe"),
     N_("allowed collision matrix"): N_(
         "which pairs of bodies are checked for collisions: pairs that never collide are proven so, adjacent "
         "ones touch at their joint only; all others are checked"
@@ -184,20 +184,6 @@ def decision(
     if table == "caution":
         return tr("Use it with care: nothing contradicts its table, but part of it is not settled.")
     return tr("There is no evidence on its table: check it before you use it.")
-
-
-def what_it_can_do(stages: Mapping[str, Sequence[str]]) -> str:
-    """What the arm is good for, from the titles of its stages but validation by their status."""
-    said = {
-        "fail": N_("Fails: {stages}."),
-        "caution": N_("With care: {stages}."),
-        "pass": N_("Nothing fails in {stages}."),
-        "unknown": N_("Not known: {stages}."),
-    }
-    known = dict(stages) | {"unknown": [*stages.get("no_reference", ()), *stages.get("not_computed", ())]}
-    return joined(
-        [tr(text, stages=joined(known[status], ", ")) for status, text in said.items() if known.get(status)], " "
-    )
 
 
 @dataclass(frozen=True)

@@ -219,7 +219,7 @@ TEXTS = texts(
         "target_not_given": "the target is not known: {reason}",
         "target_out_of_reach": "the target is out of reach: {reasons:; }",
         "target_out_of_reach.bare": "the target is out of reach",
-        "way_out_of_reach": "out of reach after {at_mm:.1f} mm; where it lacks most, {reasons}",
+        "way_out_of_reach": "out of reach after {at_mm:.1f} mm; at worst, {reasons}",
         "configuration_ends": (
             "the configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {angle_deg:.1f} {unit}"
         ),
@@ -228,11 +228,11 @@ TEXTS = texts(
         "passes_singularity": "passes the {type} singularity at {distance:.2f} deg, after {at:.1f} mm",
         "passes_singularity.mm": "passes the {type} singularity at {distance:.1f} mm, after {at:.1f} mm",
         "faster_than_assumed": (
-            "J{joint} would need {needed_deg_s:.0f} {unit}/s; {assumed_deg_s:g} {unit}/s are assumed, as no document "
+            "J{joint} would need {needed_deg_s:.0f} {unit}/s; assumed limit {assumed_deg_s:g} {unit}/s, as no document "
             "gives its speed"
         ),
         "accelerates_more_than_assumed": (
-            "J{joint} would need {needed_deg_s2:.0f} {unit}/s²; {assumed_deg_s2:g} {unit}/s² are assumed"
+            "J{joint} would need {needed_deg_s2:.0f} {unit}/s²; assumed limit {assumed_deg_s2:g} {unit}/s²"
         ),
         "configuration_changes": "the configuration changes from {before} to {after}",
         "arrives_otherwise": (
@@ -341,16 +341,15 @@ TEXTS = texts(
             "the target."
         ),
         "remedy.collision#solid": (
-            "Move the target away from {name} if the arm overlaps it there; if only the way there does, lead the tool "
-            "round it by a via point."
+            "If the arm overlaps {name} at the target, move the target away; if only on the way there, add a via point "
+            "around it."
         ),
         "remedy.collision#links": (
-            "Keep these links apart: give the target another place, tool orientation or configuration, or lead the "
-            "tool there by a via point."
+            "Keep these links apart: give the target another place, tool orientation or configuration, or add a via "
+            "point."
         ),
         "remedy.joint_jumps#stays": (
-            "If the tool is to stay here, leave this line out; if the joint is meant to turn, turn it where there is "
-            "room."
+            "If the tool should stay here, leave this line out; if the joint should turn, turn it where there is room."
         ),
         "remedy.joint_jumps#moves": "Teach the target with this joint near to where it comes from.",
         "remedy.slower": (

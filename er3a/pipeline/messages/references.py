@@ -54,19 +54,18 @@ STATUS_WORDS = {
 STATUS_MEANINGS = {
     "settled": N_("keep it: what independent documents leave open moves the tool by less than the tolerance"),
     "settled_up_to_signs": N_(
-        "keep it: every arm that the documents allow can be written with this value; once an open entry is another "
-        "one, so it can with another sign or half turn here"
+        "keep it: this value fits every arm that the documents allow; should an open entry turn out otherwise, another "
+        "sign or half turn here may fit as well"
     ),
     "weak": N_(
         "measure it: independent documents depend on it, but what they leave open moves the tool by more than the "
         "tolerance"
     ),
     "contradicted": N_("don't use it: the evidence excludes the value"),
-    "consistent": N_("check it on the arm: no document but its own source covers it"),
+    "consistent": N_("check it on the arm: only the table's own source gives it"),
     "open": N_("measure it: no document distinguishes it from another value that moves the tool"),
     "gauge": N_(
-        "keep it: not determined alone; changed together with other entries it describes the same robot; counted once, "
-        "by the sum that documents speak of"
+        "keep it: another value, with other entries changed to match, describes the same robot; only their sum counts"
     ),
     "given": N_("chosen by the author of the file"),
 }
@@ -127,8 +126,8 @@ TEXTS = texts(
         ),
         "time_joint": "time a long turn of joint {joint} at full speed, to ±{half_width_deg_s:g} deg/s",
         "not_the_robot_described": (
-            "This is not the robot that these describe: {against:; }. Positions that they give differ by up to "
-            "{mismatch_mm:.0f} mm; the best of {tried} corrections at one or two places still leaves {left_mm:.1f} mm."
+            "This is not the robot that these describe: {against:; }. Positions differ by up to {mismatch_mm:.0f} mm; "
+            "the best correction of one or two entries (of {tried} tried) still leaves {left_mm:.1f} mm."
         ),
         "measure_angle#offset": (
             "measure the angle {own_entry} of joint {joint} at the zero mark, to ±{half_width:g} deg"
@@ -145,8 +144,8 @@ TEXTS = texts(
         "look_at_motion_from": "jog +J{joint} from ({own_pose}) deg and see whether {motion} (forward is +x)",
         "look_at_motion": "jog +J{joint} from the zero pose and see whether {motion} (forward is +x)",
         "inconsistent_with_own_text": (
-            "The table contradicts its own text ({against:; }): {entry} would have to be {needed:g} {unit} instead of "
-            "{given:g}. That makes it agree with itself; it says nothing about any real robot."
+            "The table contradicts its own text ({against:; }): to agree with it, {entry} would have to be {needed:g} "
+            "{unit} instead of {given:g}. This is no evidence about a real robot."
         ),
         "inconsistent_unexplained": (
             "The table contradicts its own text: {own_documents}; no single sign or quarter turn makes them agree."

@@ -102,7 +102,7 @@ TEXTS = texts(
         "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
         "path.singular": "{type} singularity",
-        "path.too_fast_until": "{cause} (the worst, up to t = {end:.4g} s)",
+        "path.too_fast_until": "{cause} (until t = {end:.4g} s)",
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
@@ -126,7 +126,7 @@ TEXTS = texts(
             "to the arm"
         ),
         "advice.within_reach#later": (
-            "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path), but something is wrong before: from "
+            "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path), but has another fault before: from "
             "t = {first:.4g} s, {what}"
         ),
         "advice.sound": (
@@ -140,28 +140,26 @@ TEXTS = texts(
             "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, which may be "
             "wrong by {wrong:g} mm."
         ),
-        "advice.chosen": "{way}: {tool}, and {time}",
-        "advice.chosen#clear": "{way}: {tool}, {time}, and the arm keeps {clearance:.1f} mm of clearance",
-        "advice.near": "The arm is near-singular at the start, so no part of it is advised",
+        "advice.chosen": "{way}: {tool}; {time}",
+        "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
+        "advice.near": "The arm is near-singular at the start, so no part of the path is recommended",
         "advice.region": "It still passes near the singular pose",
-        "advice.full_speed": "A joint moves at its full speed: begin slowly",
+        "advice.full_speed": "A joint moves at full speed: start slowly",
         "advice.limits#both": (
-            "It takes up to {speed:.0f} % of the joints' speeds and {acceleration:.0f} % of their accelerations, which "
-            "are both assumed"
+            "It uses up to {speed:.0f} % of the assumed joint speeds and {acceleration:.0f} % of the assumed "
+            "accelerations"
         ),
-        "advice.limits#speed": "It takes up to {speed:.0f} % of the joints' speeds, which are assumed",
-        "advice.limits#acceleration": (
-            "It takes up to {acceleration:.0f} % of the joints' accelerations, which are assumed"
-        ),
+        "advice.limits#speed": "It uses up to {speed:.0f} % of the assumed joint speeds",
+        "advice.limits#acceleration": "It uses up to {acceleration:.0f} % of the assumed joint accelerations",
         "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
         "advice.tool#none": "the tool stays on the path",
         "advice.tool#far": "the tool leaves the path by {far} mm",
         "advice.tool#turned": "the tool leaves the path by {turned} deg",
-        "advice.swing": "{tool}, J{joint} turns most, by {swing:.0f} deg",
-        "advice.time#less": "it takes {takes:.2f} s instead of the {programmed:.2f} s programmed",
-        "advice.time#same": "it takes as long as programmed",
-        "advice.time#slower_there": "it takes as long as programmed, slower there and faster elsewhere",
-        "advice.time#more": "it takes {longer:.2f} s more than programmed",
+        "advice.swing": "{tool}; J{joint} turns most, by {swing:.0f} deg",
+        "advice.time#less": "{takes:.2f} s instead of {programmed:.2f} s",
+        "advice.time#same": "same time as programmed",
+        "advice.time#slower_there": "same time as programmed, slower there and faster elsewhere",
+        "advice.time#more": "{longer:.2f} s longer than programmed",
     }
 )
 
@@ -332,8 +330,8 @@ def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-ar
 
 
 def first_faults(path: PathSummary) -> list[tuple[float, str]]:
-    """When (s) a path is wrong first, and how, for each kind of fault, the earliest first; what is undecided only where
-    it comes before all that is not."""
+    """When (s) a path is wrong first, and how; then the gravest fault, if that is a later one. What is undecided counts
+    only where it comes before all that is not."""
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
     kinds: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions, *fast]
     firsts = [min(each, key=lambda part: part.t0_s) for each in kinds if each]
@@ -345,7 +343,7 @@ def first_faults(path: PathSummary) -> list[tuple[float, str]]:
     open_ = min(path.undecided, key=lambda part: part.t0_s, default=None)
     if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
         found.append((open_.t0_s, cause_text(path, open_)))
-    return sorted(found)
+    return sorted({min(found), found[0]}) if found else []
 
 
 def _until_when(part: Stretch[RateCause]) -> str:
@@ -377,7 +375,8 @@ def advice(
             return joined([no_way, _until(path, sound)], ". ")
         parts = {"way": word("advice", ADVICE, only.name), "reason": reasons(only)}
         return sentence("advice.only", **parts)
-    return joined([sentence("advice.none", why=why), _within_reach(path), _until(path, sound)], ". ")
+    none = _within_reach(path) or sentence("advice.none", why=why)
+    return joined([none, _until(path, sound)], ". ")
 
 
 def _until(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> str:

@@ -12,7 +12,7 @@ from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.messages.language import N_, as_text, own_title, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_WORDS, quoted
-from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
     Claims,
@@ -88,26 +88,28 @@ TEXTS = texts(
             "{passed} of {total} independent and {same_passed} of {same_total} consistency checks pass"
         ),
         "validation.left_open#up_to": (
-            "If open or weak entries are wrong, the tool is off by up to {mm:.0f} mm and {deg:.0f} deg."
+            "If an open or weak entry is wrong, the tool is off by up to {mm:.0f} mm and {deg:.0f} deg."
         ),
         "validation.left_open#at_least": (
-            "If open or weak entries are wrong, the tool is off by {mm:.0f} mm and {deg:.0f} deg, or by more."
+            "If an open or weak entry is wrong, the tool is off by {mm:.0f} mm and {deg:.0f} deg or more."
         ),
         "validation.left_open#turned": (
-            "If open or weak entries are wrong, the tool is where it should be, but turned by up to {deg:.0f} deg."
+            "If an open or weak entry is wrong, the tool's position is right, but it is turned by up to {deg:.0f} deg."
         ),
         "validation.left_open#turned_at_least": (
-            "If open or weak entries are wrong, the tool is where it should be, but turned by {deg:.0f} deg, or "
-            "by more."
+            "If an open or weak entry is wrong, the tool's position is right, but it is turned by {deg:.0f} deg or "
+            "more."
         ),
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
-        "validation.left_open#uncontradicted": "Nothing independent contradicts the table ({checks}), but:",
+        "validation.left_open#uncontradicted": (
+            "No independent document contradicts this table ({checks}), but not all of it is settled."
+        ),
         "validation.missed#contradicted": (
             "The model contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}; "
             "{checks}."
         ),
         "validation.missed#described": (
-            "Against the {grades} data in {own_set} the {quantity} is {measured}, not {expected}; {checks}."
+            "With this table the {quantity} is {measured}; the {grades} data in {own_set} give {expected}. {checks}."
         ),
         "validation.missed#another_arm": (
             "This is not the arm that the {grades} data in {own_set} describe: the {quantity} is {measured}, not "
@@ -127,22 +129,22 @@ TEXTS = texts(
         "validation.confirmed": (
             "Independent documents settle every entry that moves the tool: {checks} ({grades} data)."
         ),
-        "validation.left_open#parts": "{parts}.",
+        "validation.left_open#parts": "Settled: {parts}.",
         "validation.left_open#tolerance": (
-            "Settled: what is left open moves the tool by less than {mm} mm and {deg} deg."
+            "“Settled” means: what the documents leave open moves the tool by less than {mm} mm and {deg} deg."
         ),
         "validation.left_open#measurement": "Most useful measurement: {next_measurement}.",
         "validation.left_open#unbounded": (
-            "Besides, {names} rest on their own source alone: the tool could be off by any amount if it is wrong there."
+            "Only the table's own source gives {names}: if one of them is wrong, the tool could be off by any amount."
         ),
-        "validation.left_open#conflicting": "{count} undecided, as documents contradict each other",
-        "part_found#settled": "{part}: {settled} of {entries} entries settled",
-        "part_found#up_to_signs": "{count} more up to signs (keep them too)",
-        "part_found#excluded": "excluded: {names}",
+        "validation.left_open#conflicting": "{count} undecided, because documents contradict each other",
+        "part_found#settled": "{part} {settled} of {entries}",
+        "part_found#up_to_signs": "{count} of them up to signs",
+        "part_found#excluded": "contradicted: {names}",
         "part_found#open": "open: {names}",
         "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
-        "validation.another_arm": "They exclude {names}.",
+        "validation.another_arm": "Contradicted entries: {names}.",
         "contradiction#more": (
             "The references contradict each other about the {subject} ({stated}) and {more} more, which is not "
             "counted against the model: measure that on the arm before you rely on either."
@@ -216,8 +218,7 @@ def _of_claims(found: JudgedTable) -> list[str]:
 
 @say.register
 def _(found: LeftOpen) -> str:
-    parts = [say(part) for part in found.parts if part.status != "settled"]
-    sentences = [_what_speaks(found.counts), say_as(found, "parts", parts=joined(parts)) if parts else ""]
+    sentences = [_what_speaks(found.counts), settled_parts(found)]
     if found.tolerance and any(part.settled or part.up_to_signs for part in found.parts):
         sentences.append(
             say_as(found, "tolerance", mm=as_text(found.tolerance.mm, "g"), deg=as_text(found.tolerance.deg, "g"))
@@ -226,6 +227,12 @@ def _(found: LeftOpen) -> str:
     if found.next_measurement:
         sentences.append(say_as(found, "measurement"))
     return joined([*sentences, *_contradiction(found.contradiction), *_of_claims(found)], " ")
+
+
+def settled_parts(found: LeftOpen) -> str:
+    """How many entries of each part of a table are settled, and which are open."""
+    parts = [say(part) for part in found.parts if part.part == "geometry" or part.status != "settled"]
+    return sentence("validation.left_open#parts", parts=joined(parts)) if parts else ""
 
 
 def how_far_off(found: LeftOpen) -> list[str]:
@@ -252,12 +259,12 @@ def _what_speaks(counts: CheckCounts) -> str:
 
 @say.register
 def _(found: PartFound) -> str:
-    part, settled = word("part", PART_WORDS, found.part), found.settled
-    counts = say_as(found, "settled", part=part, settled=settled)
+    part, settled = word("part", PART_WORDS, found.part), found.settled + found.up_to_signs
+    signs = say_as(found, "up_to_signs", count=found.up_to_signs) if found.up_to_signs else ""
+    counts = bracketed(say_as(found, "settled", part=part, settled=settled), signs)
     excluded = say_as(found, "excluded", names=shortened(found.contradicted))
     left = say_as(found, "open", names=shortened(found.open))
-    signs = say_as(found, "up_to_signs", count=found.up_to_signs) if found.up_to_signs else ""
-    parts = [counts, signs, excluded if found.contradicted else "", left if found.open else ""]
+    parts = [counts, excluded if found.contradicted else "", left if found.open else ""]
     return joined(parts, ", ")
 
 

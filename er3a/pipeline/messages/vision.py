@@ -141,7 +141,7 @@ TEXTS = texts(
             "{count} more only if shapes that no document gives are right ({assumed:, })",
         ),
         "grasp_counts#error": "at the worst grasp 95 % of errors stay below {point_mm:.2g} mm",
-        "grasp_counts#simulated": "The camera is simulated: no real one took the samples.",
+        "grasp_counts#simulated": "The camera's samples are simulated.",
         "grasp_counts#left_out": "calibrated without {left_out:, }",
         "grasp_unlikely": (
             "the gripper's tolerance is kept with a probability of {p:.3g} % at best, and {level:.3g} % is required"

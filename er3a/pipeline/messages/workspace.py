@@ -85,8 +85,8 @@ TEXTS = texts(
             "proof, and the samples can't tell."
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm, where the arm "
-            "can't fold to; no enclosed void elsewhere points to a wrong joint range."
+            "An enclosed void of at least {litres:.3g} L surrounds the shoulder at ({x}, {y}, {z}) mm: the arm can't "
+            "fold far enough to reach it. No enclosed void elsewhere suggests a wrong joint range."
         ),
         "workspace.no_void#sampled": "The samples leave no enclosed void inside the hull; no proof.",
         "workspace.no_void#undecided": (
@@ -131,12 +131,10 @@ TEXTS = texts(
         "workspace.voids": Plural("count", "{count} enclosed void", "{count} enclosed voids"),
         "workspace.rule": Plural(
             "count",
-            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: "
-            "{count} enclosed void lies away from the shoulder. Relaxing one limit at a time names joint 2 or 3 "
-            "in {named} of {count} cases.",
-            "The rule that an unexpected hole points to a wrong limit or direction of joint 2 or 3 was applied: "
-            "{count} enclosed voids lie away from the shoulder. Relaxing one limit at a time names joint 2 or 3 "
-            "in {named} of {count} cases.",
+            "An enclosed void away from the shoulder often means a wrong limit or direction of joint 2 or 3. {count} "
+            "was found; widening one limit at a time points to joint 2 or 3 for {named} of them.",
+            "An enclosed void away from the shoulder often means a wrong limit or direction of joint 2 or 3. {count} "
+            "were found; widening one limit at a time points to joint 2 or 3 for {named} of them.",
         ),
         "inverse_unknown": "no method here finds all inverse solutions of this arm",
         "joint_one_shared": (
@@ -159,42 +157,46 @@ TEXTS = texts(
             "Not on {name} itself: an arm that reaches all of the box comes within {margin} mm of the scene or of "
             "itself."
         ),
-        "stand.between": "On a stand {gap} mm high ({least} to {most} mm would do) on {name}: centre at ({centre}) mm.",
+        "stand.between": "On a stand {gap} mm high ({least} to {most} mm work too) on {name}: centre at ({centre}) mm.",
         "void.shoulder": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder, {extent} mm, centre "
-            "at ({centre}) mm."
-        ),
-        "void.away": (
-            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder, {extent} mm, "
-            "centre at ({centre}) mm."
-        ),
-        "void.cause#it": "Its cause: it {cause}.",
-        "void.cause#noun": "Its cause: {cause}.",
-        "void.expected": "It belongs to the arm: put nothing there, and leave the limits as they are.",
-        "void.pocket": (
-            "Larger, but open to the outside, so no enclosed void: a pocket of {lower:.3g} to {upper:.3g} L, centre at "
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L around the shoulder: {extent} mm, centre "
             "({centre}) mm."
         ),
-        "void.more": Plural("count", "{count} other enclosed one besides.", "{count} other enclosed ones besides."),
-        "box.size#turned": "{box} mm, turned by 90 deg so that x, y, z are {xyz} mm",
+        "void.away": (
+            "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder: {extent} mm, centre "
+            "({centre}) mm."
+        ),
+        "void.cause#it": "It {cause}.",
+        "void.cause#noun": "Its cause: {cause}.",
+        "void.expected": "This is normal for the arm: put no target there, and leave the limits as they are.",
+        "void.pocket": (
+            "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, centre "
+            "({centre}) mm."
+        ),
+        "void.more": Plural(
+            "count", "There is {count} other enclosed void.", "There are {count} other enclosed voids."
+        ),
+        "box.size#turned": "{box} mm, turned by 90 deg (x, y, z: {xyz} mm)",
         "box.size#as_given": "{box} mm (x, y, z)",
         "box.unknown": "Box of {box} mm: {why}",
-        "box.nowhere": "Box of {box} mm: no place was found that the tool serves throughout.",
-        "box.put#on": "Box of {box}: put it on {name}, its centre at ({centre}) mm; {reached}. "
-        "The box is not checked as an obstacle.",
+        "box.nowhere": "Box of {box} mm: no place was found where the tool reaches all of it.",
+        "box.put#on": (
+            "Put the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. Collisions with the box were "
+            "not checked."
+        ),
         "box.put#over": (
-            "Box of {box}: put it on a stand {gap} mm high ({least} to {most} mm would do) on {name}, whose top is at "
-            "z = {height} mm, its centre at ({centre}) mm; {reached}. It can't stand directly on {none}. Box and "
-            "stand are not checked as obstacles."
+            "Put the box on a stand {gap} mm high ({least} to {most} mm work too) on {name} (top at z = {height} mm), "
+            "its centre at ({centre}) mm. Box: {box}; {reached}. Directly on {none} no place works. Collisions with "
+            "box and stand were not checked."
         ),
         "box.put#free": (
-            "Box of {box}: put its centre at ({centre}) mm; {reached}. No surface is known there. The box "
-            "is not checked as an obstacle."
+            "Put the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; {reached}. "
+            "Collisions with the box were not checked."
         ),
-        "box.proven#all": "the tool point is proven to reach all of it",
-        "box.proven#upper": "the tool point is proven to reach all of it from {served_from} mm above its underside on",
-        "box.sampled#all": "the tool reaches all points sampled",
-        "box.sampled#upper": "the tool reaches all points sampled from {served_from} mm above its underside on",
+        "box.proven#all": "the tool point reaches all of it (proven)",
+        "box.proven#upper": "the tool point reaches all of it but the lowest {served_from} mm (proven)",
+        "box.sampled#all": "the tool point reaches all points sampled in it",
+        "box.sampled#upper": "the tool point reaches all points sampled in it but for the lowest {served_from} mm",
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
             "cone."

@@ -31,9 +31,9 @@ from er3a.pipeline.messages.collision import near_shapes
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import N_, own_title, tr
 from er3a.pipeline.messages.left_out import left_out_text
-from er3a.pipeline.messages.pages import caveat, decision, next_step, what_it_can_do
+from er3a.pipeline.messages.pages import caveat, decision, next_step
 from er3a.pipeline.messages.say import bracketed, joined, say
-from er3a.pipeline.messages.validation import CONVENTIONS, how_far_off, missed_text, shortened
+from er3a.pipeline.messages.validation import CONVENTIONS, how_far_off, missed_text, settled_parts, shortened
 from er3a.pipeline.messages.workspace import box_text, void_text
 from er3a.pipeline.results import (
     AbsentResults,
@@ -578,13 +578,6 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         if StageVerdict(name, stage, head.status, head.finding.code, "", expected=expected.get(stage)).counts("fail")
     }
     table = heads["validation"].status if "validation" in heads else NOT_EXAMINED
-    by_status: dict[str, list[str]] = {}
-    for stage, head in heads.items():
-        if stage != "validation":
-            simulated = any(each.subject == "real_camera" for each in head.summary.not_examined)
-            title = tr(STAGES[stage].title)
-            by_status.setdefault(head.status, []).append(bracketed(title, tr("simulated") if simulated else ""))
-    by_status.setdefault("not_computed", []).extend(tr(STAGES[stage].title) for stage in stages if stage not in heads)
     finding = heads["validation"].finding if "validation" in heads else None
     same_arm, instead = isinstance(finding, DefinedOtherwise), alternative_table(study, name, results.parent)
     unproven, settled = _settled(finding)
@@ -596,7 +589,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "decision": decision(table, [*failed.values()], instead, unproven=unproven, same_arm=same_arm),
         "settled": settled,
         "instead": {instead: f"#{instead}"} if instead else {},
-        "can": what_it_can_do(by_status),
+        "simulated": [stage for stage, head in heads.items() if _misses(head, "real_camera")],
         "answers": [*_answers(heads, robot)],
         "runs": [
             _run(stage, stored[stage].results, box=_puts_box(heads))
@@ -629,11 +622,8 @@ def _proposed(finding: object) -> dict[str, str]:
     seen = N_("If so, {entry} is right; if not, turn its sign in the robot's file, and run again.")
     settles = seen if proposal.code == "look_at_motion" else N_("It settles {entry}.")
     step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]))]
-    joints = [part for part in finding.parts if part.part in ("limits", "speeds")]
-    left = {*finding.unbounded, *(name for part in finding.parts if part not in joints for name in part.open)} - {entry}
-    if left:
-        step.append(tr("Then these, each with its own check: {entries}.", entries=shortened(sorted(left))))
-    step += [page.whole_sentence(say(part)) for part in joints if part.settled < part.entries]
+    if finding.unbounded or any(part.settled + part.up_to_signs < part.entries for part in finding.parts):
+        step.append(tr("Then check the other entries that are not settled."))
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
 
@@ -645,9 +635,8 @@ def _settled(finding: object) -> tuple[bool, str]:
     if not isinstance(finding, LeftOpen):
         return False, ""
     part = next((part for part in finding.parts if part.part == "geometry"), None)
-    unsettled = joined([say(each) for each in finding.parts if each is part or each.status != "settled"])
-    settled = page.whole_sentence(unsettled) if unsettled else ""
-    return part is not None and not (part.settled or part.up_to_signs), joined([settled, *how_far_off(finding)], " ")
+    said = joined([settled_parts(finding), *how_far_off(finding)], " ")
+    return part is not None and not (part.settled or part.up_to_signs), said
 
 
 def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str, str]]:
@@ -655,17 +644,19 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
     workspace = heads["workspace"].summary if "workspace" in heads else None
     if workspace:
         box = box_text(workspace)
-        if box and any(each.subject == "tool" for each in workspace.not_examined):
-            box = joined([box, tr("The tool point is the flange's centre: no tool is given.")], " ")
-        if _puts_box(heads) and {*RUNS} & heads.keys():
-            said = tr("What is called sound here knows nothing of this box, nor of a stand below it.")
-            box = joined([box, said], " ")
+        if box and _misses(heads["workspace"], "tool"):
+            box = joined([box, tr("No tool is given: the tool point is the flange's centre.")], " ")
         yield tr("Tray or box"), box, "workspace.html#placement"
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
         place = "#table-voids" if getattr(workspace, "voids", ()) else ""
         yield tr("Void"), void_text(workspace), f"workspace.html{place}"
+
+
+def _misses(head: Head, subject: str) -> bool:
+    """Whether a stage left something out."""
+    return any(each.subject == subject for each in head.summary.not_examined)
 
 
 def _puts_box(heads: Mapping[str, Head]) -> bool:
@@ -687,14 +678,13 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults, *, box: bool)
     faulty = {fault.name for fault in faults}
     sound = [each.name for each in followed if each.name not in faulty]
     left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
-    open_ = joined([*left_out, tr("the tray or box and its stand") if box else ""])
     return {
         "stage": stage,
         "count": len(followed) + lost,
         "lost": lost,
         "sound": sound,
         "faults": faults,
-        "open": open_,
+        "open": [*left_out, *([tr("the tray or box and its stand")] if box else [])],
     }
 
 

@@ -361,11 +361,12 @@ def closed_up(html: str) -> str:
 
 
 def led(text: str) -> tuple[str, str]:
-    """A verdict's text up to the end of a sentence or clause, and the rest; empty for a short text."""
-    ends = [found.end() for found in re.finditer(r"[.;](?= )|[。；]", text[:LED])]
-    if len(text) <= WHOLE or not ends:
+    """A verdict's text up to the end of a sentence, or else of a clause, and the rest; empty for a short text."""
+    ends = [[found.end() for found in re.finditer(end, text[:LED])] for end in (r"\.(?= )|。", r";(?= )|；")]
+    cut = next((found[-1] for found in ends if found), 0)
+    if len(text) <= WHOLE or not cut:
         return text, ""
-    first, rest = text[: ends[-1]], text[ends[-1] :].strip()
+    first, rest = text[:cut], text[cut:].strip()
     if first[-1] in ".。":
         return first, rest
     return whole_sentence(first[:-1]), rest[:1].upper() + rest[1:]  # a clause becomes a sentence

@@ -75,7 +75,9 @@ OTHER_TEXTS = {
         "Of all tables that meet the independent documents this is the nearest that was found; what differs is marked. "
         "Values are one choice within what the documents leave open, with as few decimals as that allows."
     ),
-    "allowed": N_("It meets every document as well: all that is open is changed at once; what differs is marked."),
+    "allowed": N_(
+        "The documents fit this table just as well: they can't tell which of the two is right. Differences are marked."
+    ),
 }
 
 

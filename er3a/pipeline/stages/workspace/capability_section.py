@@ -41,11 +41,10 @@ def best_text(summary: model.WorkspaceSummary, placement: model.PlacementSummary
     place = placement.best
     texts = [
         box_text(summary),
-        tr("Collisions are judged at samples.") if place.status == "proven" else "",
+        tr("Other collisions were checked at samples only.") if place.status == "proven" else "",
         tr("It can be moved by {room} mm, one direction at a time.", room=_room(place)) if _movable(place) else "",
         _nearest_limit(place),
         _nearest_bodies(place),
-        tr("The box itself does not count as an obstacle."),
     ]
     return joined(texts, " ")
 
@@ -63,7 +62,7 @@ def _nearest_bodies(place: model.PlaceSummary) -> str:
     if place.clearance_mm is None or place.clearance_pair is None:
         return ""
     pair, far = say(place.clearance_pair), fixed(place.clearance_mm, 0)
-    return tr("The least clearance is {far} mm, between {pair}.", pair=pair, far=far)
+    return tr("The smallest clearance is {far} mm, between {pair}.", pair=pair, far=far)
 
 
 def _movable(place: model.PlaceSummary) -> bool:
