@@ -187,7 +187,7 @@ def clearance_along(
     every = np.arange(len(bodies.pairs))
     if not every.size:
         return ClearanceAlong(shown, np.full(len(shown), np.nan), (None,) * len(shown), (), 0)
-    times, q, way = _fine(motion, t, 2 * depth)
+    times, q, travel = _fine(motion, t, 2 * depth)
     reached = np.isfinite(q[:, 0])
     for i in np.flatnonzero(np.isin(times, shown) & reached):
         motion.measure(times[i], q[i], every)
@@ -196,7 +196,7 @@ def clearance_along(
         for end in (first, last - 1):
             motion.measure(times[end], q[end], every)
         part = slice(first, last)
-        _refine(motion, times[part], q[part], way[part], 2 * depth)
+        _refine(motion, times[part], q[part], travel[part], 2 * depth)
         contacts += _contacts(motion, times[part], q[part], (t[-1] - t[0]) * LOCATED)
     at = np.array(sorted(time for time, found in motion.known.items() if not np.isnan(found).any()))
     at = np.union1d(at, shown[~np.isin(shown, at)])
@@ -243,7 +243,7 @@ def _steps(motion: _Motion, times: Reals, q: Reals) -> Reals:
     return moved
 
 
-def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) -> None:
+def _refine(motion: _Motion, times: Reals, q: Reals, travel: Reals, step: float) -> None:
     """Measure between known points until each pair is free in all of an interval, or overlaps in it, or it is short."""
     every = np.arange(len(motion.bodies.pairs))
     known = [i for i, time in enumerate(times) if time in motion.known]
@@ -253,7 +253,7 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
     while waiting:
         a, b, pairs = waiting.pop()
         before, after = motion.known[times[a]], motion.known[times[b]]
-        moved = (way[b] - way[a])[motion.track[pairs]]
+        moved = (travel[b] - travel[a])[motion.track[pairs]]
         if b - a < 2:
             continue
         apart = before[pairs] + after[pairs]
@@ -261,7 +261,9 @@ def _refine(motion: _Motion, times: Reals, q: Reals, way: Reals, step: float) ->
         if not (~free & (apart > -moved) & (moved > step)).any():
             continue
         pairs = pairs[~free]
-        middle = int(np.clip(np.searchsorted(way[a : b + 1].sum(axis=1), way[[a, b]].sum() / 2) + a, a + 1, b - 1))
+        middle = int(
+            np.clip(np.searchsorted(travel[a : b + 1].sum(axis=1), travel[[a, b]].sum() / 2) + a, a + 1, b - 1)
+        )
         found = motion.measure(times[middle], q[middle], pairs)
         least = float(np.nanmin(bodies.counted(found)))
         if least < best:

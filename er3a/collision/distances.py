@@ -730,9 +730,9 @@ def overlap_depth(first: Reals, second: Reals) -> float:
     return _depth_of_all(first, second)
 
 
-def _farthest(first: Reals, second: Reals, ways: Reals) -> Reals:
+def _farthest(first: Reals, second: Reals, directions: Reals) -> Reals:
     """The points (k, 3) of the difference that lie farthest in the directions (k, 3)."""
-    return np.asarray(first[(ways @ first.T).argmax(axis=1)] - second[(ways @ second.T).argmin(axis=1)])
+    return np.asarray(first[(directions @ first.T).argmax(axis=1)] - second[(directions @ second.T).argmin(axis=1)])
 
 
 def _depth_of_all(first: Reals, second: Reals) -> float:

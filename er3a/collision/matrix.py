@@ -451,14 +451,10 @@ def _guide(robot: Robot, pair: tuple[Body, Body]) -> tuple[Reals, Reals, float] 
         return None
     carrier = poses[outer.link - 1]
     thick = float(away(outer.points @ carrier[:3, :3].T + carrier[:3, 3]).max()) + outer.radius
-    slide = _in_frame(start, point, axis)
+    slide = start[:3, :3].T @ (point - start[:3, 3]), start[:3, :3].T @ axis
     if thick > inner.radius or beside_axis(inner, *slide, inner.radius) == [inner]:
         return None
     return *slide, AROUND_GUIDE * (inner.radius + thick)
-
-
-def _in_frame(T: Reals, point: Reals, axis: Reals) -> tuple[Reals, Reals]:
-    return T[:3, :3].T @ (point - T[:3, 3]), T[:3, :3].T @ axis
 
 
 def _joined(

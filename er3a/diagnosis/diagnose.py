@@ -409,10 +409,10 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
         return conclusions.TooSmallToTell(candidates, best.residual_before, factor * best.residual_before, best.unit)
     figures = best.residual_before, best.residual_after, best.unit
     named = _concluded(best, best.indistinguishable_from)
-    return named or conclusions.NoFewFaultsExplain(tried, *figures, _least_left(ranking, best.unit))
+    return named or conclusions.NoFewFaultsExplain(tried, *figures, _best_left(ranking, best.unit))
 
 
-def _least_left(ranking: Ranking, unit: Unit) -> float:
+def _best_left(ranking: Ranking, unit: Unit) -> float:
     """The least that any hypothesis leaves of the largest difference in a unit."""
     left, _, units = residuals(ranking, ranking.pool.difference)
     return float(left[:, [each == unit for each in units]].max(axis=1).min())
@@ -436,7 +436,7 @@ def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypoth
     after = pool.difference[best]
     before_lengths, _, units = residuals(ranking, ranking.before)
     after_lengths, _, _ = residuals(ranking, after)
-    unit = _telling_unit(ranking, after, uncertainty)
+    unit = _worst_unit(ranking, after, uncertainty)
     of_unit = np.array([each == unit for each in units])
     greatest = [float(lengths[of_unit].max()) for lengths in (before_lengths, after_lengths)]
     return Hypothesis(
@@ -453,7 +453,7 @@ def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypoth
     )
 
 
-def _telling_unit(ranking: Ranking, after: Reals, uncertainty: Reals) -> Unit:
+def _worst_unit(ranking: Ranking, after: Reals, uncertainty: Reals) -> Unit:
     """mm if any length is missed before or after, else the first unit in which something is."""
     missed = (np.abs(ranking.before) > uncertainty) | (np.abs(after) > uncertainty)
     found = [reference.unit for reference, off in zip(ranking.references, missed) if off]

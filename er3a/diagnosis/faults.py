@@ -172,17 +172,15 @@ Faults = tuple[Fault, ...]
 CONVENTIONS = WrongOffset, ReversedDirection, BaseElsewhere, FlangeElsewhere, CountedFromGround
 """What can be chosen without changing the arm."""
 
-SIGNIFICANT_GIVEN, SIGNIFICANT_FITTED = 6, 4
-
 
 def rounded(fault: Fault) -> Fault:
     """The fault with fitted numbers to four digits and given ones to six: equal ones are the same fault."""
     if isinstance(fault, WrongLength):
-        return replace(fault, given_mm=_given(fault.given_mm), fits_mm=_fitted(fault.fits_mm))
+        return replace(fault, given_mm=_digits(fault.given_mm, 6), fits_mm=_digits(fault.fits_mm, 4))
     if isinstance(fault, WrongOffset | WrongAlpha | WrongAlphaSign | WrongLimit):
-        return replace(fault, given_deg=_given(fault.given_deg), fits_deg=_fitted(fault.fits_deg))
+        return replace(fault, given_deg=_digits(fault.given_deg, 6), fits_deg=_digits(fault.fits_deg, 4))
     if isinstance(fault, WrongScale):
-        return WrongScale(_given(fault.factor))
+        return WrongScale(_digits(fault.factor, 6))
     return fault
 
 
@@ -207,14 +205,6 @@ def entry_of(fault: Fault) -> str | None:
 def place_of(fault: Fault) -> str | Fault:
     """The entry that a fault is in; the fault itself if it is in several."""
     return entry_of(fault) or rounded(fault)
-
-
-def _given(value: float) -> float:
-    return _digits(value, SIGNIFICANT_GIVEN)
-
-
-def _fitted(value: float) -> float:
-    return _digits(value, SIGNIFICANT_FITTED)
 
 
 def _digits(value: float, count: int) -> float:
@@ -252,15 +242,18 @@ def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repa
     ----------
     references : a limit that they contradict is a repair, with the value that they state
     """
-    joints = range(given.a.shape[-1])
+    joints, alphas = range(given.a.shape[-1]), np.degrees(given.alpha[0]).tolist()
     candidates = [
         *limit_repairs(given, references),
         *_units(),
-        *_signs(given, joints),
+        *(Repair(WrongAlphaSign(j + 1, alpha, -alpha), _negated("alpha", j)) for j, alpha in enumerate(alphas)),
         *_swaps(joints),
         *_offsets(given, joints),
-        *_directions(joints),
-        *_convention(given),
+        *(Repair(ReversedDirection(j + 1), _negated("direction", j)) for j in joints),
+        Repair(
+            WrongConvention("modified" if given.modified[0] else "standard"),
+            lambda tables: replace(tables, modified=~tables.modified),
+        ),
         *_limits(joints),
     ]
     return [repair for repair in candidates if _differs(repair.apply(given), given)]
@@ -336,14 +329,6 @@ def _scaled(columns: tuple[str, ...], factor: float) -> Change:
     return lambda tables: replace(tables, **{name: getattr(tables, name) * factor for name in columns})
 
 
-def _signs(given: Tables, joints: range) -> list[Repair]:
-    found = []
-    for j in joints:
-        alpha = float(np.degrees(given.alpha[0, j]))
-        found.append(Repair(WrongAlphaSign(j + 1, alpha, -alpha), _negated("alpha", j)))
-    return found
-
-
 def _negated(column: str, joint: int) -> Change:
     return lambda tables: tables.with_column(column, [joint], -getattr(tables, column)[:, [joint]])
 
@@ -393,15 +378,6 @@ def _offsets(given: Tables, joints: range) -> list[Repair]:
 
 def _offset_moved(joint: int, angle: float) -> Change:
     return lambda tables: tables.with_column("offset", [joint], tables.offset[:, [joint]] + angle)
-
-
-def _directions(joints: range) -> list[Repair]:
-    return [Repair(ReversedDirection(j + 1), _negated("direction", j)) for j in joints]
-
-
-def _convention(given: Tables) -> list[Repair]:
-    fault = WrongConvention("modified" if given.modified[0] else "standard")
-    return [Repair(fault, lambda tables: replace(tables, modified=~tables.modified))]
 
 
 _LIMIT_FAULTS: tuple[tuple[LimitFault, Callable[[Reals, Reals], tuple[Reals, Reals]]], ...] = (

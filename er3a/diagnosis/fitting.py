@@ -147,7 +147,8 @@ class Fits:
     @property
     def squares(self) -> Reals:
         """Sum of squared residuals, (B,)."""
-        return _squares(self.left)
+        squares: Reals = np.einsum("bn,bn->b", self.left, self.left)
+        return squares
 
     @property
     def greatest(self) -> Reals:
@@ -249,11 +250,6 @@ def _solved(slopes: Reals, left: Reals, weights: Reals, damping: Reals) -> Reals
     return solved
 
 
-def _squares(left: Reals) -> Reals:
-    squares: Reals = np.einsum("bn,bn->b", left, left)
-    return squares
-
-
 @dataclass(frozen=True)
 class ScanGrid:
     """How finely to look.
@@ -283,7 +279,7 @@ def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanG
     for combination in combinations:
         numbers = [search.numbers[place] for place in combination]
         values = [grid_of(number, grid) for number in numbers]
-        scales = np.stack([reach if _is_length(number) else np.ones(starts) for number in numbers], axis=1)
+        scales = np.stack([reach if number.column in ("a", "d") else np.ones(starts) for number in numbers], axis=1)
         points = np.array(list(product(*values)))
         amounts.append((points * scales[:, None, :]).reshape(-1, len(combination)))
         which.append(np.tile(np.array(combination), (starts * len(points), 1)))
@@ -310,10 +306,6 @@ def arm_lengths(tables: Tables) -> Reals:
     """Sum (m) of all lengths of each table, (H,)."""
     lengths: Reals = np.abs(tables.a).sum(axis=1) + np.abs(tables.d).sum(axis=1)
     return np.where(lengths > 0, lengths, 1.0)
-
-
-def _is_length(number: FreeNumber) -> bool:
-    return number.column in ("a", "d")
 
 
 def _lowest(heights: Reals, cyclic: Sequence[bool], count: int) -> Integers:

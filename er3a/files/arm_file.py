@@ -131,16 +131,21 @@ def write_urdf_references(
     document = robot_name(path)
     mm = max(LEAST_MM, float(np.ceil(found.half_width_m * MM * 1e3)) / 1e3)
     deg = max(LEAST_DEG, float(np.ceil(np.degrees(found.half_width_rad) * 1e3)) / 1e3)
-    behind = (f"{path.name}, chain to the tip", "export", document)
+    limited = np.isfinite(found.lower) & np.isfinite(found.upper) & (found.lower < found.upper)
+    ends = np.column_stack([found.lower, found.upper])
+    moving = np.isfinite(found.speed) & (found.speed > 0)
     tables: dict[str, Table] = {
-        FILE: [("name", "title", "publisher", "derived_from"), (document, f"URDF {path.name}", path.name, "")],
-        "axes.csv": _axes(found, (mm, deg), behind),
-        "positions.csv": _positions(found, (mm, deg), behind),
-        "limits.csv": _limits(found, behind),
-        "speeds.csv": _speeds(found, behind),
+        "axes.csv": _axes(found, mm, deg),
+        "positions.csv": _positions(found, mm, deg),
+        "limits.csv": _joint_rows(("lower_deg", "upper_deg", "uncertainty_deg"), limited, ends, found),
+        "speeds.csv": _joint_rows(("speed_deg_s", "uncertainty_deg_s"), moving, found.speed[:, None], found),
     }
+    source = (f"{path.name}, chain to the tip", "export", document, "yes")
+    documents: Table = [("name", "title", "publisher", "derived_from"), (document, f"URDF {path.name}", path.name, "")]
     written = []
-    for name, rows in tables.items():
+    for name, (header, *rows) in tables.items():
+        tables[name] = [(*header, *SOURCE), *((*row, *source) for row in rows)]
+    for name, rows in {FILE: documents, **tables}.items():
         if len(rows) > 1:
             text = io.StringIO()
             csv.writer(text, lineterminator="\n").writerows(rows)
@@ -153,59 +158,41 @@ def write_urdf_references(
 SOURCE = ("source", "grade", "origin", "units_checked")
 
 
-def _rows(header: Sequence[str], rows: Sequence[Sequence[object]], behind: Sequence[str]) -> Table:
-    return [(*header, *SOURCE), *((*row, *behind, "yes") for row in rows)]
-
-
-def _axes(found: UrdfStatements, half_widths: tuple[float, float], behind: Sequence[str]) -> Table:
+def _axes(found: UrdfStatements, mm: float, deg: float) -> Table:
     header = ("joint", "direction_x", "direction_y", "direction_z", "x_mm", "y_mm", "z_mm", "signed")
-    rows = []
+    rows: Table = [(*header, "uncertainty_mm", "uncertainty_deg")]
     for joint, (direction, point) in enumerate(zip(found.directions, found.points), 1):
         place = ("", "", "") if found.sliding[joint - 1] else _written(MM * point, DIGITS_MM)
-        rows.append((joint, *_written(direction, DIGITS_AXIS), *place, "yes", *half_widths))
-    return _rows((*header, "uncertainty_mm", "uncertainty_deg"), rows, behind)
+        rows.append((joint, *_written(direction, DIGITS_AXIS), *place, "yes", mm, deg))
+    return rows
 
 
-def _positions(found: UrdfStatements, half_widths: tuple[float, float], behind: Sequence[str]) -> Table:
+def _positions(found: UrdfStatements, mm: float, deg: float) -> Table:
     joints = found.q.shape[1]
     further = max(joints, len(ZERO_POSE))
     header = ("name", "point", *(f"q{joint}_deg" for joint in range(1, further + 1)), "x_mm", "y_mm", "z_mm")
-    rows = []
+    rows: Table = [(*header, "uncertainty_mm", "roll_deg", "pitch_deg", "yaw_deg", "uncertainty_deg")]
     for place, (q, T) in enumerate(zip(found.q, found.flanges)):
         pose = [*_written(np.where(found.sliding, MM * q, np.degrees(q)), DIGITS_MM), *[0.0] * (further - joints)]
         turn = _written(np.degrees(rpy_of(T)), DIGITS_DEG)
         name = "zero pose" if not place else f"pose {place}"
-        rows.append((name, "flange", *pose, *_written(MM * T[:3, 3], DIGITS_MM), half_widths[0], *turn, half_widths[1]))
-    header = (*header, "uncertainty_mm", "roll_deg", "pitch_deg", "yaw_deg", "uncertainty_deg")
-    return _rows(header, rows, behind)
+        rows.append((name, "flange", *pose, *_written(MM * T[:3, 3], DIGITS_MM), mm, *turn, deg))
+    return rows
 
 
-def _limits(found: UrdfStatements, behind: Sequence[str]) -> Table:
-    stated = np.isfinite(found.lower) & np.isfinite(found.upper) & (found.lower < found.upper)
-    ends = np.column_stack([found.lower, found.upper])
-    return _joint_rows(("lower_deg", "upper_deg", "uncertainty_deg"), stated, ends, found, behind)
-
-
-def _speeds(found: UrdfStatements, behind: Sequence[str]) -> Table:
-    stated = np.isfinite(found.speed) & (found.speed > 0)
-    return _joint_rows(("speed_deg_s", "uncertainty_deg_s"), stated, found.speed[:, None], found, behind)
-
-
-def _joint_rows(
-    columns: tuple[str, ...], stated: Flags, values: Reals, found: UrdfStatements, behind: Sequence[str]
-) -> Table:
+def _joint_rows(columns: tuple[str, ...], stated: Flags, values: Reals, found: UrdfStatements) -> Table:
     """A row for each joint of which values (n, k), rad or m, are stated; those of slides in columns of their own."""
     slides = stated & found.sliding
     blank = ("",) * len(columns)
-    rows = []
+    further = tuple(name.replace("_deg", "_mm") for name in columns) if slides.any() else ()
+    rows: Table = [("joint", *columns, *further)]
     for joint in np.flatnonzero(stated).tolist():
         if slides[joint]:
             rows.append((joint + 1, *blank, *_written(MM * values[joint], DIGITS_MM), LIMITS_MM))
         else:
             row = (joint + 1, *_written(np.degrees(values[joint]), DIGITS_MM), LIMITS_DEG)
             rows.append((*row, *blank) if slides.any() else row)
-    further = tuple(name.replace("_deg", "_mm") for name in columns) if slides.any() else ()
-    return _rows(("joint", *columns, *further), rows, behind)
+    return rows
 
 
 LIMITS_DEG, LIMITS_MM = 0.05, 0.5  # three decimals of a radian or a metre, as URDFs print limits

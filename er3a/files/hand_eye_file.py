@@ -64,11 +64,6 @@ def pose_form(path: Path, header: list[str], stream: str) -> str | None:
     return forms[0] if forms else None
 
 
-def pose_columns(stream: str, form: str) -> dict[str, CsvColumn]:
-    """The columns of a stream."""
-    return {f"{stream}_{name}": CsvColumn() for name in (*POSITION, *FORMS[form])}
-
-
 def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> Reals:
     """Poses (N, 4, 4), m.
 
@@ -349,7 +344,7 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
     columns |= {f"q{joint + 1}_deg": CsvColumn() for joint in range(joints)}
     for stream in ("flange", "target"):
         if form := pose_form(table, header, stream):
-            columns |= pose_columns(stream, form)
+            columns |= {f"{stream}_{name}": CsvColumn() for name in (*POSITION, *FORMS[form])}
     if not columns:
         first = ", ".join(header)[:SHOWN_HEADER]
         apart = next((word for mark, word in SEPARATORS.items() if len(header) == 1 and mark in header[0]), None)

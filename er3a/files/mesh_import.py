@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from er3a.collision.meshes import ConvexPieces, convex_pieces
+from er3a.collision.meshes import convex_pieces
 from er3a.files.kept_files import sha256, write_atomically
 from er3a.files.pieces_file import PiecesFile, checksum_of
 from er3a.formats.mesh_file import Unit, read_mesh
@@ -34,7 +34,8 @@ def import_mesh(source: Path, output: Path, unit: Unit, threshold: float, seed: 
         triangles=len(mesh.faces),
         threshold=threshold,
         seed=seed,
-        uncovered_mm=_rounded_up(found),
+        # with what rounding the corners may take away
+        uncovered_mm=float(np.ceil(found.uncovered * 1000 * 10**DIGITS) + 2) / 10**DIGITS,
         excess_mm=round(found.excess * 1000, DIGITS),
         sha256=checksum_of(rounded),
         pieces_mm=rounded,
@@ -42,8 +43,3 @@ def import_mesh(source: Path, output: Path, unit: Unit, threshold: float, seed: 
     text = json.dumps(content.model_dump(), indent=1) + "\n"
     write_atomically(output, lambda file: file.write_text(text, encoding="utf-8"))
     return content
-
-
-def _rounded_up(found: ConvexPieces) -> float:
-    """The bound in mm, with what rounding the corners may take away."""
-    return float(np.ceil(found.uncovered * 1000 * 10**DIGITS) + 2) / 10**DIGITS

@@ -23,7 +23,7 @@ from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.robot_file import Name
 from er3a.files.units import JointsDeg, PositionMm, Triple, as_degrees, joint_values
 from er3a.files.yaml_file import StrictModel, check_own_names, load, parse
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
+from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, posed, rot_y, rot_z, transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
 from er3a.robots.robot import MOST_JOINTS, Robot
@@ -86,7 +86,6 @@ def _target(row: dict[str, Any], form: str, reference: tuple[str, ...]) -> dict[
 MOST_TARGETS = 20_000
 UNIT_LENGTH_TOLERANCE = 1e-6
 EULER_KEY = re.compile(r"euler\w*|[xyz]{3}(_(deg|rad))?", re.IGNORECASE)
-ORIENTATION_FORMS = ("rpy_deg", "zyz_deg", "quaternion_wxyz", "matrix")
 
 Angles = Annotated[Triple, as_degrees("give the orientation as a quaternion or a matrix")]
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
@@ -146,13 +145,13 @@ class Orientation(StrictModel):
 
     def forms(self) -> list[str]:
         """The forms that are given."""
-        return [key for key in ORIENTATION_FORMS if getattr(self, key) is not None]
+        return [key for key in FORMS if getattr(self, key) is not None]
 
     def check_one_form(self) -> None:
         """``ValueError`` if there is none, or more than one."""
         forms = self.forms()
         if not forms:
-            raise ValueError(f"the orientation is missing | Add one of {', '.join(ORIENTATION_FORMS)}")
+            raise ValueError(f"the orientation is missing | Add one of {', '.join(FORMS)}")
         if len(forms) > 1:
             raise ValueError(f"the orientation is given twice, as {' and '.join(forms)} | Keep one")
 
@@ -160,18 +159,15 @@ class Orientation(StrictModel):
         """The pose (4, 4) with this orientation at a position (3,) in m."""
         if self.rpy_deg is not None:
             return transform(position, np.radians(self.rpy_deg))
-        T = np.eye(4)
-        T[:3, 3], T[:3, :3] = position, self._rotation_matrix()
-        return T
-
-    def _rotation_matrix(self) -> NDArray[np.float64]:
         if self.zyz_deg is not None:
-            first, second, third = (transform(np.zeros(3), turn)[:3, :3] for turn in _zyz_turns(self.zyz_deg))
-            return first @ second @ third
-        if self.quaternion_wxyz is not None:
-            return scipy.spatial.transform.Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
-        u, _, vt = np.linalg.svd(np.array(self.matrix))
-        return u @ vt
+            a, b, c = np.radians(self.zyz_deg)
+            R = rot_z(a)[:3, :3] @ rot_y(b)[:3, :3] @ rot_z(c)[:3, :3]
+        elif self.quaternion_wxyz is not None:
+            R = scipy.spatial.transform.Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
+        else:
+            u, _, vt = np.linalg.svd(np.array(self.matrix))
+            R = u @ vt
+        return posed(R, position)
 
 
 class TargetEntry(Orientation):
@@ -279,15 +275,7 @@ def _targets_of_table(path: Path) -> tuple[TargetEntry, ...]:
         where = re.match(r"targets\[(\d+)\]\.?(\w*)", error.field or "")
         if where is None:
             raise InputError(path, "rows", error.problem, error.remedy) from None
-        column = f", column {', '.join(_columns_of(where[2]))}" if where[2] else ""
+        columns = {"xyz_mm": POSITION, "q_ref_deg": REFERENCE, **FORMS}.get(where[2], (where[2],))
+        column = f", column {', '.join(columns)}" if where[2] else ""
         problem = re.sub(r"targets\[(\d+)\]", lambda other: f"row {lines[int(other[1])]}", error.problem)
         raise InputError(path, f"row {lines[int(where[1])]}{column}", problem, error.remedy) from None
-
-
-def _columns_of(field: str) -> tuple[str, ...]:
-    return {"xyz_mm": POSITION, "q_ref_deg": REFERENCE, **FORMS}.get(field, (field,))
-
-
-def _zyz_turns(zyz_deg: list[float]) -> NDArray[np.float64]:
-    a, b, c = np.radians(zyz_deg)
-    return np.array([[0, 0, a], [0, b, 0], [0, 0, c]])

@@ -132,6 +132,13 @@ def inverse_right_jacobian(v: Reals) -> Reals:
     return J
 
 
+def frame_along(axis: Reals) -> Reals:
+    """A right-handed frame whose last row is a unit axis (3,); rows are its directions."""
+    x = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(axis, x), axis])
+
+
 def transposed(R: Reals) -> Reals:
     """The last two axes swapped."""
     return np.swapaxes(R, -1, -2)

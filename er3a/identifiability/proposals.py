@@ -27,7 +27,7 @@ BENT_DEG = 45.0
 LENGTH_MM, ANGLE_DEG, LIMIT_DEG, SPEED_SHARE = 1.0, 0.5, 0.5, 0.02
 SHARE_OF_TOLERANCE = 0.4
 SETTLED = ("settled", "settled_up_to_signs", "given", "gauge", "contradicted")
-WAYS_TO_LOOK: tuple[tuple[Point, Manner], ...] = (
+OBSERVATIONS: tuple[tuple[Point, Manner], ...] = (
     ("flange", "tilts"),
     ("flange", "moves"),
     ("wrist_centre", "moves"),
@@ -133,7 +133,7 @@ def _look(evidence: Evidence, entry: TableNumber) -> LookAtMotion | None:
     tables = join([tables_of(robot), *(each.table for each in (*others, *own))])
     unaffected = len(others) + 1
     for pose in _poses(robot):
-        for point, manner in WAYS_TO_LOOK:
+        for point, manner in OBSERVATIONS:
             if FRAME_OF_POINT[point] > robot.rows:
                 continue
             motions = [SeenMotion(pose, entry.joint, point, seen) for seen in SEEN]

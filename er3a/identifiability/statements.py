@@ -80,7 +80,7 @@ def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRob
     foreign = [
         reference
         for reference in references.checkable
-        if reference.authoritative and _foreign(robot, reference, references.documents)
+        if reference.authoritative and not made_from_table(robot, reference.document, references.documents)
     ]
     ranking = rank(robot, foreign) if foreign else None
     if ranking is None:
@@ -142,10 +142,6 @@ def _one_change(robot: Robot, asked: Asked) -> tuple[TableNumber | None, Tables 
 def _documents_of(robot: Robot) -> Sequence[str]:
     """Those that lengths, twists and offsets were taken from."""
     return tuple(dict.fromkeys(document_of(robot, entry) for entry in continuous_of(robot)))
-
-
-def _foreign(robot: Robot, reference: Reference, documents: Documents) -> bool:
-    return not made_from_table(robot, reference.document, documents)
 
 
 def _own_text(robot: Robot, reference: Reference, documents: Documents) -> bool:

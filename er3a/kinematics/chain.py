@@ -16,6 +16,8 @@ References
 
 from __future__ import annotations
 
+from itertools import accumulate
+
 import numpy as np
 
 from er3a.errors import Er3aError
@@ -154,15 +156,17 @@ def poses_of(links: Reals, q: Reals, prismatic: Flags | None = None) -> Reals:
 
 def axes_of(links: Reals) -> tuple[Reals, Reals]:
     """Directions (n, 3) and points (n, 3) of the joint axes with all joints at 0."""
-    frames = np.array([chained for chained in _partial_products(links[:-1])])
+    frames = np.array(list(accumulate(links[:-1], np.matmul)))
     return frames[:, :3, 2], frames[:, :3, 3]
 
 
-def _partial_products(links: Reals) -> list[Reals]:
-    products = [links[0]]
-    for link in links[1:]:
-        products.append(products[-1] @ link)
-    return products
+def meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
+    """Point nearest to all lines by least squares, and its largest distance from a line (m)."""
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    found = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[:, :, None]).reshape(-1), rcond=None)[0]
+    meeting = found.astype(float)
+    miss = np.linalg.norm((across @ (meeting - points)[:, :, None])[..., 0], axis=1).max()
+    return meeting, float(miss)
 
 
 def size_of(links: Reals) -> float:

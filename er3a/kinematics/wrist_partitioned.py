@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from er3a.by_value import Finding
 from er3a.errors import NotWristPartitionedError
+from er3a.geometry.transforms import frame_along
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle, wrap_to_pi
 from er3a.kinematics import closed_form
 from er3a.kinematics.block_inverse import BlockConstants, block_constants
-from er3a.kinematics.chain import axes_at_zero_theta, constant_links, row_values
+from er3a.kinematics.chain import axes_at_zero_theta, constant_links, meeting_point, row_values
 from er3a.kinematics.classes.four_bar import solve_near_reference
 from er3a.kinematics.classes.parallel_axes import ThreeParallel, three_parallel
 from er3a.numerics.arrays import Reals, for_kernel
@@ -147,7 +148,7 @@ def recognised(axes: Reals, points: Reals, T_base_tool: Reals) -> WristPartition
     for i, j in ((0, 1), (3, 4), (4, 5)):
         if np.linalg.norm(np.cross(axes[i], axes[j])) < PARALLEL:
             return NeighboursParallel(i + 1, j + 1)
-    wrist, miss = _meeting_point(axes[3:], points[3:])
+    wrist, miss = meeting_point(axes[3:], points[3:])
     if miss > closed_form.BOUNDARY_M:
         return NoWristCentre(miss * 1000)
     across = np.eye(3) - np.outer(axes[1], axes[1])
@@ -175,15 +176,6 @@ def _couples_the_arm_alone(coupling: Reals) -> bool:
     return whole and np.array_equal(rest, np.eye(6))
 
 
-def _meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
-    """Point nearest to all lines by least squares, and its largest distance from a line (m)."""
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    found = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[:, :, None]).reshape(-1), rcond=None)[0]
-    meeting = found.astype(float)
-    miss = np.linalg.norm((across @ (meeting - points)[:, :, None])[..., 0], axis=1).max()
-    return meeting, float(miss)
-
-
 @derived
 def _constants(robot: Robot) -> closed_form.ArmConstants:
     return constants_of(wrist_partitioned_arm(robot))
@@ -192,8 +184,7 @@ def _constants(robot: Robot) -> closed_form.ArmConstants:
 def constants_of(arm: WristPartitionedArm) -> closed_form.ArmConstants:
     """The arm as the kernel takes it."""
     w = [_vector(axis) for axis in arm.axes]
-    beside_6 = np.cross(arm.axes[5], np.eye(3)[np.argmin(np.abs(arm.axes[5]))])
-    beside_6 /= np.linalg.norm(beside_6)
+    beside_6 = frame_along(arm.axes[5])[0]
     upper_arm, forearm = _vector(arm.upper_arm), _vector(arm.forearm)
     least = abs(arm.upper_arm_length - arm.forearm_length)
     angle_45, angle_56 = float(unsigned_angle(w[3], w[4])), float(unsigned_angle(w[4], w[5]))

@@ -115,10 +115,10 @@ def bent_laws(
     weights = np.where(np.arange(len(share)) == 0, 1e3, 1.0)  # the start may be given
     found = []
     for s, slot in enumerate(slots.tolist()):
-        way = _even_way(robot, margins[:, :, s], q[:, :, s])
-        if way is None:
+        steps = _smooth_angles(robot, margins[:, :, s], q[:, :, s])
+        if steps is None:
             continue
-        angles = first + TURN / ANGLES * way
+        angles = first + TURN / ANGLES * steps
         for degree in DEGREES:
             values = np.asarray(chebyshev.chebfit(2 * share - 1, angles, degree, w=weights), dtype=float)
             values[0] += angles[0] - chebyshev.chebval(-1.0, values)
@@ -136,7 +136,7 @@ def _margins_alone(robot: Robot, q: Reals) -> Reals:
     return np.where(np.isnan(q[..., 0]), -np.inf, limit_margin(robot, turned))
 
 
-def _even_way(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
+def _smooth_angles(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
     """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the smallest sum of
     squared steps that keeps half of the margin that one can keep; None if none keeps the limits.
 
@@ -345,7 +345,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
         raise PathEndsError(robot.name, "out_of_reach", _first_unreached(robot, path, times))
     near = np.zeros(robot.joints) if q_start is None else q_start
 
-    def way(law: ArmAngleLaw) -> tuple[Reals, Callable[[Reals], Reals]]:
+    def joints_by(law: ArmAngleLaw) -> tuple[Reals, Callable[[Reals], Reals]]:
         def rows_at(t: Reals) -> Reals:
             return _rows(robot, path, t, law.at(path.progress(t)[0]))
 
@@ -356,7 +356,7 @@ def _at_arm_angles(robot: Robot, path: ToolPath, q_start: Reals | None) -> Piece
         if not laws[0].bent:
             yield from bent_laws(robot, poses, share, begin, slots)
 
-    return _first_within_limits(robot, path, map(way, tried()), turns_open=q_start is None)
+    return _first_within_limits(robot, path, map(joints_by, tried()), turns_open=q_start is None)
 
 
 def _turned_to(robot: Robot, q: Reals, near: Reals) -> Reals:
@@ -382,13 +382,13 @@ def _first_unreached(robot: Robot, path: ToolPath, times: Reals) -> float:
 
 
 def _first_within_limits(
-    robot: Robot, path: ToolPath, ways: Iterable[tuple[Reals, Callable[[Reals], Reals]]], *, turns_open: bool
+    robot: Robot, path: ToolPath, candidates: Iterable[tuple[Reals, Callable[[Reals], Reals]]], *, turns_open: bool
 ) -> PiecewiseMotion:
     """The first of the motions from starts (n,), with what tells all rows (N, slots, n) at times, that keeps all
     limits; else the first one. ``turns_open`` tells whether whole turns of the starts may be changed."""
     found: list[PiecewiseMotion] = []
     ends: list[PathEndsError] = []
-    for start, rows_at in ways:
+    for start, rows_at in candidates:
         try:
             motion = _followed(robot, path, start, rows_at)
             motion = _turned_inwards(robot, motion) if turns_open else motion

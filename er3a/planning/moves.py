@@ -35,12 +35,12 @@ HALF_TURN_TOLERANCE = 1e-9
 
 @runtime_checkable
 class ToolPath(Protocol):
-    """A way of the tool in space, and when it is where: what :func:`er3a.planning.follow.follow` can follow.
+    """A path of the tool in space, and when it is where: what :func:`er3a.planning.follow.follow` can follow.
 
     Attributes
     ----------
     duration : s
-    length : of the tool point's way, m
+    length : of the tool point's path, m
     turned : by how much the tool turns in all, rad
     """
 
@@ -62,8 +62,8 @@ class ToolPath(Protocol):
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
         """Velocity of the tool per unit of progress, and its derivative by progress: (..., 6), m then rad, base."""
 
-    def way(self, progress: Reals) -> Reals:
-        """Length of the tool point's way so far, m, at shares of the way (...,)."""
+    def arc_length(self, progress: Reals) -> Reals:
+        """Length of the tool point's path so far, m, at shares of the way (...,)."""
 
     @property
     def law(self) -> TimeLaw: ...
@@ -133,7 +133,7 @@ class Segment(ByValue, ABC):
     @property
     @abstractmethod
     def length(self) -> float:
-        """Length of the tool point's way, m."""
+        """Length of the tool point's path, m."""
 
     @abstractmethod
     def points(self, progress: Reals) -> Reals:
@@ -164,7 +164,7 @@ class Segment(ByValue, ABC):
 
     @property
     def bend(self) -> float:
-        """Angle by which the tool point's way turns, rad."""
+        """Angle by which the tool point's path turns, rad."""
         return 0.0
 
     def twist_bounds(self, start: Reals, end: Reals) -> Reals:
@@ -185,7 +185,7 @@ class Segment(ByValue, ABC):
             raise Er3aError(f"progress runs from {ends}; expected shares of the way, 0 to 1. At times in s: at(t)")
         return turning_poses(self.T_start, self.points(progress), self.rotation, progress)
 
-    def way(self, progress: Reals) -> Reals:
+    def arc_length(self, progress: Reals) -> Reals:
         """See :class:`ToolPath`."""
         return self.length * np.asarray(progress)
 

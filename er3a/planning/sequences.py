@@ -261,8 +261,8 @@ class SegmentPath(ByValue):
 
     @property
     def length(self) -> float:
-        """Length of the tool point's way, m."""
-        return float(self.way(np.array(1.0)))
+        """Length of the tool point's path, m."""
+        return float(self.arc_length(np.array(1.0)))
 
     @property
     def edges(self) -> Reals:
@@ -313,7 +313,7 @@ class SegmentPath(ByValue):
         omega, slope = spin(x[..., 3:], dx[..., 3:], ddx[..., 3:])
         return np.concatenate([dx[..., :3], omega], axis=-1), np.concatenate([ddx[..., :3], slope], axis=-1)
 
-    def way(self, progress: Reals) -> Reals:
+    def arc_length(self, progress: Reals) -> Reals:
         """See :class:`er3a.planning.moves.ToolPath`; by Gauss quadrature with 12 points per piece."""
         progress = np.asarray(progress, float)
         edges = self.curve.edges
@@ -326,7 +326,7 @@ class SegmentPath(ByValue):
         return self.turns
 
     def _lengths(self, start: Reals, end: Reals) -> Reals:
-        """Length of the tool point's way (...,) between shares (...,) of the way, both on one piece."""
+        """Length of the tool point's path (...,) between shares (...,) of the way, both on one piece."""
         half = (end - start) / 2
         at = start[..., None] + half[..., None] * (1 + GAUSS_POINTS)
         speeds: Reals = np.linalg.norm(self._values(at)[1][..., :3], axis=-1)
@@ -447,7 +447,7 @@ def segment_path(
 
 
 def joint_sequence(points: Reals, blends: Reals, timing: float | Times, ramp: float | None = None) -> JointSequence:
-    """The way through joint angles ``points`` (n, 6) in rad; ``blends`` in rad of the joint that turns most.
+    """The path through joint angles ``points`` (n, 6) in rad; ``blends`` in rad of the joint that turns most.
 
     The rest is as for :func:`segment_path`.
     """

@@ -1,9 +1,9 @@
-"""How fast an arm can run along a way in joint space: time laws under speed and acceleration limits of the joints.
+"""How fast an arm can run along a path in joint space: time laws under speed and acceleration limits of the joints.
 
-A way is a chain of joint vectors, parametrised by the smallest time in which its steps could be done at full joint
+A path is a chain of joint vectors, parametrised by the smallest time in which its steps could be done at full joint
 speed. In that parameter no joint's slope exceeds its speed limit, however fast a joint has to turn per millimetre of
 the tool near a singularity. The time law is the fastest one under the limits, by TOPP-RA [1]_ (the toppra library); a
-programme may cap it, so that the way is run as programmed and slower only where the joints demand it.
+programme may cap it, so that the path is run as programmed and slower only where the joints demand it.
 
 References
 ----------
@@ -30,7 +30,7 @@ from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
 from er3a.planning.profiles import Rates
 from er3a.robots.robot import Robot
 
-LONGEST_STEP = 0.02  # share of the whole way between two nodes
+LONGEST_STEP = 0.02  # share of the whole path between two nodes
 SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full speeds
 SHORTEST_STEP = 2e-4  # s at full speed; bends sharper than this count as corners
 SAME_NODE = 1e-5  # s at full speed
@@ -40,7 +40,7 @@ SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
 class MustStandStill(Finding):
-    """The arm would have to stand still on the way."""
+    """The arm would have to stand still on the path."""
 
 
 class NoTimeLawFound(Finding):
@@ -205,12 +205,12 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
     TimingError
         if there is no such time law
     """
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0) / limits.speed).max(axis=1))])
+    s = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0) / limits.speed).max(axis=1))])
     elapsed = 0.0 if programmed is None else float(programmed[-1] - programmed[0])
-    if (path := path_through(q, way)) is None:
+    if (path := path_through(q, s)) is None:
         return standing(q[-1], elapsed)
-    kept, way, spline = path
-    cap = None if programmed is None or len(kept) == 2 else np.gradient(way, programmed[kept])
+    kept, s, spline = path
+    cap = None if programmed is None or len(kept) == 2 else np.gradient(s, programmed[kept])
     constraint = toppra_library().constraint
     speeds, accelerations = (np.stack([-most, most], axis=1) for most in (limits.speed, limits.acceleration))
     scheme = constraint.DiscretizationType.Interpolation  # at both ends of each step
@@ -219,25 +219,25 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
         constraint.JointAccelerationConstraint(accelerations, discretization_scheme=scheme),
         *([] if cap is None else [_programmed_speed(cap, q.shape[1])]),
     ]
-    speed, t = solved(toppra_path(way, spline), way, constraints)
-    return within_limits(polynomial_motion(run_along(way, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
+    speed, t = solved(toppra_path(s, spline), s, constraints)
+    return within_limits(polynomial_motion(run_along(s, spline, speed, t), t, SPLINE_DEGREE), limits, elapsed)
 
 
-def path_through(q: Reals, way: Reals) -> tuple[Integers, Reals, scipy.interpolate.CubicSpline] | None:
-    """The spline through nodes (N, n) that stand at ``way`` (N,), without those of one place; None of a single place.
+def path_through(q: Reals, s: Reals) -> tuple[Integers, Reals, scipy.interpolate.CubicSpline] | None:
+    """The spline through nodes (N, n) at path parameters ``s`` (N,), without those of one place; None of a single one.
 
     Returns
     -------
-    kept : which nodes are left; way : (k,), where they stand, or more places on a way between two; spline
+    kept : which nodes are left; s : (k,), where they stand, or more places on a path of two; spline
     """
-    kept = np.flatnonzero(np.concatenate([[True], np.diff(way) > SAME_NODE]))
+    kept = np.flatnonzero(np.concatenate([[True], np.diff(s) > SAME_NODE]))
     if len(kept) < 2:
         return None
-    kept[-1] = len(way) - 1  # the end stays the end
-    q, way = q[kept], way[kept]
-    if len(way) == 2:
-        q, way = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, way[1], STRAIGHT_NODES)
-    return kept, way, scipy.interpolate.CubicSpline(way, q)
+    kept[-1] = len(s) - 1  # the end stays the end
+    q, s = q[kept], s[kept]
+    if len(s) == 2:
+        q, s = np.linspace(q[0], q[1], STRAIGHT_NODES), np.linspace(0.0, s[1], STRAIGHT_NODES)
+    return kept, s, scipy.interpolate.CubicSpline(s, q)
 
 
 def within_limits(curve: PiecewiseMotion, limits: JointLimits, least: float = 0.0) -> Timed:
@@ -248,14 +248,14 @@ def within_limits(curve: PiecewiseMotion, limits: JointLimits, least: float = 0.
     return motion if factor <= 1 else Timed(curve.scaled(factor))
 
 
-def run_along(way: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
-    """The way run at speeds (N,) at its nodes at times (N,), evenly accelerated between them."""
-    pull = np.diff(speed**2) / (2 * np.diff(way))
+def run_along(s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
+    """The path run at speeds (N,) at its nodes at times (N,), evenly accelerated between them."""
+    pull = np.diff(speed**2) / (2 * np.diff(s))
 
     def rates(at: Reals) -> Rates:
         i = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(pull) - 1)
         since = at - t[i]
-        place = way[i] + since * (speed[i] + since * pull[i] / 2)
+        place = s[i] + since * (speed[i] + since * pull[i] / 2)
         pace, pull_here = (speed[i] + since * pull[i])[..., None], pull[i][..., None]
         slope = spline(place, 1)
         return spline(place), slope * pace, spline(place, 2) * pace**2 + slope * pull_here
@@ -315,13 +315,13 @@ def toppra_library() -> Any:
     return toppra
 
 
-def toppra_path(way: Reals, spline: scipy.interpolate.CubicSpline, at_rest: float = 0.0) -> Any:
+def toppra_path(s: Reals, spline: scipy.interpolate.CubicSpline, at_rest: float = 0.0) -> Any:
     """The path as toppra takes it; a joint whose slope is no more than ``at_rest`` is at rest and has no friction."""
     count: int = spline.c.shape[-1]
 
     class Path(toppra_library().interpolator.AbstractGeometricPath):  # type: ignore[misc]
         dof, waypoints = count, None
-        path_interval = np.array([way[0], way[-1]])
+        path_interval = np.array([s[0], s[-1]])
 
         def __call__(self, at: Reals, order: int = 0) -> Any:
             values = spline(at, order)
@@ -331,7 +331,7 @@ def toppra_path(way: Reals, spline: scipy.interpolate.CubicSpline, at_rest: floa
 
 
 def _programmed_speed(cap: Reals, joints: int) -> Any:
-    """The programme's speed along the way at its nodes (N,) as an upper bound."""
+    """The programme's speed along the path at its nodes (N,) as an upper bound."""
 
     class Programme(toppra_library().constraint.LinearConstraint):  # type: ignore[misc]
         def get_dof(self) -> int:
@@ -343,18 +343,18 @@ def _programmed_speed(cap: Reals, joints: int) -> Any:
     return Programme()
 
 
-def solved(path: Any, way: Reals, constraints: list[Any]) -> tuple[Reals, Reals]:
-    """Speeds along the way and times (s) at its nodes (N,), from rest to rest; :class:`TimingError` if there are none.
+def solved(path: Any, s: Reals, constraints: list[Any]) -> tuple[Reals, Reals]:
+    """Speeds along the path and times (s) at its nodes (N,), from rest to rest; :class:`TimingError` if there are none.
 
     Parameters
     ----------
     path : see :func:`toppra_path`; constraints : of toppra
     """
-    solver = toppra_library().algorithm.TOPPRA(constraints, path, gridpoints=way, solver_wrapper="seidel")
+    solver = toppra_library().algorithm.TOPPRA(constraints, path, gridpoints=s, solver_wrapper="seidel")
     _, speed, _ = solver.compute_parameterization(0, 0)
     if speed is None or not np.isfinite(speed).all():
         raise TimingError(NoTimeLawFound())
     between = (speed[:-1] + speed[1:]) / 2
     if (between <= 0).any():
         raise TimingError(MustStandStill())
-    return np.asarray(speed, float), np.concatenate([[0.0], np.cumsum(np.diff(way) / between)])
+    return np.asarray(speed, float), np.concatenate([[0.0], np.cumsum(np.diff(s) / between)])

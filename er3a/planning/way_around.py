@@ -314,8 +314,8 @@ def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | ToppraMissing
     for share in ROUNDINGS if len(corners) > 2 else (0.0,):
         blends = share * np.minimum(sides[:-1], sides[1:]) / 2
         try:
-            way = joint_sequence(corners, blends, 1.0)
-            yield _with_jerk(way, task.limits) if task.limits.jerk is not None else _quickest(way, task.limits)
+            route = joint_sequence(corners, blends, 1.0)
+            yield _with_jerk(route, task.limits) if task.limits.jerk is not None else _quickest(route, task.limits)
         except PathError:
             continue
         except TimingError as error:
@@ -323,20 +323,20 @@ def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | ToppraMissing
                 yield error.finding
 
 
-def _quickest(way: JointSequence, limits: JointLimits) -> Timed:
+def _quickest(route: JointSequence, limits: JointLimits) -> Timed:
     """As fast as speeds and accelerations allow, from halt to halt."""
-    law = way.law
+    law = route.law
     assert isinstance(law, FromRestToRest)
     parts = []
     for a, b in pairwise(law.progress.tolist()):
         count = max(9, round(NODES * (b - a)))
-        parts.append(fastest(way.curve(np.linspace(a, b, count))[0], limits))
+        parts.append(fastest(route.curve(np.linspace(a, b, count))[0], limits))
     return joined(parts)
 
 
-def _with_jerk(way: JointSequence, limits: JointLimits) -> Timed:
+def _with_jerk(route: JointSequence, limits: JointLimits) -> Timed:
     """On quintics from halt to halt, in the time in which speeds, accelerations and jerks keep their limits."""
-    curve = way.polynomials()
+    curve = route.polynomials()
     assert limits.jerk is not None
     speed, acceleration, jerk = (
         float((curve.greatest(series) / most).max())

@@ -32,7 +32,7 @@ from er3a.kinematics.wrist_partitioned import constants_for_blocks, wrist_partit
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
-from er3a.workspace.cell_frame import CellFrame, cell_frame, places_served, without_first_limits
+from er3a.workspace.cell_frame import cell_frame, places_served, without_first_limits
 from er3a.workspace.directions import across, left_to_roll, poses
 from er3a.workspace.orientations import AskedOrientations
 from er3a.workspace.section_proof import ring_volumes
@@ -105,7 +105,8 @@ def map_capability(robot: Robot, middles: Reals, count: int, asked: AskedOrienta
     frame, free = cell_frame(robot), left_to_roll(without_first_limits(robot), asked.roll)
     reachability, solutions, most, best = np.zeros((4, len(middles), frame.sectors))
     points = frame.points(middles[:, 0], np.zeros(len(middles)), middles[:, 1])
-    turned = _from_place_0(frame, asked)
+    # even directions are even about axis 1 in the cells' frame, whatever the base's is
+    turned = frame.R.T if asked.kind == "directions" else np.eye(3)
     per_cell = int(np.prod(asked.everywhere(points[:1], count).shape[1:3]))
     for start in range(0, len(middles), step := max(1, _POSES // per_cell)):
         part = slice(start, start + step)
@@ -118,11 +119,6 @@ def map_capability(robot: Robot, middles: Reals, count: int, asked: AskedOrienta
         bounds = low.reshape(shape), high.reshape(shape), frame.width, frame.bar > 0
         _tally(bounds, within.reshape(shape), values, out)
     return Capability(reachability, solutions, most, best)
-
-
-def _from_place_0(frame: CellFrame, asked: AskedOrientations) -> Reals:
-    """What turns even directions (3, 3): they are even about axis 1 in the cells' frame, whatever the base's is."""
-    return frame.R.T if asked.kind == "directions" else np.eye(3)
 
 
 def manipulability_of(robot: Robot, q: Reals, within: Flags) -> Reals:

@@ -385,7 +385,7 @@ def _of_table(robot: Robot) -> Iterator[Candidate]:
         if robot.upper[j] - robot.lower[j] < FULL_TURN:
             given = float(np.degrees(robot.offset[j]))
             for turn in TURNS_DEG:
-                yield "offset", j + 1, round(given, 9), round(_half_turn(given + turn), 9)
+                yield "offset", j + 1, round(given, 9), round(180.0 - (180.0 - (given + turn)) % 360.0, 9)
         if abs(robot.lower[j] + robot.upper[j]) > 1e-9:
             yield "direction", j + 1, float(robot.direction[j]), -float(robot.direction[j])
     for column, rows in SHAPING.items():
@@ -408,8 +408,3 @@ def _named(cause: VoidCause) -> Sequence[Relaxed]:
     if isinstance(cause, SeveralLimits | Geometry) and cause.most is not None:
         return (cause.most,)
     return ()
-
-
-def _half_turn(degrees: float) -> float:
-    """An angle within (-180, 180]."""
-    return 180.0 - (180.0 - degrees) % 360.0

@@ -228,9 +228,9 @@ def branches(
                     continue
                 whole = sound and holds(ranges, 4, low_5, high_5)
                 if ranges[3, 1] < np.inf or ranges[5, 1] < np.inf:
-                    way = 2.0 * flip - 1.0
-                    theta_4 = np.arctan2(way * fy, way * fx) - arm.turn_4
-                    theta_6 = np.arctan2(way * gy, -way * gx)
+                    sense = 2.0 * flip - 1.0
+                    theta_4 = np.arctan2(sense * fy, sense * fx) - arm.turn_4
+                    theta_6 = np.arctan2(sense * gy, -sense * gx)
                     if orthogonal:
                         if misses(ranges, 3, theta_4 - swing_46, theta_4 + swing_46):
                             continue

@@ -172,7 +172,7 @@ def _zone(arm: WristPartitionedArm, limits: list[tuple[float, float]]) -> tuple[
     if span_4 < FULL_TURN:
         on_axis = np.linalg.norm(np.cross(arm.axes[5], tool)) < ROUND_OFF * d
         square = max(abs(arm.axes[4] @ arm.axes[3]), abs(arm.axes[4] @ arm.axes[5])) < _MIRRORED
-        inner = _both_ways(arm, tool, limits[4]) if on_axis and square and span_4 >= np.pi else (1.0, -1.0)
+        inner = _both_directions(arm, tool, limits[4]) if on_axis and square and span_4 >= np.pi else (1.0, -1.0)
     return d, outer[0], outer[1], inner[0], inner[1]
 
 
@@ -201,7 +201,7 @@ def _cosines(arm: WristPartitionedArm, tool: Reals, range_5: Range, range_6: Ran
     return float(np.clip(low, -1, 1)), float(np.clip(high, -1, 1)), pad
 
 
-def _both_ways(arm: WristPartitionedArm, tool: Reals, range_5: Range) -> tuple[float, float]:
+def _both_directions(arm: WristPartitionedArm, tool: Reals, range_5: Range) -> tuple[float, float]:
     """With half a turn of joint 4, the tilts that joint 5 reaches both ways still have every azimuth."""
     aligned = np.arctan2(np.cross(tool, arm.axes[3]) @ arm.axes[4], tool @ arm.axes[3])
     middle = (range_5[0] + range_5[1]) / 2

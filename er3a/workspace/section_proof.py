@@ -90,7 +90,7 @@ def _direction(k: int) -> Vector:
 
 
 @inner_kernel
-def _plan(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, cell: Cell) -> tuple[float, float]:
+def _plan(arm: SectionArm, phi: float, theta_2: float, tau: float, path: Vector, cell: Cell) -> tuple[float, float]:
     """Half-length (rad) of the line that sweeps the cell, and the margin (m) by which it should succeed."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
     h_rho, h_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
@@ -99,14 +99,14 @@ def _plan(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, 
     x, x_1 = (rho * c, rho * s, z), (-rho * s, rho * c, 0.0)
     v, from_centre = subtract(x, W), subtract(W, arm.centre)
     upper = turned(arm.upper, arm.axis_2, np.cos(theta_2), np.sin(theta_2))
-    change = 2.0 * dot(v, x_1) * way[0] - 2.0 * dot(v, cross(arm.axis_2, from_centre)) * way[1]
-    change -= 2.0 * dot(v, cross(arm.axis_2, subtract(from_centre, upper))) * way[2]
+    change = 2.0 * dot(v, x_1) * path[0] - 2.0 * dot(v, cross(arm.axis_2, from_centre)) * path[1]
+    change -= 2.0 * dot(v, cross(arm.axis_2, subtract(from_centre, upper))) * path[2]
     v_cell = 2.0 * (abs(v[0] * c + v[1] * s) * h_rho + abs(v[2]) * h_z) + h_rho * h_rho + h_z * h_z
     needed = 1.3 * (abs(dot(v, v) - arm.d * arm.d) + v_cell)
     if needed > _LONGEST * abs(change):
         return 0.0, -np.inf
     t = needed / abs(change)
-    e1, e2, e3 = t * abs(way[0]), t * abs(way[1]), t * abs(way[2])
+    e1, e2, e3 = t * abs(path[0]), t * abs(path[1]), t * abs(path[2])
     moved = along_change(arm, x, x_1, theta_2, f, e1, e2, e3)
     moved += abs(f[0] * c + f[1] * s) * h_rho + abs(f[2]) * h_z + (h_rho + h_z) * (e1 + e2 + e3)
     along = dot(v, f)
@@ -125,10 +125,10 @@ def _plan(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, 
 
 
 @inner_kernel
-def _sweeps(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector, t: float, cell: Cell) -> bool:
+def _sweeps(arm: SectionArm, phi: float, theta_2: float, tau: float, path: Vector, t: float, cell: Cell) -> bool:
     """Whether the line of half-length t provably sweeps the whole cell."""
     for sign in (-1.0, 1.0):
-        a, b = theta_2 + sign * t * way[1], tau + sign * t * way[2]
+        a, b = theta_2 + sign * t * path[1], tau + sign * t * path[2]
         if a < arm.theta_2[0] or a > arm.theta_2[1] or b < arm.tau[0] or b > arm.tau[1]:
             return False
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
@@ -137,9 +137,9 @@ def _sweeps(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector
     h_rho, h_z = 0.5 * (cell[1] - cell[0]) + safe, 0.5 * (cell[3] - cell[2]) + safe
     sides = 0
     for sign in (-1.0, 1.0):
-        angle = phi + sign * t * way[0]
+        angle = phi + sign * t * path[0]
         c, s = np.cos(angle), np.sin(angle)
-        W, _ = wrist_and_forearm(arm, theta_2 + sign * t * way[1], tau + sign * t * way[2])
+        W, _ = wrist_and_forearm(arm, theta_2 + sign * t * path[1], tau + sign * t * path[2])
         v = subtract((rho * c, rho * s, z), W)
         v_cell = 2.0 * (abs(v[0] * c + v[1] * s) * h_rho + abs(v[2]) * h_z) + safe
         excess = dot(v, v) - arm.d * arm.d
@@ -152,10 +152,14 @@ def _sweeps(arm: SectionArm, phi: float, theta_2: float, tau: float, way: Vector
     if sides != 0:
         return False
     piece = t / _PIECES
-    e1, e2, e3 = piece * abs(way[0]) + ROUND_OFF, piece * abs(way[1]) + ROUND_OFF, piece * abs(way[2]) + ROUND_OFF
+    e1, e2, e3 = (
+        piece * abs(path[0]) + ROUND_OFF,
+        piece * abs(path[1]) + ROUND_OFF,
+        piece * abs(path[2]) + ROUND_OFF,
+    )
     for i in range(_PIECES):
         at = (2.0 * i + 1.0 - _PIECES) * piece
-        angle, a, b = phi + at * way[0], theta_2 + at * way[1], tau + at * way[2]
+        angle, a, b = phi + at * path[0], theta_2 + at * path[1], tau + at * path[2]
         c, s = np.cos(angle), np.sin(angle)
         W, f = wrist_and_forearm(arm, a, b)
         x, x_1 = (rho * c, rho * s, z), (-rho * s, rho * c, 0.0)
@@ -182,13 +186,13 @@ def swept_angles(
     if arm.inner_low > arm.inner_high:
         return False, 0.0, 0.0
     for k in range(DIRECTIONS):
-        way = _direction(k)
+        path = _direction(k)
         p, a, b = phi, theta_2, tau
-        t, best = _plan(arm, p, a, b, way, cell)
+        t, best = _plan(arm, p, a, b, path, cell)
         step = 0.5 * max(steps[0], steps[1])
         for _ in range(_ROUNDS):
-            if best > 0.0 and _sweeps(arm, p, a, b, way, t, cell):
-                return True, p - t * abs(way[0]), p + t * abs(way[0])
+            if best > 0.0 and _sweeps(arm, p, a, b, path, t, cell):
+                return True, p - t * abs(path[0]), p + t * abs(path[0])
             improved = False
             for move in range(14):
                 if move < 6:
@@ -198,7 +202,7 @@ def swept_angles(
                     bits = move - 6
                     dp = step * (1.0 - 2.0 * (bits & 1))
                     da, db = step * (1.0 - (bits & 2)), step * (1.0 - 0.5 * (bits & 4))
-                new_t, value = _plan(arm, p + dp, a + da, b + db, way, cell)
+                new_t, value = _plan(arm, p + dp, a + da, b + db, path, cell)
                 if value > best:
                     best, t, improved = value, new_t, True
                     p, a, b = p + dp, a + da, b + db

@@ -101,7 +101,7 @@ def test_rounded_sequence_has_the_rates_that_differences_give_also_across_its_jo
         )
         share = np.linspace(0, 1, 5001)
         chords = np.linalg.norm(np.diff(path.poses(share)[:, :3, 3], axis=0), axis=1)
-        np.testing.assert_allclose(path.way(share[1:]), np.cumsum(chords), atol=1e-4)
+        np.testing.assert_allclose(path.arc_length(share[1:]), np.cumsum(chords), atol=1e-4)
 
 
 def test_motion_in_time_of_a_rounded_sequence_has_continuous_rates(random):

@@ -18,7 +18,7 @@ from er3a.pipeline.messages.say import say
 from er3a.references.predict import predict
 from er3a.references.quantities import ModelState, Quantity
 from er3a.references.reference import Row
-from er3a.references.rows import GROUPS, KINDS, Group, check_complete
+from er3a.references.rows import GROUPS, KINDS, check_complete
 from er3a.references.subjects import ReferenceSubject, Subject
 
 
@@ -50,7 +50,7 @@ class HeightRow(Row):
 @pytest.fixture
 def with_heights(monkeypatch):
     columns = {"height_mm": CsvColumn(Written), "uncertainty_mm": CsvColumn(Written, optional=True)}
-    monkeypatch.setitem(GROUPS, "heights", Group("heights", telling=8))
+    monkeypatch.setitem(GROUPS, "heights", 8)
     monkeypatch.setitem(KINDS, "heights", HeightRow)
     monkeypatch.setitem(FORMATS, "heights", Format(columns, digits=("height_mm",)))
 
@@ -66,7 +66,7 @@ def test_a_new_kind_is_read_and_predicted(tmp_path):
 
 def test_a_kind_without_columns_or_words_raises_at_once(monkeypatch):
     monkeypatch.setitem(KINDS, "heights", HeightRow)
-    monkeypatch.setitem(GROUPS, "heights", Group("heights", telling=8))
+    monkeypatch.setitem(GROUPS, "heights", 8)
     for registry in (FORMATS, words.GROUP_WORDS, words.MISSING_WORDS):
         with pytest.raises(LookupError, match="heights"):
             check_complete("heights", KINDS if registry is FORMATS else GROUPS, registry)
@@ -75,7 +75,7 @@ def test_a_kind_without_columns_or_words_raises_at_once(monkeypatch):
 @pytest.mark.parametrize("kind", KINDS.values())
 def test_every_group_of_a_kind_is_listed(kind):
     assert set(kind.groups) <= set(GROUPS)
-    assert len({group.telling for group in GROUPS.values()}) == len(GROUPS)
+    assert len(set(GROUPS.values())) == len(GROUPS)
 
 
 @pytest.mark.parametrize("name", ["er3a_c60", "er3a_c60_article", "er3_600"])

@@ -24,8 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from er3a.geometry.transforms import frame_along
 from er3a.geometry.vectors import TURN, Vector
-from er3a.kinematics.chain import axes_of, poses_of
+from er3a.kinematics.chain import axes_of, meeting_point, poses_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel
@@ -71,13 +72,6 @@ def spherical_constants(axes: Reals, frame: Reals) -> tuple[SphericalConstants, 
         zero_2,
     )
     return constants, G
-
-
-def frame_along(axis: Reals) -> Reals:
-    """A frame whose last row is the axis; rows are its directions."""
-    x = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    x /= np.linalg.norm(x)
-    return np.array([x, np.cross(axis, x), axis])
 
 
 def about_z(angle: float) -> Reals:
@@ -186,8 +180,8 @@ def arm_angle_arm(links: Reals, reference: Reals | None = None) -> ArmAngleArm |
     ``reference`` (3,) is the direction that the arm angle is taken from, in the base frame; None means axis 1.
     """
     axes, points = axes_of(links)
-    S, W = _meeting(axes[:3], points[:3]), _meeting(axes[4:], points[4:])
-    if S is None or W is None:
+    (S, shoulder_miss), (W, wrist_miss) = meeting_point(axes[:3], points[:3]), meeting_point(axes[4:], points[4:])
+    if not max(shoulder_miss, wrist_miss) < MEETS_M:
         return None
     for k in (0, 1, 4, 5):
         if np.linalg.norm(np.cross(axes[k], axes[k + 1])) < 1e-6:
@@ -224,14 +218,6 @@ def arm_angle_arm(links: Reals, reference: Reals | None = None) -> ArmAngleArm |
         zero_4=float(np.arctan2(to_w @ elbow[1], to_w @ elbow[0])),
     )
     return ArmAngleArm(np.ascontiguousarray(links, dtype=float), constants)
-
-
-def _meeting(axes: Reals, points: Reals) -> Reals | None:
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    right = (across @ points[:, :, None]).reshape(-1)
-    found = np.asarray(np.linalg.lstsq(across.reshape(-1, 3), right, rcond=None)[0], dtype=float)
-    miss = np.linalg.norm((across @ (found - points)[:, :, None])[..., 0], axis=1).max()
-    return found if miss < MEETS_M else None
 
 
 def solve_at_arm_angle(arm: ArmAngleArm, T: Reals, psi: Reals | float) -> tuple[Reals, Flags]:

@@ -14,9 +14,10 @@ from functools import partial
 
 import numpy as np
 
+from er3a.geometry.transforms import frame_along
 from er3a.kinematics.chain import axes_of, inverse_rigid, poses_of, size_of
 from er3a.kinematics.classes import class_solvers
-from er3a.kinematics.classes.arm_angle import about_x, about_z, arm_angle_arm, frame_along
+from er3a.kinematics.classes.arm_angle import about_x, about_z, arm_angle_arm
 from er3a.kinematics.classes.parallel_axes import three_parallel
 from er3a.kinematics.classes.scara import gantry, scara
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, prepared, solve_six_revolute

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.transforms import frame_along
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import axes_of, poses_of
-from er3a.kinematics.classes.arm_angle import SphericalConstants, frame_along, spherical_constants, three_angles
+from er3a.kinematics.classes.arm_angle import SphericalConstants, spherical_constants, three_angles
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 
@@ -54,9 +55,7 @@ def scara(links: Reals, sliding: Flags) -> Scara | None:
     w = axes[0]
     if np.linalg.norm(np.cross(axes, w), axis=1).max() > PARALLEL:
         return None
-    x = np.cross(w, np.eye(3)[np.argmin(np.abs(w))])
-    x /= np.linalg.norm(x)
-    frame = np.array([x, np.cross(w, x), w])
+    frame = frame_along(w)
     turning = np.flatnonzero(~np.asarray(sliding))
     T = poses_of(links, np.zeros(4), np.asarray(sliding))
     a, b, c = (points[turning] - points[turning[0]]) @ frame.T

@@ -183,10 +183,10 @@ def _beside(certainty: Integers, T: Reals, count: Integers, size: float) -> Iter
         in_doubt, idle = in_doubt[idle < NOTHING_NEW], idle[idle < NOTHING_NEW]
         if not in_doubt.size:
             return
-        way = random.normal(size=6) * ASIDE[k % len(ASIDE)]
+        offset = random.normal(size=6) * ASIDE[k % len(ASIDE)]
         beside = np.eye(4)
-        beside[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(way[:3]).as_matrix()
-        beside[:3, 3] = way[3:] * size
+        beside[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(offset[:3]).as_matrix()
+        beside[:3, 3] = offset[3:] * size
         before = count[in_doubt]
         yield in_doubt, T[in_doubt] @ beside
         idle = np.where(count[in_doubt] > before, 0, idle + 1)

@@ -20,9 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.geometry.transforms import frame_along
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import axes_of, inverse_rigid, poses_of, size_of
-from er3a.kinematics.classes.arm_angle import SphericalConstants, frame_along, spherical_constants
+from er3a.kinematics.classes.arm_angle import SphericalConstants, spherical_constants
 from er3a.kinematics.classes.scara import wrist_angles
 from er3a.kinematics.classes.six_revolute import CERTAIN, SLOTS, UNCERTAIN, RowsFound, in_order
 from er3a.numerics.arrays import Flags, Reals

@@ -261,18 +261,18 @@ def _others(A: Reals, turns: Complexes) -> None:
 
 
 @inner_kernel
-def _ends(links: Reals, slides: Flags, turns: Complexes, ways: Complexes) -> complex:
+def _ends(links: Reals, slides: Flags, turns: Complexes, shifts: Complexes) -> complex:
     """The determinant of both sliding directions and of where the loop ends with the slides at 0, which are the rows
     of ``ways`` (3, 3), complex."""
     R, S = np.zeros((3, 3), np.complex128), np.zeros((3, 3), np.complex128)
     for i in range(3):
         R[i, i] = 1.0
-        ways[2, i] = 0.0
+        shifts[2, i] = 0.0
     turn, slide = 0, 0
     for k in range(6):
         if slides[k]:
             for i in range(3):
-                ways[slide, i] = R[i, 2]
+                shifts[slide, i] = R[i, 2]
             slide += 1
         else:
             c, s = turns[turn, 0], turns[turn, 1]
@@ -280,11 +280,11 @@ def _ends(links: Reals, slides: Flags, turns: Complexes, ways: Complexes) -> com
             for i in range(3):
                 R[i, 0], R[i, 1] = R[i, 0] * c + R[i, 1] * s, R[i, 1] * c - R[i, 0] * s
         for i in range(3):
-            ways[2, i] += R[i, 0] * links[k, 0, 3] + R[i, 1] * links[k, 1, 3] + R[i, 2] * links[k, 2, 3]
+            shifts[2, i] += R[i, 0] * links[k, 0, 3] + R[i, 1] * links[k, 1, 3] + R[i, 2] * links[k, 2, 3]
             for j in range(3):
                 S[i, j] = R[i, 0] * links[k, 0, j] + R[i, 1] * links[k, 1, j] + R[i, 2] * links[k, 2, j]
         R[:, :] = S
-    u, v, p = ways[0], ways[1], ways[2]
+    u, v, p = shifts[0], shifts[1], shifts[2]
     value: complex = (
         p[0] * (u[1] * v[2] - u[2] * v[1]) + p[1] * (u[2] * v[0] - u[0] * v[2]) + p[2] * (u[0] * v[1] - u[1] * v[0])
     )
@@ -295,7 +295,7 @@ def _ends(links: Reals, slides: Flags, turns: Complexes, ways: Complexes) -> com
 def _sampled(reading: SlideReading, loops: Reals, angles: Reals, samples: Reals) -> None:
     """Values (N, S) of the polynomial, NaN where the reading is inconclusive."""
     links, A = np.empty((6, 4, 4)), np.empty((4, 3, 3))
-    turns, ways = np.zeros((4, 2), np.complex128), np.zeros((3, 3), np.complex128)
+    turns, shifts = np.zeros((4, 2), np.complex128), np.zeros((3, 3), np.complex128)
     for n in range(loops.shape[0]):
         _loop_of(reading, loops[n], links, A)
         usable = np.hypot(A[2, 2, 0], A[2, 2, 1]) > ACROSS
@@ -313,7 +313,7 @@ def _sampled(reading: SlideReading, loops: Reals, angles: Reals, samples: Reals)
                 sign = 1.0 - 2.0 * side
                 turns[1, 0], turns[1, 1] = (-c * a - sign * b * root) / square, (-c * b + sign * a * root) / square
                 _others(A, turns)
-                product *= _ends(links, reading.slides, turns, ways)
+                product *= _ends(links, reading.slides, turns, shifts)
             samples[n, m] = product.real
 
 
@@ -332,7 +332,7 @@ def _rows(
 ) -> None:
     """Add to ``q`` (N, 16, 6) and ``count`` (N,) the solutions at zeros (k, z, 2) of the poses with numbers (k,)."""
     links, A = np.empty((6, 4, 4)), np.empty((4, 3, 3))
-    turns, ways = np.zeros((4, 2), np.complex128), np.zeros((3, 3), np.complex128)
+    turns, shifts = np.zeros((4, 2), np.complex128), np.zeros((3, 3), np.complex128)
     for i in range(numbers.shape[0]):
         n = numbers[i]
         _loop_of(reading, loops[n], links, A)
@@ -355,8 +355,8 @@ def _rows(
                 sign = 1.0 - 2.0 * side
                 turns[1, 0], turns[1, 1] = (-c * a - sign * b * root) / square, (-c * b + sign * a * root) / square
                 _others(A, turns)
-                _ends(links, reading.slides, turns, ways)
-                _as_joints(reading, turns, ways, m.candidate)
+                _ends(links, reading.slides, turns, shifts)
+                _as_joints(reading, turns, shifts, m.candidate)
                 residual, pivot = newton(chain, m.sliding, poses[n], m.candidate, 12, m.frames, m.J, m.dq, m.columns)
                 if residual < SOLVES * reach:
                     away = m.candidate[reading.joint[0]] * reading.sense - zeros[i, z, 0]
@@ -382,9 +382,9 @@ def _rows(
 
 
 @inner_kernel
-def _as_joints(reading: SlideReading, turns: Complexes, ways: Complexes, x: Reals) -> None:
+def _as_joints(reading: SlideReading, turns: Complexes, shifts: Complexes, x: Reals) -> None:
     """Fill x (6,) with the arm's joints: angles of ``turns``, slides that bring the loop's end back."""
-    u, v, p = ways[0].real, ways[1].real, ways[2].real
+    u, v, p = shifts[0].real, shifts[1].real, shifts[2].real
     inner, pu, pv = 0.0, 0.0, 0.0
     for i in range(3):
         inner += u[i] * v[i]

@@ -32,7 +32,7 @@ import numpy as np
 import scipy
 
 from er3a.errors import PoseError
-from er3a.geometry.transforms import moved
+from er3a.geometry.transforms import frame_along, moved
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward, frames, rows_of, step_row, turn_row
@@ -228,7 +228,7 @@ def _beside(segment: avoidance.SingularSegment, T: Reals, slot: int, singular: S
     arm = wrist_partitioned_arm(robot)
     if singular == "shoulder":
         centre = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool - arm.points[0]
-        across: Reals = centre @ _plane_across(arm.axes[0]).T
+        across: Reals = centre @ frame_along(arm.axes[0])[:2].T
         return across
     q, _, gap = solve_slots(robot, T, np.zeros((len(T), 6)))
     if singular == "elbow":
@@ -238,15 +238,8 @@ def _beside(segment: avoidance.SingularSegment, T: Reals, slot: int, singular: S
     axes = frames(robot, q[:, slot])[..., :3, 2]
     axis_4, axis_6 = axes[:, 3], axes[:, 5]
     same = np.sign(np.einsum("ni,ni->n", axis_4, axis_6))[:, None]
-    apart: Reals = (axis_6 - same * axis_4) @ _plane_across(axis_6[-1]).T
+    apart: Reals = (axis_6 - same * axis_4) @ frame_along(axis_6[-1])[:2].T
     return apart
-
-
-def _plane_across(axis: Reals) -> Reals:
-    """Two unit vectors (2, 3) across an axis and each other."""
-    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first)])
 
 
 def _least(

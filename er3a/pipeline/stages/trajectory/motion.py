@@ -183,7 +183,7 @@ def motion_of(
         joints=followed.joints,
         rates=followed.rates,
         tool=lambda t: path.poses(path.progress(t)[0]),
-        way=lambda t: path.way(path.progress(t)[0]),
+        way=lambda t: path.arc_length(path.progress(t)[0]),
         followed=followed,
         polynomials=None,
         proof=proof,

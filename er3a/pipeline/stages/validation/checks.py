@@ -405,7 +405,7 @@ def most_telling(failed: list[model.ReferenceCheck]) -> model.ReferenceCheck:
     lengths = [check for check in failed if check.unit == "mm"]
     least = TELLING_SHARE * max((abs(check.difference) for check in lengths), default=0.0)
     large = [check for check in lengths if abs(check.difference) >= least]
-    return min(large or failed, key=lambda check: GROUPS[check.group].telling)
+    return min(large or failed, key=lambda check: GROUPS[check.group])
 
 
 def key_figures(
