@@ -228,9 +228,11 @@ def row_of_panels(
     return figure, figure.subplots(1, columns, **subplots)
 
 
-def equal_scale(axes: Axes, x_label: str, y_label: str) -> None:
-    """A drawing to scale: equal units on both axes."""
-    axes.set_aspect("equal", adjustable="datalim")
+def equal_scale(axes: Axes, x_label: str, y_label: str, fill: bool = True) -> None:
+    """A drawing to scale: equal units on both axes, which fill their place, or are as large as what they show, bare."""
+    axes.set_aspect("equal", adjustable="datalim" if fill else "box")
+    if not fill:
+        axes.grid(False)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
 

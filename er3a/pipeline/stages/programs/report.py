@@ -33,7 +33,6 @@ from er3a.programs.languages import LANGUAGES
 
 MOST_LINES = 400  # of a listing that the page shows
 AROUND = 3  # lines around those with motions or findings, in a longer listing
-STATUSES: dict[Level, str] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
 
 
 def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
@@ -71,7 +70,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
     motion = results.motion.take(results.motion.program == program.name)
     return dict(
         program=program,
-        status=STATUSES[program.outcome],
+        status=program.outcome,
         language=LANGUAGES[program.language].title,
         cycle=cycle_text(program),
         lines=_listing(program, text, rows, motion, found),

@@ -18,7 +18,7 @@ from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import GRADE_NAMES, decision
 from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADES, GROUPS, counted_checks
+from er3a.pipeline.messages.validation import CONVENTIONS, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model, validation_figures
 from er3a.pipeline.stages.validation.evidence_section import (
@@ -297,7 +297,7 @@ def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:
     ----------
     instead : a model of the same arm that evidence does not contradict
     """
-    head = head_of(stored, FIGURES)
+    head = head_of(stored)
     if head.status != "fail":
         return head
     same_arm = isinstance(head.finding, model.DefinedOtherwise)
