@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
-from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.files.robot_writer import robot_file, robot_text
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import GRADE_NAMES, decision
@@ -252,7 +252,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     contradicted = summary.verdict.status == "fail"
     corrected, _ = validation_figures.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
-    text = yaml_text(file.model_dump(exclude_none=True, exclude_defaults=True)) if file else ""
+    text = robot_text(file) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
     render_stage(
         study,
