@@ -238,7 +238,7 @@ class TaskSearch:
         choice = list(islice(filter(None, map(self._spot, written)), most))
         found = choice[:1]
         while choice and len(found) < MOST_TARGETS:
-            away = [min(_distance(spot, other) for other in found) for spot in choice]
+            away = [min(np.linalg.norm(np.subtract(spot.xyz_mm, other.xyz_mm)) for other in found) for spot in choice]
             if max(away) < APART * self.reach.radius * 1000:
                 break
             found.append(choice[int(np.argmax(away))])
@@ -413,10 +413,6 @@ def _move(kind: str, title: str, spot: Spot, rest: dict[str, Any]) -> dict[str, 
     branch = spot.label.replace("_elbow", ", elbow").replace("_no_flip", ", no flip").replace("_flip", ", flip")
     branch = branch.replace("_", " ")
     return {"name": kind, "kind": kind, "title": title, "start": spot.pose, "start_branch": branch, **rest}
-
-
-def _distance(spot: Spot, other: Spot) -> float:
-    return float(np.linalg.norm(np.subtract(spot.xyz_mm, other.xyz_mm)))
 
 
 def _millimetres(point: Reals) -> list[float]:

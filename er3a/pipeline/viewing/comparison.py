@@ -43,7 +43,7 @@ def write_comparison(
         verdict=found.verdict,
         headline=headline(found),
         layers=layer_rows(found),
-        columns=_columns(one[1]),
+        columns=_columns(),
         rows=[] if corrected is None else _rows(one[1], corrected),
         corrected=text,
         corrected_address=page.text_address(text),
@@ -52,7 +52,7 @@ def write_comparison(
     )
 
 
-def _columns(robot: Robot) -> list[str]:
+def _columns() -> list[str]:
     units = {"a": "mm", "d": "mm", "direction": ""}
     return [
         bracketed(column, tr(unit)) if (unit := units.get(column, "deg")) else tr("direction") for column in COLUMNS

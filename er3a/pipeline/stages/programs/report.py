@@ -47,7 +47,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
         faults={fault.name: fault for fault in faults(results)},
-        player=player(robot, motions(robot, results), scene),
+        player=player(robot, motions(results), scene),
         bodies=[each.name for each in scene.solids] if scene else [],
         solids=solid_rows(scene),
         drawing_head=drawing_head(),

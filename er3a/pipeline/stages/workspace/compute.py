@@ -313,13 +313,7 @@ def _left_out(
 
 
 def _bars(proven: Proven) -> model.Bars | None:
-    if proven.proof.bar == 0:
-        return None
-    x, y, z = proven.R
-    return model.Bars(
-        proven.proof.bar,
-        model.SectionFrame((model.triple(x), model.triple(y), model.triple(z)), model.triple(proven.origin)),
-    )
+    return model.Bars(proven.proof.bar, model.frame_of(proven.R, proven.origin)) if proven.proof.bar else None
 
 
 def _figures(

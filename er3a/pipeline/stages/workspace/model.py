@@ -273,6 +273,12 @@ class SectionFrame:
     origin_m: Triple
 
 
+def frame_of(R: Reals, origin: Reals) -> SectionFrame:
+    """A frame by the rows of its axes (3, 3) and its origin."""
+    x, y, z = (triple(row) for row in R)
+    return SectionFrame((x, y, z), triple(origin))
+
+
 @dataclass(frozen=True)
 class Bars:
     """Cells of the proof where joint 1 slides: bars along y of this frame, from 0 on, all so long."""
