@@ -218,8 +218,13 @@ def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
 
 def write_robot(robot: Robot, path: Path) -> None:
     """Write a robot file that :func:`er3a.load_robot` reads back to the same numbers, to 1e-12 m and rad."""
-    text = yaml_text(robot_file(robot, path).model_dump(exclude_none=True, exclude_defaults=True))
+    text = robot_text(robot_file(robot, path))
     write_atomically(path, lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def robot_text(content: RobotFile) -> str:
+    """The content of a robot file as YAML, without what is as it is by itself."""
+    return yaml_text(content.model_dump(exclude_none=True, exclude_defaults=True))
 
 
 def yaml_text(content: dict[str, Any]) -> str:

@@ -21,12 +21,11 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_args, get_origin
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from er3a.by_value import ByValue, Finding
 from er3a.collision.pairs import Pair, PairsUnexamined, ShapesAssumed
@@ -35,7 +34,7 @@ from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
-from er3a.pipeline.tables import table_types
+from er3a.pipeline.tables import adapter, table_types
 
 FORMAT_VERSION = 8
 BESIDE = ("unexamined", "shapes", "missed")
@@ -70,18 +69,18 @@ class Verdict(Generic[FindingT]):
 
     def short_of(self, missed: tuple[LeftOut, ...]) -> Verdict[FindingT]:
         """The verdict where something that may turn it was not examined: no pass, if there is anything."""
-        status: Status = "caution" if missed and self.status == "pass" else self.status
-        return replace(self, status=status, missed=missed)
+        return self._lowered(bool(missed), missed=missed)
 
     def without(self, unexamined: tuple[Pair, ...]) -> Verdict[FindingT]:
         """The verdict where collisions of some pairs were not looked at: no pass, if there are any."""
-        status: Status = "caution" if unexamined and self.status == "pass" else self.status
-        return replace(self, status=status, unexamined=unexamined)
+        return self._lowered(bool(unexamined), unexamined=unexamined)
 
     def resting_on(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
         """The verdict where shapes of the arm are assumed: no pass, if anything comes too near to them."""
-        status: Status = "caution" if shapes and shapes.near and self.status == "pass" else self.status
-        return replace(self, status=status, shapes=shapes)
+        return self._lowered(bool(shapes and shapes.near), shapes=shapes)
+
+    def _lowered(self, doubtful: bool, **beside: Any) -> Verdict[FindingT]:
+        return replace(self, status="caution" if doubtful and self.status == "pass" else self.status, **beside)
 
 
 @dataclass(frozen=True)
@@ -347,7 +346,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     }
     if record["verdict"]["status"] == "not_computed":
         absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))
-        origin = _adapter(Provenance).validate_python(record["provenance"])
+        origin = adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, absent, rests_on, folder)
     return replace(read_results(folder, stage.module("model").RESULTS), rests_on=rests_on, folder=folder)
 
@@ -355,7 +354,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
 def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
     known: tuple[type[Finding], ...] = (NotComputed, *stage.absences)
     kinds: dict[str, Any] = {kind.code: kind for kind in known}
-    found: Finding = _adapter(kinds[verdict["code"]]).validate_python(verdict["params"])
+    found: Finding = adapter(kinds[verdict["code"]]).validate_python(verdict["params"])
     return found
 
 
@@ -509,18 +508,13 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
             more = {key: verdict[key] for key in BESIDE if key in verdict}
             own["verdict"] = {"status": verdict["status"], "finding": finding, **more}
         of_stage: Any = summary_type(kind)
-        return _adapter(of_stage).validate_python(own), _adapter(Provenance).validate_python(stored.get("provenance"))
+        return adapter(of_stage).validate_python(own), adapter(Provenance).validate_python(stored.get("provenance"))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise ResultError(path, f"damaged ({where}: {first['msg']})") from None
     except KeyError as error:
         raise ResultError(path, f"damaged (verdict without {error})") from None
-
-
-@cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
 
 
 OVERALL = ("index.html", "compare.html", "junit.xml")

@@ -13,6 +13,7 @@ from er3a.errors import InputError
 from er3a.files.robot_file import Name, Placement, RobotFile, Text, check_placement
 from er3a.files.yaml_file import StrictModel, parse
 from er3a.pipeline.messages.language import N_, tr
+from er3a.pipeline.stages.registry import STAGES
 from er3a.robots.robot import MOST_JOINTS
 
 MOST_VALUES = 1000
@@ -139,6 +140,15 @@ class Variant:
         return InputError(None, f"sweeps.{self.sweep}", f"{self.vary} = {self.value:.9g}: {problem}", remedy)
 
 
+def _known_stage(name: str) -> str:
+    if name not in STAGES:
+        raise ValueError(f"there is no stage '{name}' | Known: {', '.join(STAGES)}")
+    return name
+
+
+StageName = Annotated[Text, AfterValidator(_known_stage)]
+
+
 def _distinct(values: list[Any]) -> list[Any]:
     for value in values:
         if values.count(value) > 1:
@@ -159,7 +169,7 @@ class Sweep(StrictModel):
     to: Value | None = None
     steps: Annotated[int, Field(ge=2, le=MOST_VALUES)] | None = None
     values: Annotated[list[Value], Field(min_length=1, max_length=MOST_VALUES), AfterValidator(_distinct)] | None = None
-    stages: Annotated[list[Text], Field(min_length=1), AfterValidator(_distinct)] = ["validation", "workspace"]
+    stages: Annotated[list[StageName], Field(min_length=1), AfterValidator(_distinct)] = ["validation", "workspace"]
 
     @model_validator(mode="after")
     def _values_or_a_range(self):

@@ -322,11 +322,12 @@ def _coded(findings: NDArray[Any]) -> NDArray[Any]:
 
 @cache
 def _decoded(kind: Any, text: str | None) -> Any:
-    return None if text is None else _adapter(kind).validate_json(text)
+    return None if text is None else adapter(kind).validate_json(text)
 
 
 @cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:
+def adapter(kind: Any) -> TypeAdapter[Any]:
+    """What checks and reads values of a type, made once."""
     return TypeAdapter(kind)
 
 

@@ -65,7 +65,7 @@ def written(folder, shown) -> None:
 def page(browser, tmp_path):
     robot = load_robot("er3a_c60")
     still = PlayedMotion("still", "It stands.", np.array([0.0, 1.0]), np.zeros((2, 6)))
-    way = PlayedMotion("way", "It goes.", np.arange(9.0), np.zeros((9, 6)), timed=False)
+    way = PlayedMotion("way", "It goes.", np.arange(9.0), np.zeros((9, 6)))
     scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
     written(tmp_path, player(robot, [bow(robot), still, way], scene))
     browser.get_log("browser")
@@ -214,14 +214,14 @@ def test_it_stays_in_sight_and_covers_nothing_that_leads_to_it(page):
     assert stand["bottom"] <= page.execute_script("return innerHeight")
 
 
-def test_a_way_without_times_counts_its_points_and_what_is_played_is_framed(page):
+def test_what_is_played_is_framed(page):
     stretch = page.find_element(By.CSS_SELECTOR, ".stretch")
     assert "now" not in stretch.get_attribute("class")
     page.execute_script("arguments[0].click()", stretch)
-    until(page, lambda: clock(page) == "point 4 of 8")
+    until(page, lambda: clock(page).startswith("t = 4.000 s"))
     assert "now" in stretch.get_attribute("class")
     page.execute_script("document.querySelector('.player .forward').click()")
-    until(page, lambda: clock(page) == "point 5 of 8")
+    until(page, lambda: clock(page).startswith("t = 5.000 s"))
     assert "now" not in stretch.get_attribute("class")
 
 

@@ -71,12 +71,11 @@ def compute(study, name):
 ''',
     "pipeline/stages/toy/report.py": '''"""The page."""
 from pathlib import Path
-from er3a.pipeline.messages.toy import FIGURES
 from er3a.pipeline.viewing.page import head_of, render, run_command
 
 def report(study, stored, output):
     """Write it."""
-    render(Path(__file__).with_name("report.html.j2"), output, head=head_of(stored, FIGURES),
+    render(Path(__file__).with_name("report.html.j2"), output, head=head_of(stored),
            command=run_command(study, f"{stored.robot}/toy.html"), robot=study.robot(stored.robot),
            robot_pages=study.pages(stored.robot))
 ''',

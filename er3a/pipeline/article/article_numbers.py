@@ -25,7 +25,7 @@ from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectorySummary
+from er3a.pipeline.stages.trajectory.model import PathChecks, PathSummary, TrajectorySummary
 from er3a.pipeline.stages.validation.model import ReferenceCheck, ValidationSummary
 from er3a.pipeline.stages.workspace.model import VoidSummary, VoidUnexpected, WorkspaceSummary
 from er3a.pipeline.study import Study
@@ -215,9 +215,9 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     tables = study.article
     assert tables is not None
     robot = study.robot(tables.printed)
-    validation: ValidationSummary = _summary(results, tables.printed, "validation")
-    trajectory: TrajectorySummary = _summary(results, tables.printed, "trajectory")
-    workspace: WorkspaceSummary = _summary(results, tables.printed, "workspace")
+    validation: ValidationSummary = summary_of(results, tables.printed, "validation")
+    trajectory: TrajectorySummary = summary_of(results, tables.printed, "trajectory")
+    workspace: WorkspaceSummary = summary_of(results, tables.printed, "workspace")
     printed, corrected, real = (_table(study, results, name) for name in tables.names)
     compared = compare(robot, study.robot(tables.real))
     hypothesis = next(found for found in validation.diagnoses if found.reference_set == STATEMENTS).hypotheses[0]
@@ -232,7 +232,7 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
     beyond = np.degrees(np.maximum(free.q - robot.upper, robot.lower - free.q))
     cloud = 1000 * _points(robot, random)
     void = np.array(printed.void_mm if printed.void_mm else (np.nan,) * 3)
-    move, line = (_path(trajectory, name) for name in (MOVE, LINE))
+    move, line = (next(path for path in trajectory.paths if path.name == name) for name in (MOVE, LINE))
     repair = line.chosen.motion if line.chosen else None
     rpy = (0.0, 90.0, 0.0), (30.0, 90.0, 30.0)
     same = [transform(np.zeros(3), np.radians(angles)) for angles in rpy]
@@ -274,7 +274,7 @@ def article_numbers(study: Study, results: Path) -> ArticleNumbers:
         cloud_farthest_mm=float(np.hypot(cloud[:, 0], cloud[:, 1]).max()),
         cloud_nearest_to_void_mm=float(np.linalg.norm(cloud - void, axis=1).min()),
         move_speed_deg_s=max(move.max_joint_speed_deg_s or (np.nan,)),
-        move_acceleration_deg_s2=_greatest_acceleration(results, tables.printed),
+        move_acceleration_deg_s2=float(np.nanmax(np.abs(path_rows(results, tables.printed, MOVE).q_deg_s2))),
         line_speed_deg_s=max(line.max_joint_speed_deg_s or (np.nan,)),
         line_turn_deg=_line_turn_deg(robot),
         **_of_the_line(results, tables.printed, printed, line),
@@ -304,15 +304,21 @@ def _changes_of_the_void(robot: Robot, workspace: WorkspaceSummary, printed: Tab
     }
 
 
-def _summary(results: Path, robot: str, stage: str):  # type: ignore[no-untyped-def]  # the stage's own
+def summary_of(results: Path, robot: str, stage: str):  # type: ignore[no-untyped-def]  # the stage's own
     return read_stage(results / robot / stage, STAGES[stage]).results.summary
+
+
+def path_rows(results: Path, robot: str, path: str) -> PathChecks:
+    """A robot's path as it was checked, where the arm reaches it."""
+    rows: PathChecks = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.checks
+    return rows.take((rows.path == path) & rows.reachable)
 
 
 def _table(study: Study, results: Path, name: str) -> TableNumbers:
     robot = study.robot(name)
-    validation: ValidationSummary = _summary(results, name, "validation")
-    workspace: WorkspaceSummary = _summary(results, name, "workspace")
-    trajectory: TrajectorySummary = _summary(results, name, "trajectory")
+    validation: ValidationSummary = summary_of(results, name, "validation")
+    workspace: WorkspaceSummary = summary_of(results, name, "workspace")
+    trajectory: TrajectorySummary = summary_of(results, name, "trajectory")
     claims = next((found.counts.claims for found in validation.sets if found.name == STATEMENTS), None)
     checks = validation.counts.independent
     upper_arm_deg, forearm_deg = _zero_pose_deg(robot)
@@ -482,14 +488,9 @@ def _ranked_apart_percent(robot: Robot, seed: int) -> float:
     return float(50 * (1 - tau))
 
 
-def _path(trajectory: TrajectorySummary, name: str) -> PathSummary:
-    return next(path for path in trajectory.paths if path.name == name)
-
-
 def _of_the_line(results: Path, robot: str, table: TableNumbers, line: PathSummary) -> dict[str, Any]:
     """When a quintic would cross, how fast joints are at the last crossing and at most, and what can be done."""
-    rows = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.checks
-    rows = rows.take((rows.path == LINE) & rows.reachable)
+    rows = path_rows(results, robot, LINE)
     speeds = np.abs(rows.q_deg_s)
     peak, joint = np.unravel_index(speeds.argmax(), speeds.shape)
     crossings = table.line_crossings_s
@@ -502,8 +503,3 @@ def _of_the_line(results: Path, robot: str, table: TableNumbers, line: PathSumma
         "strategies_usable": tuple(tried.name for tried in line.avoidance if tried.usable),
         "strategies_unusable": tuple(tried.name for tried in line.avoidance if not tried.usable),
     }
-
-
-def _greatest_acceleration(results: Path, robot: str) -> float:
-    samples = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.checks
-    return float(np.nanmax(np.abs(samples.q_deg_s2[samples.path == MOVE])))

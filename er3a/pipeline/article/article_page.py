@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,9 @@ from er3a.pipeline.article.article_numbers import (
     TableNumbers,
     agreements,
     article_numbers,
+    path_rows,
     random_joints,
+    summary_of,
 )
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
@@ -43,7 +45,6 @@ from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Provenance, checksum_file, input_records, read_stage, result_records
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.registry import STAGES, all_messages
-from er3a.pipeline.stages.trajectory.model import PathChecks
 from er3a.pipeline.stages.vision.model import GraspCounts
 from er3a.pipeline.study import ArticleTables, Study
 from er3a.pipeline.viewing import page
@@ -181,8 +182,7 @@ def _move(numbers: ArticleNumbers) -> Picture:
 def _line(results: Path, tables: tuple[str, ...], names: list[str], numbers: ArticleNumbers) -> Picture:
     figure, axes = new_figure(width=8.0, height=3.8)
     for table, name, colour in zip(tables, names, COLOURS):
-        stored = read_stage(results / table / "trajectory", STAGES["trajectory"]).results
-        rows = stored.checks.take((stored.checks.path == LINE) & stored.checks.reachable)
+        rows = path_rows(results, table, LINE)
         axes.semilogy(rows.t_s, np.abs(rows.q_deg_s).max(axis=1) + 1e-3, color=colour, label=name)
     for found, colour in zip((numbers.printed, numbers.corrected), COLOURS):
         for t in found.line_crossings_s:
@@ -295,7 +295,10 @@ def _write(
         others=[(code, Locale(code).display_name, name) for code, name in others.items()],
         counts=[(status, BADGES[status], sum(row["status"] == status for row in rows)) for status in AGREEMENT],
         agreement_words=AGREEMENT,
-        sections=[(code, title, [rows[k] for k in _of_section(code)]) for code, title in SECTIONS.items()],
+        sections=[
+            (code, title, [row for row, item in zip(rows, ITEMS) if item.section == code])
+            for code, title in SECTIONS.items()
+        ],
         compared=_compared(numbers),
         pages_in=mark,
         roles=[tr(word) for word in ROLES.values()],
@@ -307,10 +310,6 @@ def _write(
         player=_player(study, results, tables),
         drawing_head=drawing_head(),
     )
-
-
-def _of_section(section: str) -> list[int]:
-    return [k for k, item in enumerate(ITEMS) if item.section == section]
 
 
 def _rows(study: Study, results: Path, numbers: ArticleNumbers, places: dict[str, int]) -> Iterator[dict[str, Any]]:
@@ -397,7 +396,7 @@ def _parts(study: Study, results: Path, numbers: ArticleNumbers, places: dict[st
 def _grasps(study: Study, results: Path) -> dict[str, Any] | None:
     """What came of the real arm's simulated camera; None where its verdict is of another kind."""
     assert study.article is not None
-    verdict = read_stage(results / study.article.real / "vision", STAGES["vision"]).results.summary.verdict
+    verdict = summary_of(results, study.article.real, "vision").verdict
     found = verdict.finding
     if not isinstance(found, GraspCounts) or found.point_mm is None or not found.simulated:
         return None
@@ -414,7 +413,7 @@ def _grasps(study: Study, results: Path) -> dict[str, Any] | None:
 def _torque(study: Study, results: Path) -> dict[str, Any] | None:
     """The real arm's greatest torque on a path; None where its verdict is of another kind."""
     assert study.article is not None
-    found = read_stage(results / study.article.real / "dynamics", STAGES["dynamics"]).results.summary.verdict.finding
+    found = summary_of(results, study.article.real, "dynamics").verdict.finding
     if not isinstance(found, NoLimits) or found.path is None or found.grade is None:
         return None
     return {
@@ -462,43 +461,28 @@ def _times(times: tuple[float, ...]) -> str:
 
 def _compared(numbers: ArticleNumbers) -> list[list[str]]:
     """The rows of the comparison: what is compared, then a cell for each table."""
-    tables = (numbers.printed, numbers.corrected, numbers.real)
-
-    def row(label: str, *cells: str) -> list[str]:
-        return [label, *cells]
-
-    return [
-        row(
+    unexamined = tr("not examined")
+    rows: list[tuple[str, Callable[[TableNumbers], str]]] = [
+        (
             tr("Statements of the article that hold"),
-            *(tr("not examined") if t.statements is None else f"{t.statements_met} / {t.statements}" for t in tables),
+            lambda t: unexamined if t.statements is None else f"{t.statements_met} / {t.statements}",
         ),
-        row(
+        (
             tr("Independent checks against CAD models and a URDF that pass"),
-            *(f"{t.checks_met} / {t.checks}" for t in tables),
+            lambda t: f"{t.checks_met} / {t.checks}",
         ),
-        row(tr("Upper arm from the vertical, all joints at 0"), *(f"{fixed(t.upper_arm_deg, 1)}°" for t in tables)),
-        row(tr("Forearm from the vertical, all joints at 0"), *(f"{fixed(t.forearm_deg, 1)}°" for t in tables)),
-        row(tr("Tool at joint angles 0: x, y, z (mm)"), *(", ".join(fixed(v, 2) for v in t.tool_mm) for t in tables)),
-        row(
-            tr("Branches of the article's target within the limits"),
-            *(f"{t.within_limits} / {t.solutions}" for t in tables),
-        ),
-        row(tr("Greatest reach of the tool from axis 1 (mm)"), *(fixed(t.reach_mm, 1) for t in tables)),
-        row(tr("Reached volume, proven (m³)"), *(_between(t.volume_m3, 3) for t in tables)),
-        row(
-            tr("Largest enclosed void, proven (L)"),
-            *("–" if t.void_litres is None else _between(t.void_litres, 2) for t in tables),
-        ),
-        row(tr("Its centre: z (mm)"), *("–" if t.void_mm is None else fixed(t.void_mm[2], 0) for t in tables)),
-        row(
-            tr("The article's straight line"),
-            *(outcome_word(t.line) if t.line else tr("not examined") for t in tables),  # type: ignore[arg-type]
-        ),
-        row(
-            tr("It is singular at t (s)"),
-            *(_times(t.line_crossings_s) if t.line else tr("not examined") for t in tables),
-        ),
+        (tr("Upper arm from the vertical, all joints at 0"), lambda t: f"{fixed(t.upper_arm_deg, 1)}°"),
+        (tr("Forearm from the vertical, all joints at 0"), lambda t: f"{fixed(t.forearm_deg, 1)}°"),
+        (tr("Tool at joint angles 0: x, y, z (mm)"), lambda t: ", ".join(fixed(v, 2) for v in t.tool_mm)),
+        (tr("Branches of the article's target within the limits"), lambda t: f"{t.within_limits} / {t.solutions}"),
+        (tr("Greatest reach of the tool from axis 1 (mm)"), lambda t: fixed(t.reach_mm, 1)),
+        (tr("Reached volume, proven (m³)"), lambda t: _between(t.volume_m3, 3)),
+        (tr("Largest enclosed void, proven (L)"), lambda t: _between(t.void_litres, 2) if t.void_litres else "–"),
+        (tr("Its centre: z (mm)"), lambda t: fixed(t.void_mm[2], 0) if t.void_mm else "–"),
+        (tr("The article's straight line"), lambda t: outcome_word(t.line) if t.line else unexamined),  # type: ignore[arg-type]
+        (tr("It is singular at t (s)"), lambda t: _times(t.line_crossings_s) if t.line else unexamined),
     ]
+    return [[label, *map(cell, (numbers.printed, numbers.corrected, numbers.real))] for label, cell in rows]
 
 
 def _between(bounds: tuple[float, float], decimals: int) -> str:
@@ -535,7 +519,7 @@ def _player(study: Study, results: Path, tables: ArticleTables) -> Any:
     labels = {MOVE: tr("Joint move"), LINE: tr("Straight line")}
     motions = []
     for name, text in texts.items():
-        own, other = (_motion(results, robot, name) for robot in (tables.printed, tables.corrected))
+        own, other = (path_rows(results, robot, name) for robot in (tables.printed, tables.corrected))
         q = np.stack([np.interp(own.t_s, other.t_s, column) for column in other.q_deg.T], axis=1)
         motions.append(
             PlayedMotion(
@@ -557,19 +541,13 @@ def _player(study: Study, results: Path, tables: ArticleTables) -> Any:
     return player(first, motions, beside=(beside,), signs=signs)
 
 
-def _motion(results: Path, robot: str, name: str) -> PathChecks:
-    checks: PathChecks = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.checks
-    return checks.take((checks.path == name) & checks.reachable)
-
-
 def _events(results: Path, tables: ArticleTables, name: str) -> list[PlayedEvent]:
     """Where one of both tables is singular on a path."""
     found = []
     for robot, sign in ((tables.printed, tr("as printed")), (tables.corrected, tr("offset 2 = −90°"))):
-        summary = read_stage(results / robot / "trajectory", STAGES["trajectory"]).results.summary
-        path = next(each for each in summary.paths if each.name == name)
-        for event in path.singularities:
-            if event.crossing:
-                text = tr("{table}: singular ({type})", table=sign, type=event_word(event))
-                found.append(PlayedEvent(event.t_s, event.until_s, text, "caution"))
+        for path in summary_of(results, robot, "trajectory").paths:
+            for event in path.singularities if path.name == name else ():
+                if event.crossing:
+                    text = tr("{table}: singular ({type})", table=sign, type=event_word(event))
+                    found.append(PlayedEvent(event.t_s, event.until_s, text, "caution"))
     return found

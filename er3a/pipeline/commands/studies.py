@@ -120,23 +120,17 @@ def verdicts(
     as_json: options.AsJson = False,
 ):
     """Say what a finished study came to: the verdict of each stage of each robot."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Column, Table
-    from rich.text import Text
-
     from er3a.pipeline.verdicts import read_verdicts
 
     found = read_verdicts(load_study(study), results)
     if as_json:
         options.print_json([asdict(verdict) for verdict in found])
     else:
-        columns = ("robot", "stage", "verdict", Column("finding", overflow="fold"))
-        table = Table(*columns, box=box.SIMPLE, padding=0)
-        for each in found:
-            expected = ", as expected" if each.is_demonstration else ""
-            table.add_row(each.robot, each.stage, each.status.replace("_", " ") + expected, Text(each.text))
-        Console().print(table)
+        status = {True: ", as expected", False: ""}
+        options.print_table(
+            ("robot", "stage", "verdict", "finding"),
+            ((v.robot, v.stage, v.status.replace("_", " ") + status[v.is_demonstration], v.text) for v in found),
+        )
     if fail_on:
         _end_with_findings(found, fail_on)
 
@@ -189,10 +183,6 @@ def diff(
     as_json: options.AsJson = False,
 ):
     """Compare two results folders: verdicts, key figures and tables that moved. Exit code 1 if anything differs."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Column, Table
-
     from er3a.pipeline.viewing.diff import COLUMNS, changes, write_diff
 
     if words not in language.LANGUAGES:
@@ -201,11 +191,10 @@ def diff(
     found = changes(old, new)
     if as_json:
         options.print_json([asdict(change) for change in found])
+    elif found:
+        options.print_table([language.tr(column) for column in COLUMNS], map(astuple, found))
     else:
-        table = Table(*(Column(language.tr(column), overflow="fold") for column in COLUMNS), box=box.SIMPLE, padding=0)
-        for change in found:
-            table.add_row(*astuple(change))
-        Console().print(table if found else language.tr("Nothing differs."))
+        print(language.tr("Nothing differs."))
     if output:
         write_diff(old, new, found, output)
     if found:

@@ -12,7 +12,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain, combinations, islice, product
 from pathlib import Path
@@ -31,7 +31,7 @@ from er3a.files.path_file import PathFile, ProgramPath
 from er3a.files.reference_sets import FORMATS
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
 from er3a.files.robot_library import read_robot, robot_of, robot_path
-from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.files.robot_writer import robot_file, robot_text, yaml_text
 from er3a.files.scene_file import SceneFile
 from er3a.files.target_file import TargetEntry
 from er3a.files.yaml_file import parse, read_yaml
@@ -43,7 +43,6 @@ from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.solutions import Solutions, Target
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
@@ -52,8 +51,6 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured
 from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, proof_requirements
 from er3a.planning.commands import CommandSource
-from er3a.planning.timing import JointLimits
-from er3a.planning.tool_proof import ProofRequirements
 from er3a.robots.joint_limits import limit_margin, shown, within
 from er3a.robots.robot import Convention, Robot, robot_name
 from er3a.selection.nearest import nearest
@@ -205,7 +202,6 @@ class DrawnCounts:
     overlaps: tuple[tuple[str, int], ...]
 
 
-@dataclass
 class TaskSearch:
     """What an arm can do in a scene, by the settings of the study's trajectory stage.
 
@@ -217,27 +213,12 @@ class TaskSearch:
     rejected : kind of path -> why paths of it that were tried are none that the arm can do, with how many
     """
 
-    robot: Robot
-    reach: SampledReach
-    scene: Scene
-    settings: TrajectorySettings
-    follows_tool: bool = field(init=False)
-    near: NearSingular = field(init=False)
-    limits: JointLimits = field(init=False)
-    required: ProofRequirements = field(init=False)
-    bodies: Bodies = field(init=False)
-    middle: Reals = field(init=False)
-    fit: Reals = field(init=False)
-    counts: DrawnCounts = field(init=False)
-    tried: int = 0
-    rejected: dict[str, Counter[str]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.follows_tool = has_branches(self.robot)
-        self.limits, self.required = limits_of(self.robot, self.settings), proof_requirements(self.robot, self.settings)
-        self.near, self.bodies = self.required.near, Bodies(self.robot, self.scene)
-        self.middle = self.reach.q.mean(axis=0)
-        q = self.reach.q[:DRAWN]
+    def __init__(self, robot: Robot, reach: SampledReach, scene: Scene, settings: TrajectorySettings) -> None:
+        self.robot, self.reach, self.settings = robot, reach, settings
+        self.limits, self.required = limits_of(robot, settings), proof_requirements(robot, settings)
+        self.near, self.bodies = self.required.near, Bodies(robot, scene)
+        self.tried, self.rejected = 0, dict[str, Counter[str]]()
+        q = reach.q[:DRAWN]
         roomy, regular, free = self._roomy(q), self._regular(q), self.bodies.free(q)
         self.fit = q[roomy & regular & free]
         touching = Counter({pair.label: 0 for pair in self.bodies.pairs})
@@ -257,7 +238,7 @@ class TaskSearch:
         choice = list(islice(filter(None, map(self._spot, written)), most))
         found = choice[:1]
         while choice and len(found) < MOST_TARGETS:
-            away = [min(_distance(spot, other) for other in found) for spot in choice]
+            away = [min(np.linalg.norm(np.subtract(spot.xyz_mm, other.xyz_mm)) for other in found) for spot in choice]
             if max(away) < APART * self.reach.radius * 1000:
                 break
             found.append(choice[int(np.argmax(away))])
@@ -273,17 +254,15 @@ class TaskSearch:
 
     def any_path(self, spots: list[Spot]) -> list[dict[str, Any]]:
         """A slow joint move between two of them, whatever is in the way."""
-        return [
-            entry | {"duration_s": DURATIONS_S[-1], "samples": PATH_SAMPLES}
-            for entry in islice(self._joint_moves(spots), 1)
-        ]
+        timing = {"duration_s": DURATIONS_S[-1], "samples": PATH_SAMPLES}
+        return [entry | timing for entry in islice(self._joint_moves(spots), 1)]
 
     def paths(self, spots: list[Spot]) -> list[dict[str, Any]]:
         """Entries of a path file, each safe and away from singular poses: a joint move and, where the arm has branches,
         a line and an arc.
         """
         kinds = {"joint": self._joint_moves}
-        if self.follows_tool:
+        if has_branches(self.robot):
             kinds |= {"line": self._lines, "arc": self._arcs}
         return [found for kind, entries in kinds.items() if (found := self._first_safe(kind, entries(spots)))]
 
@@ -294,11 +273,12 @@ class TaskSearch:
             return
         turn = np.radians(self.reach.side_deg)
         out, aside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
+        open_ = self._where_open(self.reach.q.mean(axis=0))
         for height in HEIGHTS:
             for distance in DISTANCES:
                 for share in ASIDE:
                     point = base[:3, 3] + self.reach.radius * (distance * out + share * aside + [0, 0, height])
-                    yield {"xyz_mm": _millimetres(point), "rpy_deg": [180.0, 0.0, 0.0]} | self._where_open(self.middle)
+                    yield {"xyz_mm": _millimetres(point), "rpy_deg": [180.0, 0.0, 0.0]} | open_
 
     def _drawn(self) -> Iterator[dict[str, list[float]]]:
         """Poses of drawn joint values that meet all conditions: of arms with fewer than six joints the joint values.
@@ -435,10 +415,6 @@ def _move(kind: str, title: str, spot: Spot, rest: dict[str, Any]) -> dict[str, 
     return {"name": kind, "kind": kind, "title": title, "start": spot.pose, "start_branch": branch, **rest}
 
 
-def _distance(spot: Spot, other: Spot) -> float:
-    return float(np.linalg.norm(np.subtract(spot.xyz_mm, other.xyz_mm)))
-
-
 def _millimetres(point: Reals) -> list[float]:
     rounded: list[float] = (np.round(point * 200) * 5 + 0.0).tolist()  # to 5 mm
     return rounded
@@ -542,7 +518,7 @@ def _known(robot: str, name: str | None) -> Arm:
 
 
 def _text(content: RobotFile) -> str:
-    return SCHEMA_LINE + yaml_text(content.model_dump(exclude_none=True, exclude_defaults=True))
+    return SCHEMA_LINE + robot_text(content)
 
 
 STUDY = "config/config.yaml"
@@ -599,14 +575,7 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
         a file stands where one would be written; then nothing is written
     """
     name = arm.robot.name
-    places = {
-        "README.md",
-        STUDY,
-        SCENE,
-        f"data/robots/{name}.yaml",
-        f"data/targets/{name}.yaml",
-        f"data/paths/{name}.yaml",
-    }
+    places = {"README.md", STUDY, SCENE, *(f"data/{kind}/{name}.yaml" for kind in ("robots", "targets", "paths"))}
     if there := sorted(place for place in places if (folder / place).exists()):
         raise Er3aError(f"{folder / there[0]} is there already, and is kept; give another folder")
     found = _found(arm)
@@ -636,7 +605,8 @@ def _found(arm: Arm) -> FoundTasks:
         search = TaskSearch(arm.robot, reach, parse(SceneFile, scene, None).scene(), settings)
         spots = search.spots()
         if len(spots) >= LEAST_TARGETS and (paths := search.paths(spots)):
-            missing = (f"No {_without_path(kind, search)}" for kind in search.rejected if kind not in _kinds(paths))
+            found = {path["kind"] for path in paths}
+            missing = (f"No {_without_path(kind, search)}" for kind in search.rejected if kind not in found)
             return FoundTasks(scene, spots, paths, True, True, tuple(_unexamined(arm, search)), tuple(missing))
         if best is None or len(spots) >= len(best[2]):
             best = scene, search, spots
@@ -674,10 +644,6 @@ def _remedy(arm: Arm) -> str:
             "the gap at a joint: without --split the hulls are taken, and what overlaps around a joint is left out."
         )
     return text
-
-
-def _kinds(paths: list[dict[str, Any]]) -> set[str]:
-    return {path["kind"] for path in paths}
 
 
 def _without_path(kind: str, search: TaskSearch) -> str:

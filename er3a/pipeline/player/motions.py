@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 from urllib.parse import urlencode
 
@@ -71,7 +71,6 @@ class PlayedMotion:
     ----------
     name, text : what it is called, and what is said of it where no event is near; label : for people, if not the name
     t : (N,), s, rising; q : (N, n), joint coordinates, finite
-    timed : false where no times are known: ``t`` counts points then, which are shown at an even pace
     beside : (N, n) each, joint coordinates of the arms that stand beside the first
     """
 
@@ -80,7 +79,6 @@ class PlayedMotion:
     t: Reals
     q: Reals
     events: Sequence[PlayedEvent] = ()
-    marks: Sequence[Mark] = field(default=())
-    timed: bool = True
+    marks: Sequence[Mark] = ()
     beside: Sequence[Reals] = ()
     label: str = ""

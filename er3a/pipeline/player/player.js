@@ -82,7 +82,7 @@ function frame(now) {
   awaited = false;
   if (playing) {
     const until = playedUntil();
-    t += ((now - last) / 1000) * Number(part("speed").value) * (motion.rate ?? 1);
+    t += ((now - last) / 1000) * Number(part("speed").value);
     last = now;
     if (t >= until) {
       t = until;
@@ -134,8 +134,7 @@ function toolFrame(T) {
 function tell() {
   if (bar.dataset.motion !== motion.name) newMotion();
   bar.value = String(t);
-  const [said, digits] = motion.rate ? [words.points, 0] : [words.clock, 3];
-  clock.textContent = said.replace("{t}", fixed(t, digits)).replace("{end}", fixed(end(), digits));
+  clock.textContent = words.clock.replace("{t}", fixed(t, 3)).replace("{end}", fixed(end(), 3));
   bar.setAttribute("aria-valuetext", clock.textContent);
   const text = motion.events.filter(isNow).map((event) => event.text).join(words.between) || motion.text;
   show(nowShown, text);

@@ -26,7 +26,6 @@ from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
 MOST_FRAMES, FRAMES_IN_ALL, FEWEST_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
-UNTIMED_S = 8.0  # how long a motion without times is shown
 MOST_FACES, FEWEST_CORNERS = 2000, 12  # of an arm, and of a convex piece
 BALL = 24  # corners of each end of a capsule
 SCENE_COLOUR = "#b9a78f"
@@ -56,7 +55,6 @@ WORDS = {
     "speed": N_("speed ×"),
     "time": N_("time of the motion"),
     "clock": N_("t = {t} s of {end} s"),
-    "points": N_("point {t} of {end}"),
     "joints": N_("Joint values at this moment, and how far each is from the nearer of its limits; ▲ marks the least."),
     "room": N_("{room} to limit"),
     "beyond": N_("{room} beyond"),
@@ -238,20 +236,15 @@ def _motion(motion: PlayedMotion, most: int) -> dict[str, Any]:
     rows = _shown(motion, most)
     return {
         "name": motion.name,
-        "rate": None if motion.timed else max(1.0, float(motion.t[-1]) / UNTIMED_S),
         "text": motion.text,
         "times": np.round(motion.t[rows], 4).tolist(),
-        "values": [_packed(q[rows]) for q in (motion.q, *motion.beside)],
+        "values": [base64.b64encode(q[rows].astype("<f4")).decode() for q in (motion.q, *motion.beside)],
         "events": [asdict(event) for event in sorted(motion.events, key=lambda event: event.t)],
         "marks": [
             {"from": mark.start, "to": mark.end, "text": mark.text, "t0": mark.t0, "t1": mark.t1}
             for mark in motion.marks
         ],
     }
-
-
-def _packed(q: Reals) -> str:
-    return base64.b64encode(q.astype("<f4").tobytes()).decode("ascii")
 
 
 def _shown(motion: PlayedMotion, most: int) -> np.ndarray:

@@ -38,21 +38,6 @@ class StudyFiles(Protocol):
     def loads(self, name: str) -> list[LoadFields]: ...
 
 
-def applies_to_all(robot: Robot) -> Finding | None:
-    """For stages that can be computed for every robot."""
-    return None
-
-
-def no_files(study: StudyFiles, robot: str) -> list[Path]:
-    """For stages that read nothing but the robot's file."""
-    return []
-
-
-def wanted_of_all(study: StudyFiles, robot: str) -> bool:
-    """For stages that every robot of a study goes through."""
-    return True
-
-
 @dataclass(frozen=True)
 class Stage:
     """An entry of the registry.
@@ -78,10 +63,10 @@ class Stage:
     title: str
     question: str
     settings: Mapping[str, type[StrictModel]]
-    inputs: Callable[[StudyFiles, str], list[Path]] = no_files
+    inputs: Callable[[StudyFiles, str], list[Path]] = lambda study, robot: []
     given: Callable[[StudyFiles, str], dict[str, Any]] = lambda study, robot: {}
-    wanted: Callable[[StudyFiles, str], bool] = wanted_of_all
-    applies: Callable[[Robot], Finding | None] = applies_to_all
+    wanted: Callable[[StudyFiles, str], bool] = lambda study, robot: True
+    applies: Callable[[Robot], Finding | None] = lambda robot: None
     absences: tuple[type[Finding], ...] = ()
     views: tuple[str, ...] = ("record", "report")
     rests_on: tuple[str, ...] = ()

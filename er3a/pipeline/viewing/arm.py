@@ -116,11 +116,6 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
             stream.log(f"{path}/axis", axis, tip, static=True)
     if not ghost:
         stream.log(f"{entity}/tool", rr.TransformAxes3D(radius * 3), static=True)
-    log_pose(stream, robot, q, entity)
-
-
-def log_pose(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str = "arm") -> None:
-    """Set the arm's pose for all times: joint angles (6,) in rad."""
     for path, T in zip(_moving_entities(robot, entity), frames(robot, q)):
         stream.log(path, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]), static=True)
 

@@ -18,7 +18,7 @@ from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement, PointObservations, observed
 from er3a.comparison.compare import compare
 from er3a.files.kept_files import sha256
-from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.files.robot_writer import robot_file, robot_text
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages import language
@@ -108,7 +108,7 @@ def write_calibration(
     held_back : positions that the fit has not seen
     """
     errors = measured_errors(robot, measurements, found)
-    text = yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True))
+    text = robot_text(robot_file(corrected))
     comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
     residuals = found.beyond.residuals if found.beyond else found.residuals
     table = str(files[0]) if len(files) > 1 else robot.name

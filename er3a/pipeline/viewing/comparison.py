@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.comparison.compare import Comparison
 from er3a.files.kept_files import sha256
-from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.files.robot_writer import robot_file, robot_text
 from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.comparison import headline, layer_rows
@@ -30,11 +30,7 @@ def write_comparison(
 ) -> None:
     """Render a comparison as a page; ``one`` and ``other``: as they were named on the command line, and read."""
     corrected = found.corrected
-    text = (
-        ""
-        if corrected is None
-        else yaml_text(robot_file(corrected).model_dump(exclude_none=True, exclude_defaults=True))
-    )
+    text = "" if corrected is None else robot_text(robot_file(corrected))
     lengths, angles = (f"{value:g}" for value in tolerances)
     words = ["--tolerance-mm", lengths, "--tolerance-deg", angles, "--html", str(output)]
     files = [Path(name) for name, _ in (one, other) if Path(name).is_file()]
@@ -47,7 +43,7 @@ def write_comparison(
         verdict=found.verdict,
         headline=headline(found),
         layers=layer_rows(found),
-        columns=_columns(one[1]),
+        columns=_columns(),
         rows=[] if corrected is None else _rows(one[1], corrected),
         corrected=text,
         corrected_address=page.text_address(text),
@@ -56,7 +52,7 @@ def write_comparison(
     )
 
 
-def _columns(robot: Robot) -> list[str]:
+def _columns() -> list[str]:
     units = {"a": "mm", "d": "mm", "direction": ""}
     return [
         bracketed(column, tr(unit)) if (unit := units.get(column, "deg")) else tr("direction") for column in COLUMNS

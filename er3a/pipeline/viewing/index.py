@@ -59,7 +59,7 @@ from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.numbers import number
-from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, stage_head, status_word, stored_head
+from er3a.pipeline.viewing.page import PAGES, Head, Picture, alternative_table, head_of, stage_head, status_word
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -571,7 +571,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
     robot, expected = study.robot(name), study.entry(name).expect
     stages = [stage for stage in study.stages(name) if stage in STAGES]
     stored = {stage: read_stage(results / stage, STAGES[stage]) for stage in stages if is_computed(results / stage)}
-    heads = {stage: stored_head(each) for stage, each in stored.items()}
+    heads = {stage: head_of(each) for stage, each in stored.items()}
     failed = {
         stage: tr(STAGES[stage].title)
         for stage, head in heads.items()

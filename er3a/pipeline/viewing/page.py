@@ -210,19 +210,14 @@ class Head:
         return self.text.removesuffix(self.banner).rstrip()
 
 
-def head_of(stored: Stored[Any], figure_words: dict[str, str], links: Mapping[str, str] | None = None) -> Head:
-    """The head of a stage's page.
-
-    Parameters
-    ----------
-    figure_words : names of key figures by code, marked with ``N_``
-    links : as of :class:`Head`
-    """
+def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head:
+    """The head of a stage's page; ``links`` as of :class:`Head`."""
     verdict, stage = stored.results.summary.verdict, stored.stage
+    words = import_module(STAGES[stage].messages).FIGURES
     shown = tuple(
         ShownFigure(
             figure.name,
-            language.translated(f"{stage}.figure", figure_words[figure.name]),
+            language.translated(f"{stage}.figure", words[figure.name]),
             figure.value,
             tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
             figure.uncertainty,
@@ -337,7 +332,7 @@ def render_stage(
     """
     name, stage = stored.robot, stored.stage
     shared = {
-        "head": head or head_of(stored, import_module(STAGES[stage].messages).FIGURES, head_links),
+        "head": head or head_of(stored, head_links),
         "command": run_command(study, f"{name}/{stage}.html"),
         "robot": study.robot(name),
         "robot_pages": study.pages(name),
@@ -479,13 +474,7 @@ def panel_link(q_deg: Iterable[float], text: str) -> str:
 
 def stage_head(folder: Path, stage: Stage) -> Head:
     """The verdict and key figures that a folder holds, in the page's language."""
-    return stored_head(read_stage(folder, stage))
-
-
-def stored_head(stored: Stored[Any]) -> Head:
-    """The verdict and key figures of a stage's results, in the page's language."""
-    words = import_module(STAGES[stored.stage].messages)
-    return head_of(stored, words.FIGURES)
+    return head_of(read_stage(folder, stage))
 
 
 def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
@@ -493,7 +482,7 @@ def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> 
     render(
         Path(__file__).with_name("absent.html.j2"),
         output,
-        head=head_of(stored, {}),
+        head=head_of(stored),
         command=run_command(study, f"{stored.robot}/{stored.stage}.html"),
         robot=study.robot(stored.robot),
         robot_pages=study.pages(stored.robot),

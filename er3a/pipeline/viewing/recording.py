@@ -204,12 +204,6 @@ def recording(
     write_atomically(output, lambda file: file.write_bytes(content))
 
 
-def write_reason(output: Path, name: str, stage: str, markdown: str) -> None:
-    """Write the recording of a stage that was not computed: a text alone."""
-    with recording(output, name, stage, _note_view(stage)) as stream:
-        _log_text(stream, f"{stage}/note", markdown)
-
-
 def escaped(text: str) -> str:
     """A text from an input file for a Markdown document: shown as it is, on one line, with nothing fetched for it."""
     return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
@@ -393,4 +387,5 @@ def _touching(shown: Recorded, events: Sequence[PlayedEvent]) -> Iterator[tuple[
 
 def record_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
     """Write the recording of a stage that was not computed, which holds the reason alone."""
-    write_reason(output, stored.robot, stored.stage, escaped(say(stored.results.summary.verdict.finding)))
+    with recording(output, stored.robot, stored.stage, _note_view(stored.stage)) as stream:
+        _log_text(stream, f"{stored.stage}/note", escaped(say(stored.results.summary.verdict.finding)))

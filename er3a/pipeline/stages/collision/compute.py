@@ -98,18 +98,9 @@ def path_clearances(
 
 
 def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int) -> model.Closest:
-    points = bodies.surface_points(q, int(pair)) * 1000
-    name, kind, t = about
-    return model.Closest(
-        name,
-        kind,
-        float(distance * 1000),
-        bodies.pairs[pair],
-        t,
-        tuple(shown(bodies.robot, q).tolist()),
-        tuple(points[0].tolist()),
-        tuple(points[1].tolist()),
-    )
+    first, second = (tuple(point.tolist()) for point in bodies.surface_points(q, int(pair)) * 1000)
+    (name, kind, t), q_deg = about, tuple(shown(bodies.robot, q).tolist())
+    return model.Closest(name, kind, float(distance * 1000), bodies.pairs[pair], t, q_deg, first, second)
 
 
 STAGE_NAME = "collision"
@@ -144,11 +135,13 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     closest = (*at_targets, *on_paths)
     margin = study.section(TrajectorySettings).assumed_margin_mm / 1000
     assumed = shapes_assumed(robot, margin, {each.name: each.clearance_mm / 1000 for each in closest})
+    joined = places_found.joined
+    free = model.FreeSpace(
+        space.whole.value, places_found.reached, places_found.clear, joined, undecided, assumed is not None
+    )
     return model.CollisionResults(
         summary=model.CollisionSummary(
-            verdict=_verdict(
-                pairs, mounting, wrong or home_found, _free_space(space, places_found, undecided, assumed is not None)
-            )
+            verdict=_verdict(pairs, mounting, wrong or home_found, free)
             .without(() if wrong else bodies.unexamined)
             .resting_on(assumed),
             figures=_figures(space, places_found, matrix),
@@ -250,12 +243,6 @@ def _places_summary(places: free_space.ClearPlaces) -> model.PlacesSummary:
         clear_m3=clear * cell,
         lost_m3=(len(places.clear) - clear) * cell,
     )
-
-
-def _free_space(
-    space: free_space.JointSpace, places: model.PlacesSummary, undecided: int, assumed: bool
-) -> model.FreeSpace:
-    return model.FreeSpace(space.whole.value, places.reached, places.clear, places.joined, undecided, assumed)
 
 
 def _verdict(

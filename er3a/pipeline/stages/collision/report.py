@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
 
 from er3a.collision.pairs import TRIED
 from er3a.kinematics.forward import skeleton
@@ -20,7 +22,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.played import motions
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.figures import axis_label, equal_scale, new_figure
+from er3a.pipeline.viewing.figures import clearance_panels, equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, LINK, MODEL, MUTED, REFERENCE, VERDICTS
@@ -28,8 +30,6 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 MOST_PAIRS = 12
-COLUMNS = 4
-ROW_HEIGHT = 1.5
 LOST, CLEAR, JOINED = 0, 1, 2
 
 
@@ -55,18 +55,24 @@ def by_pair(pairs: model.PairShares) -> Picture | None:
     return Picture(figure, tr("Bars: share of joint space per pair. {conclusion}", conclusion=caption), caption)
 
 
+def _two_views(height: float) -> tuple[Figure, list[tuple[Axes, list[int]]]]:
+    """A figure with a drawing from the side and one from above, each with the numbers of its coordinates."""
+    figure, axes = new_figure(1, 2, width=11.0, height=height)
+    for ax, up, title in zip(axes, (tr("z (mm)"), tr("y (mm)")), (tr("From the side"), tr("From above"))):
+        equal_scale(ax, tr("x (mm)"), up)
+        ax.set_title(title)
+    return figure, list(zip(axes, ([0, 2], [0, 1])))
+
+
 def workspace(results: model.CollisionResults) -> Picture:
     """From the side and from above: what of the reached places is clear, joined to home, or lost."""
     rows = results.places
     state = np.where(rows.joined, JOINED, np.where(rows.clear, CLEAR, LOST))
-    figure, axes = new_figure(1, 2, width=11.0, height=5.2)
+    figure, views = _two_views(5.2)
     cell = results.summary.places.cell_m * 1000
-    labels = (tr("x (mm)"), tr("y (mm)"), tr("z (mm)"))
-    for ax, (across, up), title in zip(axes, ((0, 2), (0, 1)), (tr("From the side"), tr("From above"))):
-        mesh = _columns(ax, rows.middle_mm[:, [across, up]], state, cell)
-        equal_scale(ax, labels[across], labels[up])
-        ax.set_title(title)
-    figure.colorbar(mesh, ax=axes.tolist(), label=tr("reached cells lost to collisions (%)"), shrink=0.8)
+    for ax, plane in views:
+        mesh = _columns(ax, rows.middle_mm[:, plane], state, cell)
+    figure.colorbar(mesh, ax=figure.axes[:2], label=tr("reached cells lost to collisions (%)"), shrink=0.8)
     found = results.summary.places
     numbers = {
         "cell": cell,
@@ -129,21 +135,7 @@ def clearance_over_time(results: model.CollisionResults) -> Picture | None:
     names = [str(name) for name in dict.fromkeys(rows.path) if np.isfinite(rows.clearance_mm[rows.path == name]).any()]
     if not names:
         return None
-    count = -(-len(names) // COLUMNS)
-    figure, axes = new_figure(count, COLUMNS, width=11.0, height=ROW_HEIGHT * count + 0.4, sharey=True, squeeze=False)
-    panels = list(zip(axes.flat, names))
-    for ax, name in panels:
-        part = rows.take(rows.path == name)
-        ax.plot(part.t_s, part.clearance_mm, color=MODEL)
-        ax.fill_between(part.t_s, part.clearance_mm, 0, where=part.clearance_mm < 0, color=VERDICTS["fail"], alpha=0.5)
-        ax.axhline(0, color=INK, linewidth=0.8)
-        ax.set_title(name, fontsize=9)
-    for ax in axes.flat[len(names) :]:
-        ax.set_visible(False)
-    for ax in axes[:, 0]:
-        ax.set_ylabel(axis_label(rows, "clearance_mm"), fontsize=8)
-    for ax in axes[-1]:
-        ax.set_xlabel(axis_label(rows, "t_s"), fontsize=8)
+    figure, panels = clearance_panels(rows, names)
     met = [found.name for found in results.summary.closest if found.kind == "path" and found.clearance_mm < 0]
     caption = (
         tr("Below zero bodies overlap: {paths}.", paths=joined(met, ", "))
@@ -158,14 +150,11 @@ def closest_pair(robot: Robot, found: model.Closest) -> Picture:
     """The arm where it is nearest to anything, from the side and from above, with the two points."""
     points = skeleton(robot, meant(robot, np.array(found.q_deg))) * 1000
     pair = np.array([found.from_mm, found.to_mm])
-    figure, axes = new_figure(1, 2, width=11.0, height=4.6)
-    labels = (tr("x (mm)"), tr("y (mm)"), tr("z (mm)"))
-    for ax, (across, up), title in zip(axes, ((0, 2), (0, 1)), (tr("From the side"), tr("From above"))):
-        ax.plot(points[:, across], points[:, up], color=LINK, linewidth=7, solid_capstyle="round", zorder=1)
-        ax.plot(points[:, across], points[:, up], color=MUTED, linewidth=1, zorder=2)
-        ax.plot(pair[:, across], pair[:, up], "o-", color=HIGHLIGHT, markersize=5, zorder=3)
-        equal_scale(ax, labels[across], labels[up])
-        ax.set_title(title)
+    figure, views = _two_views(4.6)
+    for ax, plane in views:
+        ax.plot(*points[:, plane].T, color=LINK, linewidth=7, solid_capstyle="round", zorder=1)
+        ax.plot(*points[:, plane].T, color=MUTED, linewidth=1, zorder=2)
+        ax.plot(*pair[:, plane].T, "o-", color=HIGHLIGHT, markersize=5, zorder=3)
     caption = tr(
         "{name}: {pair}, {clearance} mm apart; the line joins the two nearest points of their surfaces.",
         name=found.name,

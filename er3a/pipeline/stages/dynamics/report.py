@@ -17,7 +17,7 @@ from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import fixed, no_noise, number
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED
 
@@ -212,7 +212,7 @@ def _motor(motor: model.MotorNeed) -> list[str]:
     needs = motor.peak, motor.rms, motor.holding, motor.speed, motor.power_w
     return [
         _label(motor.joint, motor.unit),
-        *(number(_no_noise(value), 3) for value in needs),
+        *(number(no_noise(value), 3) for value in needs),
         inertia,
         *(
             NONE if value is None else number(value, 3)
@@ -275,10 +275,10 @@ def _joints(path: model.PathLoad) -> list[list[str]]:
     return [
         [
             _label(load.joint, load.unit),
-            f"{number(_no_noise(load.peak), 3)} ± {number(_no_noise(load.tolerance), 2)}",
+            f"{number(no_noise(load.peak), 3)} ± {number(no_noise(load.tolerance), 2)}",
             moment(path.name, load.peak_at_s, fixed(load.peak_at_s, 2)),
-            f"{number(_no_noise(load.rms), 3)} ± {number(_no_noise(load.rms_tolerance), 2)}",
-            *(number(_no_noise(getattr(load, part)), 3) for part in model.PARTS),
+            f"{number(no_noise(load.rms), 3)} ± {number(no_noise(load.rms_tolerance), 2)}",
+            *(number(no_noise(getattr(load, part)), 3) for part in model.PARTS),
             _both(load.power_w, load.braking_w),
             _both(load.work_j, load.recovered_j),
         ]
@@ -287,11 +287,11 @@ def _joints(path: model.PathLoad) -> list[list[str]]:
 
 
 def _both(given: float, taken: float) -> Markup:
-    return Markup("{}<br>{}").format(number(_no_noise(given), 3), number(_no_noise(taken), 3))
+    return Markup("{}<br>{}").format(number(no_noise(given), 3), number(no_noise(taken), 3))
 
 
 def _held(held: model.HoldingTorque) -> list[str]:
-    found, bound, tolerance = (_no_noise(value) for value in (abs(held.torque), held.bound, held.tolerance))
+    found, bound, tolerance = (no_noise(value) for value in (abs(held.torque), held.bound, held.tolerance))
     pose = panel_link(held.q, ", ".join(fixed(value, 0) for value in held.q))
     return [_label(held.joint, held.unit), number(found, 4), bound_text(bound), number(tolerance, 2), pose]
 
@@ -306,13 +306,9 @@ def _wrist(summary: model.DynamicsSummary) -> list[list[str]]:
         [
             path.name,
             f"J{moment.joint}",
-            f"{number(_no_noise(moment.moment_n_m), 3)} ± {number(_no_noise(moment.tolerance), 2)}",
+            f"{number(no_noise(moment.moment_n_m), 3)} ± {number(no_noise(moment.tolerance), 2)}",
             fixed(moment.t_s, 2),
         ]
         for path in summary.paths
         for moment in path.wrist
     ]
-
-
-def _no_noise(value: float) -> float:
-    return 0.0 if abs(value) < 1e-9 or not np.isfinite(value) else value

@@ -94,7 +94,7 @@ def solve_target(
             alone = scene is not None and _usable(robot, None, clearance)(solutions.q[solutions.within_limits]).any()
             advice = (model.MoveObstacle(),) if alone else ()
         else:
-            obstacle = _obstacle(robot, target, solutions, len(found))
+            obstacle = _obstacle(robot, target, len(found))
         if advise and has_branches(robot):
             usable = _usable(robot, scene, clearance)
             near = stated(model.NeighbourPoses, neighbours(robot, target.T, random, usable))
@@ -203,7 +203,7 @@ def _method(robot: Robot, method: Method) -> Method:
     return method
 
 
-def _obstacle(robot: Robot, target: Target, solutions: Solutions, branches: int) -> model.Obstacle:
+def _obstacle(robot: Robot, target: Target, branches: int) -> model.Obstacle:
     """Why there is no solution within the limits: of the branch that misses the pose by least."""
     if branches:
         return model.BranchesLeaveLimits(branches)

@@ -37,7 +37,7 @@ from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, new_figure, row_of_panels
-from er3a.pipeline.viewing.numbers import fixed, number
+from er3a.pipeline.viewing.numbers import fixed, no_noise, number
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MODEL, MUTED, colour_of, shape_of
 from er3a.robots.joint_limits import LimitsExceeded, meant, shown
@@ -465,16 +465,11 @@ def _rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
     for branch in np.unique(ranked.branch):
         own = ranked.take(ranked.branch == branch)
         cells = {
-            rule: f"{number(_no_noise(measure), 3)}{NO_BREAK_SPACE}({place or collides})"
+            rule: f"{number(no_noise(measure), 3)}{NO_BREAK_SPACE}({place or collides})"
             for rule, measure, place in zip(own.rule, own.measure, own.place)
         }
         rows.append([_on_one_line(own.label[0], int(branch)), *(cells.get(rule, "–") for rule in rules)])
     return rows
-
-
-def _no_noise(measure: float) -> float:
-    """0 for what is nothing but rounding."""
-    return 0.0 if abs(measure) < 1e-9 else float(measure)
 
 
 def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:

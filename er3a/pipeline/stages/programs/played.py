@@ -15,12 +15,11 @@ from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, Weigh
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
-from er3a.robots.robot import Robot
 
 WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
 
 
-def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
+def motions(results: ProgramsResults) -> list[PlayedMotion]:
     """The programs as far as they were followed, the worst first, as the player shows them.
 
     The motion of each line is an event with its text, its verdict and what touches; each finding is one at its moment.

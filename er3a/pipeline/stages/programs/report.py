@@ -33,7 +33,6 @@ from er3a.programs.languages import LANGUAGES
 
 MOST_LINES = 400  # of a listing that the page shows
 AROUND = 3  # lines around those with motions or findings, in a longer listing
-STATUSES: dict[Level, str] = {"pass": "pass", "note": "pass", "caution": "caution", "fail": "fail"}
 
 
 def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) -> None:
@@ -48,7 +47,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
         faults={fault.name: fault for fault in faults(results)},
-        player=player(robot, motions(robot, results), scene),
+        player=player(robot, motions(results), scene),
         bodies=[each.name for each in scene.solids] if scene else [],
         solids=solid_rows(scene),
         drawing_head=drawing_head(),
@@ -71,7 +70,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
     motion = results.motion.take(results.motion.program == program.name)
     return dict(
         program=program,
-        status=STATUSES[program.outcome],
+        status=program.outcome,
         language=LANGUAGES[program.language].title,
         cycle=cycle_text(program),
         lines=_listing(program, text, rows, motion, found),

@@ -103,7 +103,7 @@ class AvoidanceTask:
         collides = bool(along.contacts)
         if (collides or found.beyond or found.limits) and motion.no_way is None and self.only in (None, "planned"):
             results += self._planned(motion)
-        margin = self._margin_of(along)
+        margin, name = self._margin_of(along), motion.entry.name
         met = {result.name: self._meets(result.cost, margin) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
@@ -113,7 +113,12 @@ class AvoidanceTask:
             tried=tried,
             chosen=chosen.name if chosen else None,
             fastest_s=quickest.duration if quickest else None,
-            rows=model.AvoidanceRows.stacked(self._tables(motion, results, quickest)),
+            rows=model.AvoidanceRows.stacked(
+                [
+                    *(self._rows(name, each.name, each.cost.motion, each.cost) for each in results if each.cost),
+                    *([self._rows(name, model.FASTEST, quickest, None)] if quickest else []),
+                ]
+            ),
         )
 
     def _no_more_than(self, found: judgement.Judgement) -> JointLimits:
@@ -182,25 +187,14 @@ class AvoidanceTask:
         ends = along.distance[[0, -1]]
         return float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))
 
-    def _tables(
-        self, motion: Motion, results: list[StrategyResult], quickest: Timed | None
-    ) -> Iterator[model.AvoidanceRows]:
-        for result in results:
-            if result.cost:
-                deviations = (result.cost.distance, result.cost.angle)
-                yield self._rows(motion.entry.name, result.name, result.cost.motion, deviations)
-        if quickest:
-            yield self._rows(motion.entry.name, model.FASTEST, quickest, None)
-
-    def _rows(
-        self, path: str, strategy: str, timed: Timed, deviations: tuple[Reals, Reals] | None
-    ) -> model.AvoidanceRows:
+    def _rows(self, path: str, strategy: str, timed: Timed, cost: StrategyCost | None) -> model.AvoidanceRows:
         """At most ROWS rows of a motion, and those of its maximum speed and deviation."""
         kept = np.unique(np.linspace(0, len(timed.t) - 1, min(ROWS, len(timed.t))).round().astype(int))
-        kept = kept if deviations is None else np.union1d(kept, [np.argmax(deviations[0])])
+        kept = kept if cost is None else np.union1d(kept, [np.argmax(cost.distance)])
         times = np.union1d(timed.t[kept], [self._fastest_time(timed)])
         q, velocity, acceleration = timed.curve.rates(times)
-        distance, angle = (np.interp(times, timed.t, part) for part in deviations or (np.zeros(len(timed.t)),) * 2)
+        off = (cost.distance, cost.angle) if cost else (np.zeros(len(timed.t)),) * 2
+        distance, angle = (np.interp(times, timed.t, part) for part in off)
         measures = conditioning(self.robot, q, characteristic_length(self.robot))
         return model.AvoidanceRows.of(
             path=path,
@@ -303,7 +297,7 @@ def path_summary(
         corner_deviation_deg=_greatest(np.degrees(getattr(motion.built.joints, "deviation", []))),
         repeated_rows=tuple(motion.built.repeated_rows),
         sliding=tuple((np.flatnonzero(robot.slides) + 1).tolist()),
-        start_turn_deg=None if followed is None else _degrees(followed.start_turn),
+        start_turn_deg=None if followed is None else tuple(np.degrees(followed.start_turn).tolist()),
         singularities=tuple(_singularity(event) for event in found.events),
         unreachable=_stretches(motion, found.beyond),
         out_of_limits=_stretches(motion, found.limits),
@@ -358,10 +352,6 @@ def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> t
 
 def _greatest(values: Reals) -> float | None:
     return float(values.max()) if values.size else None
-
-
-def _degrees(values: Reals) -> tuple[float, ...]:
-    return tuple(float(value) for value in np.degrees(values))
 
 
 def compute(study: Study, name: str) -> model.TrajectoryResults:

@@ -6,7 +6,6 @@ Layout is fixed, so that matplotlib draws each figure once.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -30,7 +29,7 @@ from er3a.pipeline.messages.trajectory import event_word
 from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
-from er3a.pipeline.viewing.figures import axis_label, new_figure, svg_data_uri
+from er3a.pipeline.viewing.figures import axis_label, clearance_panels, svg_data_uri
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.joint_limits import meant, shown
@@ -339,25 +338,15 @@ def _legend(path: model.PathSummary) -> list[Line2D | Patch]:
     return handles
 
 
-CLEARANCE_COLUMNS = 4
-ROW_HEIGHT = 1.5
-
 Measured = tuple[model.PathSummary, model.MinClearance]
 
 
-@dataclass(frozen=True)
-class ClearanceSection:
-    """The picture, None where no path has a pose that can be reached, and the rows of the table."""
-
-    picture: Picture | None
-    rows: list[list[str]]
-
-
-def clearance_section(results: model.TrajectoryResults, most: int) -> ClearanceSection:
-    """What the section needs; at most so many paths, those with the smallest clearance, are drawn."""
+def clearance_section(results: model.TrajectoryResults, most: int) -> dict[str, Any]:
+    """The picture, if any path has a pose that can be reached, and the rows of the table; at most so many paths, those
+    with the smallest clearance, are drawn."""
     paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
     if not paths:
-        return ClearanceSection(None, [])
+        return {"picture": None, "rows": []}
     colliding = [path.name for path, _ in paths if path.collisions]
     if colliding:
         names = joined(colliding, ", ")
@@ -370,42 +359,23 @@ def clearance_section(results: model.TrajectoryResults, most: int) -> ClearanceS
     if len(paths) > most:
         caption = joined([caption, tr("Drawn: the {count} paths with the least clearance.", count=most)], " ")
     alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
-    return ClearanceSection(Picture(_curves(drawn, results), alt, caption), [_row(*measured) for measured in paths])
+    rows = [
+        [path.name, fixed(least.least_mm, 1), fixed(least.t_s, 3), say(least.between), str(least.poses_measured)]
+        for path, least in paths
+    ]
+    return {"picture": Picture(_curves(drawn, results.clearance), alt, caption), "rows": rows}
 
 
-def _row(path: model.PathSummary, least: model.MinClearance) -> list[str]:
-    return [path.name, fixed(least.least_mm, 1), fixed(least.t_s, 3), say(least.between), str(least.poses_measured)]
-
-
-def _curves(paths: list[Measured], results: model.TrajectoryResults) -> Figure:
-    rows = results.clearance
-    count = -(-len(paths) // CLEARANCE_COLUMNS)
-    figure, axes = new_figure(
-        count, CLEARANCE_COLUMNS, width=11.0, height=ROW_HEIGHT * count + 0.4, sharey=True, squeeze=False
-    )
-    for ax, (path, least) in zip(axes.flat, paths):
-        part = rows.take(rows.path == path.name)
-        t, clearance = part.t_s, part.clearance_mm
-        ax.plot(t, clearance, color=palette.MODEL)
-        ax.fill_between(
-            t, clearance, 0, where=clearance < 0, color=palette.VERDICTS["fail"], alpha=0.5, interpolate=True
-        )
-        ax.axhline(0, color=palette.INK, linewidth=0.8)
+def _curves(paths: list[Measured], rows: model.Clearances) -> Figure:
+    figure, panels = clearance_panels(rows, [path.name for path, _ in paths])
+    for (ax, _), (path, least) in zip(panels, paths):
         colour = palette.VERDICTS["fail"] if least.least_mm <= 0 else palette.INK
         ax.plot(least.t_s, least.least_mm, "o", color=colour, markersize=4)
         for gap in path.unreachable:
             ax.axvspan(gap.t0_s, gap.t1_s, color=palette.MUTED, alpha=0.25, linewidth=0)
-        ax.set_title(path.name, fontsize=9)
         ax.set_xlim(0, path.duration_s)
-    for ax in axes.flat[len(paths) :]:
-        ax.set_visible(False)
-    for ax in axes[:, 0]:
-        ax.set_ylabel(axis_label(rows, "clearance_mm"), fontsize=8)
-    for k, ax in enumerate(axes.flat[: len(paths)]):
-        if k + CLEARANCE_COLUMNS >= len(paths):
-            ax.set_xlabel(axis_label(rows, "t_s"), fontsize=8)
     low, high = np.nanmin(rows.clearance_mm), np.nanmax(rows.clearance_mm)
-    axes[0, 0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
+    panels[0][0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
     return figure
 
 

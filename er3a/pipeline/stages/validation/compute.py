@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.calibration.calibrate import Calibration, calibrate
+from er3a.calibration.calibrate import calibrate
 from er3a.calibration.outcomes import CalibrationError
 from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of, residuals
 from er3a.diagnosis.ranking import Ranking, usable
@@ -54,7 +54,7 @@ def calibrate_from_sets(
     robot: Robot, sets: list[ReferenceSet]
 ) -> tuple[tuple[model.SetCalibration, ...], model.Corrections]:
     """Estimate corrections to the table from each reference set's positions."""
-    found, tables = [], []
+    found, rows = [], []
     for references in sets:
         try:
             calibration = calibrate(robot, references)
@@ -63,15 +63,19 @@ def calibrate_from_sets(
             continue
         found.append(model.SetCalibration(references.name, stated(model.Calibrated, calibration)))
         if calibration.fits:
-            tables.append(_corrections(references.name, calibration))
-    return tuple(found), model.Corrections.stacked(tables)
-
-
-def _corrections(reference_set: str, found: Calibration) -> model.Corrections:
-    return model.Corrections.of_rows(
-        (reference_set, each.name, each.unit, each.nominal, each.correction, each.standard_error, each.half_width)
-        for each in found.estimates
-    )
+            rows += [
+                (
+                    references.name,
+                    each.name,
+                    each.unit,
+                    each.nominal,
+                    each.correction,
+                    each.standard_error,
+                    each.half_width,
+                )
+                for each in calibration.estimates
+            ]
+    return tuple(found), model.Corrections.of_rows(rows)
 
 
 def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[tuple[model.SetDiagnosis, ...], model.Residuals]:
@@ -266,7 +270,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     sets = [load_references(reference, robot) for reference in robot.references]
     check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
 
-    turning, six = is_turning(robot), is_six_turning(robot)
+    turning = is_turning(robot)
     stated = [quantity for references in sets for quantity in quantities_of(references.checkable)]
     sought = [quantity for quantity in stated if isinstance(quantity, quantities.Extreme)]
     wanted = dict.fromkeys([*always_searched(robot), *sought])
@@ -322,7 +326,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         checks=model.Checks.of_records(checks),
         axes=axes,
         key_poses=poses,
-        section=section_table(robot, extremes) if six else model.Section.empty(),
+        section=section_table(robot, extremes) if turning and robot.rows == SIX else model.Section.empty(),
         residuals=residuals,
         corrections=corrections,
     )
@@ -396,11 +400,6 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> model.Table
 def is_turning(robot: Robot) -> bool:
     """Whether the arm is one of those that diagnosis and evidence are made for: revolute joints, one for each row."""
     return not robot.sliding.any() and robot.coupling is None
-
-
-def is_six_turning(robot: Robot) -> bool:
-    """Whether the arm is one of those that the workspace drawing is made for."""
-    return robot.rows == SIX and is_turning(robot)
 
 
 def always_searched(robot: Robot) -> tuple[quantities.AxisDistance, ...]:

@@ -12,13 +12,13 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
-from er3a.files.robot_writer import robot_file, yaml_text
+from er3a.files.robot_writer import robot_file, robot_text
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import GRADE_NAMES, decision
 from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, FIGURES, GRADES, GROUPS, counted_checks
+from er3a.pipeline.messages.validation import CONVENTIONS, GRADES, GROUPS, counted_checks
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model, validation_figures
 from er3a.pipeline.stages.validation.evidence_section import (
@@ -252,7 +252,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     contradicted = summary.verdict.status == "fail"
     corrected, _ = validation_figures.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
-    text = yaml_text(file.model_dump(exclude_none=True, exclude_defaults=True)) if file else ""
+    text = robot_text(file) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
     render_stage(
         study,
@@ -297,7 +297,7 @@ def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:
     ----------
     instead : a model of the same arm that evidence does not contradict
     """
-    head = head_of(stored, FIGURES)
+    head = head_of(stored)
     if head.status != "fail":
         return head
     same_arm = isinstance(head.finding, model.DefinedOtherwise)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -163,17 +163,24 @@ def _model_axes(robot: Robot) -> list[tuple[int, np.ndarray, np.ndarray]]:
 
 def _label(axes: PlotAxes, points: Iterable[tuple[int, np.ndarray]], colour: str, shift: tuple[int, int]) -> None:
     """Name joints at their points; joints that share a point share a label."""
-    groups: list[tuple[np.ndarray, list[int]]] = []
-    for joint, point in points:
-        for other, joints in groups:
-            if np.linalg.norm((point - other)[[0, 2]]) < 1.0:
-                joints.append(joint)
-                break
-        else:
-            groups.append((point, [joint]))
+    groups = _grouped(points, lambda one, other: float(np.linalg.norm((one - other)[[0, 2]])))
     for point, joints in groups:
         text = ", ".join(f"J{joint}" for joint in joints)
         axes.annotate(text, (point[0], point[2]), shift, textcoords="offset points", color=colour, zorder=6)
+
+
+def _grouped(
+    points: Iterable[tuple[int, Reals]], apart: Callable[[Reals, Reals], float]
+) -> list[tuple[Reals, list[int]]]:
+    """Points with their numbers, those at one place (to ``SAME_PLACE_MM``) together."""
+    groups: list[tuple[Reals, list[int]]] = []
+    for number, point in points:
+        there = next((numbers for other, numbers in groups if apart(point, other) < SAME_PLACE_MM), None)
+        if there is None:
+            groups.append((point, [number]))
+        else:
+            there.append(number)
+    return groups
 
 
 def _short(source: str) -> str:
@@ -200,15 +207,10 @@ def link_frames(robot: Robot, other: Robot | None, other_label: str) -> Figure:
     axes.plot(*_seen(corners).T, color=LINK, linewidth=8, solid_capstyle="round", solid_joinstyle="round", zorder=1)
     size = float(np.ptp(np.vstack(drawn), axis=0).max())
     T = np.concatenate([robot.base[None], _frames_of_links(robot)])
-    groups: list[tuple[Reals, list[int]]] = []
-    for number, frame in enumerate(T):
-        origin = frame[:3, 3] * 1000
+    origins = 1000 * T[:, :3, 3]
+    for frame, origin in zip(T, origins):
         _triad(axes, origin, frame[:3, :3], ARROW * size)
-        alike = [own for place, own in groups if np.linalg.norm(place - origin) < SAME_PLACE_MM]
-        if alike:
-            alike[0].append(number)
-        else:
-            groups.append((origin, [number]))
+    groups = _grouped(enumerate(origins), lambda one, other: float(np.linalg.norm(one - other)))
     for origin, numbers in groups:
         text = ", ".join(map(str, numbers))
         axes.annotate(

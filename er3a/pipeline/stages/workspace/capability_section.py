@@ -19,12 +19,12 @@ from er3a.geometry.transforms import rpy_along
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.language import N_, own_title, tr
+from er3a.pipeline.messages.language import own_title, tr
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.workspace import STATUS, box_text, millimetres, stand_text
 from er3a.pipeline.player.turning import CIRCLE, solid_pieces
 from er3a.pipeline.stages.workspace import model
-from er3a.pipeline.stages.workspace.workspace_figures import slide_names
+from er3a.pipeline.stages.workspace.workspace_figures import name_level, slide_names
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture
@@ -144,7 +144,6 @@ SHADES = "viridis"
 PIXELS = 301
 _HEIGHTS = (0.25, 0.5, 0.75)
 _LABEL = 0.035  # height of a label, of the longer side of a drawing
-_PLANE = N_("from axis 1, in the arm's zero plane (mm)")
 
 
 def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: model.CapabilityCells) -> Figure:
@@ -180,10 +179,12 @@ def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: mod
         )
         figure.colorbar(mesh, ax=panel, label=label, location="top", shrink=0.9)
         _draw_arm(panel, robot, capability.frame, origin)
-        names = slide_names(capability.frame) if lookup.bars else (tr(_PLANE), tr("height along axis 1 (mm)"))
-        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "")
-        panel.set_aspect("equal", adjustable="box")
-        panel.grid(False)
+        names = (
+            slide_names(capability.frame)
+            if lookup.bars
+            else (tr("from axis 1, in the arm's zero plane (mm)"), tr("height along axis 1 (mm)"))
+        )
+        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "", fill=False)
     return figure
 
 
@@ -203,16 +204,8 @@ def level_slices(
         mesh = panel.pcolormesh(
             (line + origin[0]) * 1000, along * 1000, values.T, cmap=SHADES, vmin=0, vmax=100, rasterized=True
         )
-        if lookup.bars:
-            title = tr("at {height} mm across it", height=fixed(1000 * (height + origin[1]), 0))
-            names = slide_names(capability.frame)[0], tr("along the slide (mm)")
-        else:
-            title = tr("{height} mm up axis 1", height=fixed(1000 * height, 0))
-            names = tr(_PLANE), tr("across it (mm)")
-        panel.set_title(title)
-        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "")
-        panel.set_aspect("equal", adjustable="box")
-        panel.grid(False)
+        names = name_level(panel, capability.frame if lookup.bars else None, height, origin)
+        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "", fill=False)
     figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
     return figure
 
@@ -390,38 +383,26 @@ def _placement_context(
 
 
 def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> list[Picture]:
+    cells = results.capability
+    upright, reached, held = (
+        (
+            tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability"),
+            tr("Slices along the slide of joint 1: reachability"),
+            tr("Slices along the slide of joint 1: reached poses that can be held without collision"),
+        )
+        if capability.bar_m
+        else (
+            tr("Slices through axis 1: reachability, IK solutions, manipulability"),
+            tr("Slices across axis 1: reachability"),
+            tr("Slices across axis 1: reached poses that can be held without collision"),
+        )
+    )
+    of_held = level_slices(capability, cells, clear_percent(cells), tr("reached poses held without collision (%)"))
+    of_reached = level_slices(capability, cells, 100.0 * cells.reachability.astype(float), asked_ratio(capability))
     return [
-        Picture(
-            upright_slices(robot, capability, results.capability),
-            tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability")
-            if capability.bar_m
-            else tr("Slices through axis 1: reachability, IK solutions, manipulability"),
-            _slices_caption(capability),
-        ),
-        Picture(
-            level_slices(
-                capability,
-                results.capability,
-                100.0 * results.capability.reachability.astype(float),
-                asked_ratio(capability),
-            ),
-            tr("Slices along the slide of joint 1: reachability")
-            if capability.bar_m
-            else tr("Slices across axis 1: reachability"),
-            _level_caption(capability),
-        ),
-        Picture(
-            level_slices(
-                capability,
-                results.capability,
-                clear_percent(results.capability),
-                tr("reached poses held without collision (%)"),
-            ),
-            tr("Slices along the slide of joint 1: reached poses that can be held without collision")
-            if capability.bar_m
-            else tr("Slices across axis 1: reached poses that can be held without collision"),
-            _clear_caption(capability.clear, results.summary.verdict.shapes is not None),
-        ),
+        Picture(upright_slices(robot, capability, cells), upright, _slices_caption(capability)),
+        Picture(of_reached, reached, _level_caption(capability)),
+        Picture(of_held, held, _clear_caption(capability.clear, results.summary.verdict.shapes is not None)),
     ]
 
 

@@ -24,6 +24,7 @@ from er3a.pipeline.stages.workspace.sample import draw_of, gather, sampled
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.references.rows import EnvelopeRow
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid, shoulder_of
 from er3a.sampling.random_joints import Draw
@@ -173,17 +174,20 @@ def compute(study: Study, name: str, parts: Sequence[Path] | None = None) -> mod
     asked = study.section(CapabilitySettings)
     tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin / 1000, proven=proven)
     vertices, triangles = model.void_surfaces(voids)
+    corners = model.HullVertices(hull.vertices, shown(robot, samples.q_extreme[hull.of]))
     return model.WorkspaceResults(
         summary=_summary(study, robot, samples, proven, voids, tool, scene=scene),
         cells=model.cells(tally, void_numbers(in_cloud, tally.counts, samples.inside)),
-        section=model.section(section_cells(tally, grid)),
-        side_view=model.side_view(side_views(robot, tally, grid, draw)),
-        curve=model.curve(touched_growth(draw, tally, grid)),
+        section=model.SectionCells.of(section_cells(tally, grid)),
+        side_view=model.SideViewCells.stacked(map(model.SideViewCells.of, side_views(robot, tally, grid, draw))),
+        curve=model.GrowthCurve.stacked(
+            model.GrowthCurve.of(part, touched_m3=part.volume) for part in touched_growth(draw, tally, grid)
+        ),
         cloud=model.cloud(robot, samples.q_cloud),
-        hull_vertices=model.hull_vertices(robot, hull, samples.q_extreme),
+        hull_vertices=corners.of_joints(robot.slides),
         hull_triangles=model.HullTriangles(hull.triangles),
         proof=model.proof(proven),
-        border=model.border(border_lines(robot)),
+        border=model.Border.stacked(map(model.border, border_lines(robot))),
         drawing=drawing_table(robot, float((shoulder - grid.axis_point) @ grid.axis)),
         void_vertices=vertices,
         void_triangles=triangles,
@@ -309,13 +313,7 @@ def _left_out(
 
 
 def _bars(proven: Proven) -> model.Bars | None:
-    if proven.proof.bar == 0:
-        return None
-    x, y, z = proven.R
-    return model.Bars(
-        proven.proof.bar,
-        model.SectionFrame((model.triple(x), model.triple(y), model.triple(z)), model.triple(proven.origin)),
-    )
+    return model.Bars(proven.proof.bar, model.frame_of(proven.R, proven.origin)) if proven.proof.bar else None
 
 
 def _figures(

@@ -17,9 +17,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.messages.language import N_
 from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
-from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
-from er3a.sampling import tally
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.tally import UNTOUCHED, ReachExtremes, Tally
 from er3a.workspace.capability import Capability, ClearPoses, Overall
@@ -29,9 +27,9 @@ from er3a.workspace.general_proof import Surface
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.placement import Places
 from er3a.workspace.proven import ProofMethod, Proven
-from er3a.workspace.side_view import BorderLine, SideView
+from er3a.workspace.side_view import BorderLine
 from er3a.workspace.tool_inverse import MapsMissing
-from er3a.workspace.voids import Hull, Void, VoidKind
+from er3a.workspace.voids import Void, VoidKind
 
 
 class Flat(Finding, code="workspace.flat"):
@@ -274,6 +272,12 @@ class SectionFrame:
 
     axes: tuple[Triple, Triple, Triple]
     origin_m: Triple
+
+
+def frame_of(R: Reals, origin: Reals) -> SectionFrame:
+    """A frame by the rows of its axes (3, 3) and its origin."""
+    x, y, z = (triple(row) for row in R)
+    return SectionFrame((x, y, z), triple(origin))
 
 
 @dataclass(frozen=True)
@@ -662,21 +666,6 @@ def cells(tally: Tally, void_number: NDArray[np.int64]) -> Cells:
     )
 
 
-def section(found: tally.TouchedSection) -> SectionCells:
-    """The side section."""
-    return SectionCells(found.rho, found.z, found.samples, found.void)
-
-
-def side_view(views: Sequence[SideView]) -> SideViewCells:
-    """The side views, one after another."""
-    return SideViewCells.stacked(SideViewCells.of(view) for view in views)
-
-
-def curve(growth: Sequence[tally.Growth]) -> GrowthCurve:
-    """Growth of the touched volume, one cell size after another."""
-    return GrowthCurve.stacked(GrowthCurve.of(part, touched_m3=part.volume) for part in growth)
-
-
 def cloud(robot: Robot, q: Reals) -> Cloud:
     """Tool points of samples (n, joints), rad or m, and their manipulability: of arms with other than six joints the
     product of the singular values."""
@@ -684,11 +673,6 @@ def cloud(robot: Robot, q: Reals) -> Cloud:
     square = robot.joints == J.shape[-2]
     measure = np.abs(np.linalg.det(J)) if square else np.linalg.svd(J, compute_uv=False).prod(axis=-1)
     return Cloud(forward(robot, q)[:, :3, 3], measure)
-
-
-def hull_vertices(robot: Robot, hull: Hull, q_extreme: Reals) -> HullVertices:
-    """The hull's corners with the joint angles that reach them."""
-    return HullVertices(hull.vertices, shown(robot, q_extreme[hull.of])).of_joints(robot.slides)
 
 
 def proof(proven: Proven) -> ProofCells:
@@ -708,14 +692,10 @@ def proof(proven: Proven) -> ProofCells:
     )
 
 
-def border(lines: Sequence[BorderLine]) -> Border:
-    """The points of border lines, one line after another."""
-    return Border.stacked(
-        Border.of(
-            line, rho_m=line.points[:, 0], z_m=line.points[:, 1], q2=line.q[:, 0], q3=line.q[:, 1], arc=line.number
-        )
-        for line in lines
-    )
+def border(line: BorderLine) -> Border:
+    """The points of a border line."""
+    (rho, z), (q2, q3) = line.points.T, line.q.T
+    return Border.of(line, rho_m=rho, z_m=z, q2=q2, q3=q3, arc=line.number)
 
 
 def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:

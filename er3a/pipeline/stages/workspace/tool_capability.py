@@ -21,6 +21,7 @@ from er3a.collision.scene import Scene
 from er3a.kinematics.by_class import parameters_of
 from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
+from er3a.numerics.si_units import stated
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.robots.robot import Robot
@@ -218,7 +219,7 @@ def tool_capability(
         directions=plan.count,
         cell_m=plan.cell,
         bar_m=frame.bar,
-        frame=model.SectionFrame(_rows(frame.R), model.triple(frame.origin)),
+        frame=model.frame_of(frame.R, frame.origin),
         sectors=frame.sectors,
         roll=model.RollSummary(asked.roll.free, len(asked.roll.angles), asked.roll.last_joint),
         overall=overall(found, cells, frame.bar),
@@ -236,11 +237,6 @@ def tool_capability(
     return ToolCapability(
         summary, placement, model.capability(middles, found, tried, frame.bar > 0), places, bodies.unexamined
     )
-
-
-def _rows(R: Reals) -> tuple[model.Triple, model.Triple, model.Triple]:
-    x, y, z = (model.triple(row) for row in R)
-    return x, y, z
 
 
 def _placed(
@@ -271,7 +267,7 @@ def _placed(
     placement = find_places(
         robot, task, asked.roll, plan.lattice, LISTED, settings.proof_poses, free=free, in_cone=asked.in_cone
     )
-    placed = _placement_summary(robot, settings.placement, task, placement, best, scene=scene, margin=margin)
+    placed = _placement_summary(settings.placement, task, placement, scene, margin)
 
     def listed(own: Task, found: BoxPlacement) -> tuple[model.PlaceSummary, ...]:
         arms = _arms_at(within, free, own, asked, found)
@@ -401,25 +397,12 @@ def _task(asked: BoxTask) -> Task:
 
 
 def _task_summary(asked: BoxTask) -> model.TaskSummary:
-    return model.TaskSummary(
-        model.triple(asked.box_mm),
-        model.triple(asked.tool_direction),
-        asked.cone_deg,
-        asked.limit_margin_deg,
-        asked.lowest_mm,
-        asked.clear_of_axis_mm,
-    )
+    box, direction = model.triple(asked.box_mm), model.triple(asked.tool_direction)
+    return stated(model.TaskSummary, asked, box_mm=box, tool_direction=direction)
 
 
 def _placement_summary(
-    robot: Robot,
-    asked: BoxTask,
-    task: Task,
-    placement: BoxPlacement,
-    best: float,
-    *,
-    scene: Scene | None,
-    margin: float,
+    asked: BoxTask, task: Task, placement: BoxPlacement, scene: Scene | None, margin: float
 ) -> model.PlacementSummary:
     """The placement as the summary has it; ``best`` is the arm's largest manipulability, m^3."""
     places = placement.places

@@ -56,11 +56,7 @@ class CellMap:
 def top_view(robot: Robot, results: model.WorkspaceResults) -> Figure:
     """The cloud from above, with the wedge that joint 1 leaves."""
     figure, axes = new_figure(width=8.0, height=6.6)
-    _draw_top(figure, axes, robot, CellMap(results.summary.grid, results.cells))
-    return figure
-
-
-def _draw_top(figure: Figure, axes: Axes, robot: Robot, cells: CellMap) -> None:
+    cells = CellMap(results.summary.grid, results.cells)
     column = cells.samples.sum(axis=2) / cells.cell**2 / 1e6
     mesh = axes.pcolormesh(
         cells.edges(0), cells.edges(1), masked(column).T, cmap=DENSITY, norm=log_norm(column), rasterized=True
@@ -84,9 +80,8 @@ def _draw_top(figure: Figure, axes: Axes, robot: Robot, cells: CellMap) -> None:
         handles = [Line2D([], [], color=LIMIT, label=tr("the arm's plane at the limits of joint 1"))]
         axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), borderaxespad=0.2)
     axes.set_title(title, pad=42)
-    equal_scale(axes, "x (mm)", "y (mm)")
-    axes.set_aspect("equal", adjustable="box")
-    axes.grid(False)
+    equal_scale(axes, "x (mm)", "y (mm)", fill=False)
+    return figure
 
 
 def convergence(results: model.WorkspaceResults) -> Figure:
@@ -158,9 +153,7 @@ def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
     for axes in (left, right):
         _draw_border(axes, border)
         axes.plot(*arm.T * 1000, color=INK, linewidth=2.4, marker="o", markersize=4, solid_capstyle="round")
-        equal_scale(axes, across, up if axes is left else "")
-        axes.set_aspect("equal", adjustable="box")
-        axes.grid(False)
+        equal_scale(axes, across, up if axes is left else "", fill=False)
         if not bars:
             axes.set_xlim(0, None)
     draw_labels(right, drawing, drawing.rho_m)
@@ -200,14 +193,19 @@ def _colour_bar(figure: Figure, shown: QuadMesh, label: str) -> None:
 
 
 def _draw_density(axes: Axes, cell: float, section: model.SectionCells) -> QuadMesh:
-    middles = np.stack([section.rho_m, section.z_m], axis=1)
+    rings = np.pi * cell**2 * 2 * section.rho_m * 1e3
+    return _draw_cells(axes, cell, section.rho_m, section.z_m, section.samples / rings)
+
+
+def _draw_cells(axes: Axes, cell: float, across: Reals, up: Reals, density: Reals, **style: Any) -> QuadMesh:
+    """Cells (n,), by their middles in m, shaded by what each holds."""
+    middles = np.stack([across, up], axis=1)
     low = middles.min(axis=0) - cell / 2
     index = np.rint((middles - low) / cell - 0.5).astype(int)
-    density = np.zeros(tuple(index.max(axis=0) + 1))
-    rings = np.pi * cell**2 * 2 * section.rho_m * 1e3
-    density[tuple(index.T)] = section.samples / rings
-    rho, z = ((low[i] + np.arange(density.shape[i] + 1) * cell) * 1000 for i in (0, 1))
-    return axes.pcolormesh(rho, z, masked(density).T, cmap=DENSITY, norm=log_norm(density), rasterized=True)
+    shown = np.zeros(tuple(index.max(axis=0) + 1))
+    shown[tuple(index.T)] = density
+    x, z = ((low[i] + np.arange(shown.shape[i] + 1) * cell) * 1000 for i in (0, 1))
+    return axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), rasterized=True, **style)
 
 
 def _across(bars: model.Bars, points: Reals) -> Reals:
@@ -303,25 +301,24 @@ def slices(results: model.WorkspaceResults) -> Figure:
         shades = ListedColormap(list(PROOF.values()))
         rho, azimuth = (x, 360 * y / bars.length_m) if bars else (np.hypot(x, y), np.degrees(np.arctan2(y, x)) % 360)
         shown = _slice(results.proof, rho, azimuth, height)
-        title, first, second = (
-            tr("{height} mm up axis 1", height=fixed(1000 * height, 0)),
-            tr("from axis 1, in the arm's zero plane (mm)"),
-            tr("across it (mm)"),
-        )
-        if bars:
-            first, second = slide_names(bars.frame)[0], tr("along the slide (mm)")
-            title = tr("at {height} mm across it", height=fixed(1000 * (height + origin[1]), 0))
         panel.pcolormesh(
             (across + origin[0]) * 1000, along * 1000, shown.T, cmap=shades, vmin=-0.5, vmax=3.5, rasterized=True
         )
-        panel.set_title(title)
-        equal_scale(panel, first, second if panel is axes[0] else "")
-        panel.set_aspect("equal", adjustable="box")
-        panel.grid(False)
+        first, second = name_level(panel, bars.frame if bars else None, height, origin)
+        equal_scale(panel, first, second if panel is axes[0] else "", fill=False)
     states = [state for kind, state in enumerate(PROOF) if kind != WEDGE]
     handles = [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
+
+
+def name_level(axes: Axes, slide: model.SectionFrame | None, height: float, origin: Reals) -> tuple[str, str]:
+    """Title a level slice by its height (m); returns the labels of its axes."""
+    if slide:
+        axes.set_title(tr("at {height} mm across it", height=fixed(1000 * (height + origin[1]), 0)))
+        return slide_names(slide)[0], tr("along the slide (mm)")
+    axes.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
+    return tr("from axis 1, in the arm's zero plane (mm)"), tr("across it (mm)")
 
 
 def slice_heights(results: model.WorkspaceResults) -> list[float]:
@@ -377,9 +374,7 @@ def side_view(results: model.WorkspaceResults, has_tool: bool) -> Figure:
             axes.plot(x, z, color=colour, linewidth=1.5)
             if axes is left:
                 axes.annotate(str(i), (x[len(x) // 2], z[len(z) // 2]), **_numbered(colour))
-        equal_scale(axes, tr("x to the front (mm)"), tr("height along axis 1 (mm)") if axes is left else "")
-        axes.set_aspect("equal", adjustable="box")
-        axes.grid(False)
+        equal_scale(axes, tr("x to the front (mm)"), tr("height along axis 1 (mm)") if axes is left else "", fill=False)
     left.set_title(tr("Wrist centre"))
     right.set_title(tr("Flange (border), tool point (samples)") if has_tool else tr("Flange"))
     draw_labels(left, results.drawing, results.drawing.x_m)
@@ -414,15 +409,10 @@ def _numbered(colour: str) -> dict[str, Any]:
 
 def _draw_samples(axes: Axes, views: model.SideViewCells, point: str) -> QuadMesh:
     rows = views.take(views.point == point)
-    cell, middles = rows.cell_m[0], np.stack([rows.x_m, rows.z_m], axis=1)
-    low = middles.min(axis=0) - cell / 2
-    index = np.rint((middles - low) / cell - 0.5).astype(int)
-    shown = np.zeros(tuple(index.max(axis=0) + 1))
+    cell = float(rows.cell_m[0])
     # Per volume of the half ring: else the samples near the axis would drown.
     half_rings = np.pi * cell**2 * np.maximum(np.abs(rows.x_m), cell / 2) * 1e3
-    shown[tuple(index.T)] = rows.samples / half_rings
-    x, z = ((low[i] + np.arange(shown.shape[i] + 1) * cell) * 1000 for i in (0, 1))
-    return axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), alpha=0.8, rasterized=True)
+    return _draw_cells(axes, cell, rows.x_m, rows.z_m, rows.samples / half_rings, alpha=0.8)
 
 
 CLOUD_POINTS = 12_000
