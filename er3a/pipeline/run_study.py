@@ -297,7 +297,7 @@ def _parsed(words: Sequence[str]) -> Namespace:
         if not end.code:
             raise
         problem = said.getvalue().strip().rpartition("error: ")[2]
-        raise RunError(f"{' '.join(problem.split())}. All that it takes: snakemake --help") from None
+        raise RunError(f"{' '.join(problem.split())}. See: snakemake --help") from None
 
 
 def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str]) -> bool:
