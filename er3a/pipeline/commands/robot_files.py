@@ -175,8 +175,8 @@ def calibrate(
 ):
     """Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot file.
 
-    Joint errors beyond D-H (ratio, once and twice a turn, sag) are fitted if they improve poses left out of the fit. The
-    robot file holds the best table without them, and the ratios as its coupling.
+    Joint errors beyond D-H (ratio, once and twice a turn, sag) are fitted if they improve poses left out of the fit.
+    The robot file holds the best table without them, and the ratios as its coupling.
     """
     from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
