@@ -1,4 +1,4 @@
-"""Clearance along a motion, with nothing skipped between the points at which it is measured.
+"""Clearance along a motion, bounded between the points at which it is measured.
 
 The distance of two bodies changes by no more than they move against each other. If they are d0 apart at one time and
 d1 at another, and move by M in between, they stay (d0 + d1 - M) / 2 apart [1]_: an interval in which that is positive
@@ -339,12 +339,12 @@ def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
 
 
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
-    """Smallest distance of each arm (N, n) in rad or m from the scene's solids and from itself.
+    """Smallest distance of the arm, at each joint vector (N, n) in rad or m, from the scene's solids and from itself.
 
     Raises
     ------
     Er3aError
-        if the scene is none
+        if the scene is not a scene of er3a
     """
     bodies = bodies_of(robot, scene)
     distance, pair = bodies.min_distance(np.asarray(q, float).reshape(-1, robot.joints))

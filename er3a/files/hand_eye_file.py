@@ -261,7 +261,11 @@ class HandEyeFile(StrictModel):
 
 
 def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
-    """Read a calibration set; the arm's table turns joint angles into poses.
+    """Read a calibration set.
+
+    Parameters
+    ----------
+    arm : the robot that was used, to convert joint angles into flange poses; not needed for sets with flange poses
 
     Raises
     ------

@@ -457,8 +457,8 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
 
     Parameters
     ----------
-    robot : rows about joints that it does not have, a wrist centre or limits in the other unit are set aside, with a
-        warning (:class:`er3a.InputWarning`)
+    robot : rows that do not apply to it are left out with a warning (:class:`er3a.InputWarning`): joints that it does
+        not have, a wrist centre, or limits in the other unit
 
     Raises
     ------

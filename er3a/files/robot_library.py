@@ -40,8 +40,8 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
     """Load a robot by the name of a file in data/robots, or by a path that ends in .yaml or .csv.
 
     A name is looked up below the working folder first, then among the robots that come with er3a. A .csv holds a D-H
-    table (:mod:`er3a.files.dh_table`), mm and degrees, in the convention given unless it says its own; what had to be
-    assumed is warned of (``er3a.InputWarning``).
+    table (:mod:`er3a.files.dh_table`), mm and degrees, in the given convention unless the file names one. Assumptions
+    give a warning (``er3a.InputWarning``).
 
     Raises
     ------

@@ -425,10 +425,10 @@ def follow(
 
     Parameters
     ----------
-    t : (N,), s, rising from 0 to the line's duration: where to solve at least; the result has more times where
-        branches come near to each other
+    t : (N,), s, rising from 0 to the line's duration: the times to solve; the result has more times where branches come
+        near to each other
     q_start : (6,), rad, joints at the start, whose tool pose is the line's first
-    start_slot : closed-form branch (0..7) to begin on; None for the best
+    start_slot : closed-form branch (0..7) at the start; None for the best one
 
     Raises
     ------

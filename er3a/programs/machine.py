@@ -833,21 +833,21 @@ def execute(
     limits: RunLimits | None = None,
     keep_on: KeepOn | None = None,
 ) -> Execution:
-    """The instructions of a program in the order of their execution, on every way through it.
+    """Execute a program symbolically: its instructions in order, on every path through it.
 
     Parameters
     ----------
-    robot : the arm, for what the text gives by where the arm stands: partial and relative targets
-    start : (n,), rad, joints where the program starts
+    robot : the arm, needed for partial and relative targets
+    start : (n,), rad or m, joint values at the start of the program
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
-    keep_on : asked whether to go on; where it says no, each way ends as ``stopped``
+    keep_on : called from time to time; if it returns False, each path ends as ``stopped``
 
     Raises
     ------
     InputError
-        for an arm whose number of joints the program's language, or the table, does not have
+        for an arm with another number of joints than the program's language or table supports
     ShapeError, PoseError
-        for a start that lacks an angle for each joint, and a frame that is no rigid transform
+        for a start without one value for each joint, and a frame that is not a rigid transform
     """
     if robot is not None and (reason := _not_meant(program, robot)):
         raise InputError(program.file, None, reason, "Give the arm that the program is meant for")

@@ -57,7 +57,8 @@ class LinkMass:
 
 @dataclass(frozen=True)
 class Load(MassBody):
-    """What hangs on the flange (centre and inertia in the flange's frame), and what the surroundings do to the tool.
+    """The load on the flange (centre and inertia in the flange's frame), and the wrench of the surroundings on the
+    tool.
 
     Attributes
     ----------

@@ -232,13 +232,13 @@ def select(
     Parameters
     ----------
     rule : a name in ``RULES``, or weights of several, such as ``{"time": 1, "clearance": 2}``
-    q_ref : (6,), rad, the joint angles that the arm comes from
-    scene : obstacles; rows that touch them are refused, and, with or without, those in which the arm touches itself
+    q_ref : (n,), rad or m, the current joint values
+    scene : obstacles; rows that touch them are refused. Rows in which the arm touches itself are refused in any case
 
     Raises
     ------
     Er3aError
-        for an unknown rule, a bad weight, or a rule that lacks its data
+        for an unknown rule, an invalid weight, or a rule whose data are missing
     """
     weights = checked_weights(rule)
     q_ref = checked_reference(robot, q_ref)
@@ -326,14 +326,14 @@ def select_sequence(
     scene: Scene | None = None,
     acceleration: Reals | None = None,
 ) -> SequenceChoice:
-    """Choose one solution of each pose so that all moves together cost least.
+    """Choose one solution of each pose so that the total cost of the moves is least.
 
     Parameters
     ----------
-    poses : the solutions of each pose, in order; rows outside the limits or in collision are left out
-    q_ref : (6,), rad, where the arm starts
-    rule : how a move costs: "nearest" (largest joint move), "weighted" or "time"
-    acceleration : (n,), rad/s^2; moves by "time" then run from rest to rest, else at full speed throughout
+    poses : the solutions of each pose, in order; rows outside the limits or in collision are not used
+    q_ref : (n,), rad or m, joint values at the start
+    rule : the cost of a move: "nearest" (largest joint move), "weighted" or "time"
+    acceleration : (n,), rad/s^2; then "time" moves run from rest to rest, otherwise at full speed throughout
 
     Raises
     ------
