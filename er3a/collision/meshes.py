@@ -1,9 +1,9 @@
-"""Closed meshes as convex pieces, and how far pieces and mesh stand out of each other.
+"""Closed meshes as convex pieces, and how far pieces and mesh stick out of each other.
 
-Pieces neither surely hold the mesh nor equal it. How far the mesh stands out of them is bounded: a triangle whose three
-corners are within a distance of one convex piece is so as a whole, and those that no one piece holds well are cut
-finer until bound and measurement agree. Taken larger by that distance, the pieces hold the mesh's surface, and nothing
-reaches the inside but through it. How far the pieces stand out of the mesh is measured at points of their surfaces.
+The pieces do not equal the mesh and need not contain it. How far the mesh sticks out of them is bounded: a triangle
+whose three corners are within a distance of one convex piece is so as a whole; other triangles are subdivided until
+bound and measurement agree. Enlarged by that distance, the pieces contain the mesh's surface, through which anything
+must pass to get inside. How far the pieces stick out of the mesh is measured at points of their surfaces.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Solids of simple shape around an arm, in the frame that its base is placed in; metres."""
+"""Solids of simple shape around an arm, in the world frame in which its base is placed; metres."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a diagnosis concludes, and which further measurement would say more."""
+"""The conclusion of a diagnosis, and the measurement that would narrow it down."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is most likely wrong with a table."""
+"""The most likely faults of a table, ranked."""
 
 from __future__ import annotations
 

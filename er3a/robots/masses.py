@@ -1,4 +1,4 @@
-"""Masses of links and loads, drives, and what the wrist may carry: what dynamics needs of a robot, in SI units."""
+"""Masses of links and loads, drives and wrist limits: the data that dynamics needs, in SI units."""
 
 from __future__ import annotations
 
