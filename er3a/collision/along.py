@@ -11,9 +11,9 @@ M is the longer way of a capsule's two ends (its other points move no farther), 
 the other link for two links. The way is bounded on a grid of the motion so fine that no end moves by more than
 twice the depth from point to point: a chord over a time h, plus A h^2 / 3, where A bounds the end's acceleration.
 With levers of at most L, revolute rows with speeds v and accelerations a, and prismatic rows with w and b,
-``A = L (sum |a| + (sum |v|)^2) + sum |b| + 2 sum |v| sum |w|``: these are bounds over
-the whole interval. The caller gives them for the joints; a coupling converts them to rows. If the motion has no such bounds (at singular poses of a tool path, through which nothing is
-proven), the bulge of the parabola through three points replaces A h^2 / 3.
+``A = L (sum |a| + (sum |v|)^2) + sum |b| + 2 sum |v| sum |w|``: these are bounds over the whole interval. The caller
+gives them for the joints; a coupling converts them to rows. If the motion has no such bounds (at singular poses of a
+tool path, through which nothing is proven), the bulge of the parabola through three points replaces A h^2 / 3.
 
 References
 ----------

@@ -2,8 +2,8 @@
 
 A reference with a half-width requires ``|off| <= half-width``; one with a standard deviation is a term of a likelihood.
 Of references that contradict each other, either may be right, so they require only the hull of the values they allow.
-Extremes over the joint limits are tracked with the pose at which they are attained: their derivative with respect to the
-table is that at the maximiser (envelope theorem).
+Extremes over the joint limits are tracked with the pose at which they are attained: their derivative with respect to
+the table is that at the maximiser (envelope theorem).
 
 In this order:
 

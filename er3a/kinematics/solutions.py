@@ -1,4 +1,4 @@
-"""What the inverse gives: joint solutions with their verdict, and why there are none where there are none.
+"""Result types of the inverse: joint solutions with their verdict, and the reason if there are none.
 
 The eight branches of a wrist-partitioned arm are slots: ``4 * shoulder + 2 * elbow + wrist``. Each part is the sign of
 one factor of the Jacobian's determinant, so that a branch can only change where the arm passes a singularity of it:

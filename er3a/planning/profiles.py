@@ -1,4 +1,4 @@
-"""Time laws: where along its way a motion is at a time. Seconds in, SI derivatives out.
+"""Time laws: the position along a path as a function of time. Seconds in, SI derivatives out.
 
 References
 ----------

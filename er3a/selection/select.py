@@ -1,8 +1,8 @@
-"""Ranking the solutions of one pose, and choosing those of a sequence of poses that are best as a whole.
+"""Ranking of the solutions of one pose, and the best choice of solutions for a sequence of poses.
 
-Rules that rank joint solutions each give every solution a cost, the least of which is best. Rules can be mixed as
-weighted sums. Then each rule's costs are stretched so that its best solution within the limits costs 0 and its worst 1,
-since degrees, seconds and millimetres don't add.
+Each rule gives every solution a cost; the least is best. Rules can be mixed as weighted sums. Then the costs of each
+rule are scaled so that its best solution within the limits costs 0 and its worst 1, because degrees, seconds and
+millimetres can't be added.
 
 A sequence is chosen by Bellman's recursion over the solutions of each pose, turns included [1]_: the cost to reach a
 solution is the least, over those of the pose before, of its cost plus that of the move between the two.

@@ -1,8 +1,8 @@
-"""Any serial arm as the general proof takes it: a chain of joints about and along z, and bounds of its levers.
+"""Any serial arm in the form of the general proof: a chain of joints about and along z, and bounds of its levers.
 
 The tool point is carried from the tip to axis 1: turned about the z axis of a joint's frame or shifted along it, then
-taken over a constant link. The distance of the point from a joint's axis, its *lever*, depends on the joints behind
-that one alone.
+taken over a constant link. The distance of the point from a joint's axis, its *lever*, depends only on the joints after
+that one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The adaptive proof: rings of the section, split where they are neither filled nor empty.
+"""The adaptive proof: rings of the section, split if they are neither filled nor empty.
 
 **Filled**, a second proof: the tool's sphere is swept across the cell. For a point x of the cell at the angle phi, the
 sphere of radius d about W must pass through x with the direction in the zone. Move joints 1 to 3 along a short straight

@@ -1,5 +1,5 @@
-"""Where a followed path is singular, nearly so or out of reach, and what a strategy that avoids it yields: a motion, or
-why it can't be carried out or used.
+"""The singular segment of a path (singular, near-singular or out of reach), and the result of an avoidance strategy: a
+motion, or the reason why it is not possible or not usable.
 """
 
 from __future__ import annotations
