@@ -1,4 +1,4 @@
-"""Upper bounds of what is largest over all poses within the limits, by branch and bound [1]_.
+"""Upper bounds of a maximum over all poses within the limits, by branch and bound [1]_.
 
 A box of joint values has a bound by the corners of its hulls (:mod:`er3a.dynamics.pose_bound`). Boxes that can't
 hold more than what is found already are dropped, the others halved, the highest bound first. What is left in the end,

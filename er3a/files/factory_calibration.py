@@ -1,10 +1,10 @@
-"""A Universal Robots arm's own calibration: ``calibration.conf`` of its controller, or the YAML that
-``ur_calibration``'s ``extract_calibration`` (ROS) makes of it.
+"""The factory calibration of a Universal Robots arm: ``calibration.conf`` of its controller, or the YAML that
+``extract_calibration`` of the ROS package ``ur_calibration`` makes from it.
 
-The controller's file holds what is to be added to the nominal table: ``delta_theta``, ``delta_a``, ``delta_d``,
-``delta_alpha``, in rad and m. Axes 2, 3 and 4 are parallel but for an error, so that d of these rows may be hundreds of
-metres that cancel. The YAML holds the same arm as the poses of its links (``kinematics``, ``shoulder``: x, y, z, roll,
-pitch, yaw; ...), m and rad, each joint turning about its link's z. Either becomes rows with Hayati's beta.
+The controller's file holds corrections to the nominal table: ``delta_theta``, ``delta_a``, ``delta_d``,
+``delta_alpha``, in rad and m. Axes 2, 3 and 4 are nearly parallel, so the d of these rows may be hundreds of metres and
+cancel. The YAML holds the same arm as the poses of its links (``kinematics``, ``shoulder``: x, y, z, roll, pitch, yaw;
+...), m and rad, each joint turning about its link's z. Either becomes rows with Hayati's beta.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""Calibration sets of cameras: a YAML file that says what was recorded, and CSV tables beside it with the samples.
+"""Calibration sets of cameras: a YAML file that describes the recording, and CSV tables beside it with the samples.
 
-A table of samples has one row for each: where the flange was, as joint angles (``q1_deg`` ..) or as a pose
-(``flange_x_mm`` ..), and where the camera saw the board (``target_x_mm`` ..) or in which ``image``. Orientations are
-``_qw`` .. ``_qz``, ``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), ``_r11`` ..
-``_r33`` by rows, or ``_rx_rad`` .. ``_rz_rad`` (a rotation vector). ``name`` is optional.
+A table has one row for each sample: the flange, as joint angles (``q1_deg`` ..) or as a pose (``flange_x_mm`` ..), and
+the board as the camera saw it (``target_x_mm`` ..), or an ``image``. Orientations are ``_qw`` .. ``_qz``,
+``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), ``_r11`` .. ``_r33`` by rows, or
+``_rx_rad`` .. ``_rz_rad`` (a rotation vector). ``name`` is optional.
 
-Poses in CSV tables: a position in mm and an orientation in one of four forms, by row and column in every error.
+Poses in CSV tables: a position in mm and an orientation in one of four forms. Errors name row and column.
 
-Rotation vectors (axis times angle, in rad) are what OpenCV's detectors and the pendants of Universal Robots give.
+Rotation vectors (axis times angle, in rad) are used by OpenCV and by the pendants of Universal Robots.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Files that are written whole or not at all, and read with one clear error.
+"""Atomic writes of files, and reading with one clear error.
 
-Where the project's own robots, references, schemas and workflow stand: beside the package in a checkout, in it
-where a wheel was installed (``tool.hatch.build.targets.wheel.force-include`` in ``pyproject.toml``).
+Location of er3a's own robots, references, schemas and workflow: beside the package in a checkout, inside it in an
+installed wheel (``tool.hatch.build.targets.wheel.force-include`` in ``pyproject.toml``).
 """
 
 from __future__ import annotations

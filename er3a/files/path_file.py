@@ -1,15 +1,15 @@
-"""What a path file may hold (YAML, mm, degrees and seconds): data/paths/<robot>.yaml.
+"""Path files (YAML, mm, degrees and seconds): data/paths/<robot>.yaml.
 
 Paths as CSV tables, one point per row: of the tool, or of the joints; with or without times.
 
 Columns of the tool: ``x_mm``, ``y_mm``, ``z_mm`` and those of one form of orientation
-(:data:`er3a.files.target_file.FORMS`). Columns of the joints: ``q1_deg`` .. ``qn_deg``, of those that
-slide ``q3_mm``. Either with ``t_s``, which
-starts at 0 and rises. A row that repeats the point before is a halt if the table has times, else it is left out.
+(:data:`er3a.files.target_file.FORMS`). Columns of the joints: ``q1_deg`` .. ``qn_deg``, or ``q3_mm`` for a prismatic
+joint. Both may have ``t_s``, which starts at 0 and rises. A row that repeats the point before is a stop if the table
+has times; otherwise it is left out.
 
 A joint trajectory of ROS or MoveIt (``trajectory_msgs/JointTrajectory``, or ``moveit_msgs/RobotTrajectory`` around it)
-as YAML or JSON is a timed table of joints. Of its points positions and times count; which joint is which says the
-number in its name.
+as YAML or JSON is a timed table of joints. Only positions and times of its points are used; the number in a joint's
+name is its place.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Files of convex pieces, as ``er3a mesh`` writes them; studies need neither the mesh nor what reads it."""
+"""Files of convex pieces, written by ``er3a mesh``; studies need neither the mesh nor a mesh library."""
 
 from __future__ import annotations
 

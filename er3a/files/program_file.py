@@ -1,4 +1,4 @@
-"""Program files (YAML): which programs a robot's cell has, and what their tools and bases stand for."""
+"""Program files (YAML): the robot programs of a cell, and the frames of their tools and bases."""
 
 from __future__ import annotations
 

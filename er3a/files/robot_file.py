@@ -1,4 +1,4 @@
-"""What a robot file may hold (YAML, mm and degrees), and the checks that need only the file itself."""
+"""Robot files (YAML, mm and degrees): their fields, and the checks that need only the file itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Robot files to :class:`Robot`."""
+"""Makes a :class:`Robot` from a robot file."""
 
 from __future__ import annotations
 

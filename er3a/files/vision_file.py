@@ -1,4 +1,4 @@
-"""What a robot with a camera is to grasp: the calibration, the camera's view, detected objects and their grasps."""
+"""Vision files: the calibration, the camera's view, detected objects and their grasps."""
 
 from __future__ import annotations
 
@@ -50,7 +50,8 @@ class ViewEntry(StrictModel):
 
 
 class ArmAccuracyEntry(StrictModel):
-    """What is stated of the arm: RP of ISO 9283, and standard deviations of its table's lengths and angles."""
+    """Stated errors of the arm: pose repeatability RP (ISO 9283), and standard deviations of its table's lengths and
+    angles."""
 
     source: Text
     repeatability_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
@@ -73,7 +74,7 @@ class ArmAccuracyEntry(StrictModel):
 
 
 class GripperEntry(StrictModel):
-    """Errors that the gripper forgives, along and about the tool's x, y and z."""
+    """Errors that the gripper tolerates, along and about the tool's x, y and z."""
 
     source: Text
     tolerance_mm: Tolerances

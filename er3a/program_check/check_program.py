@@ -1,4 +1,4 @@
-"""Checks what a program makes an arm do, motion by motion: :func:`check_program`."""
+"""The check of a robot program, motion by motion: :func:`check_program`."""
 
 from __future__ import annotations
 

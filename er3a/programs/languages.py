@@ -1,6 +1,6 @@
 """Programs read and written in the languages that are registered here: one record for each language.
 
-:func:`read_program` tells a file's language and reads it; :func:`write_program` writes a sequence;
+:func:`read_program` detects a file's language and reads it; :func:`write_program` writes a sequence;
 :func:`er3a.programs.machine.execute` runs what was read, by the language's dialect.
 """
 

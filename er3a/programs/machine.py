@@ -1,15 +1,15 @@
-"""Runs a program: follows calls, loops and branches, and notes each instruction that is carried out.
+"""Executes a program: follows calls, loops and branches, and records each executed instruction.
 
-A loop is followed until its state (place, variables that decide motions, position of the arm) repeats. Where a
-condition depends on what only the cell knows, both sides are followed; a way that comes into a state in which another
-was ends there. Further rounds of a loop to an unknown end wait, when it had many, until all else was followed. Beyond
-the limit, the side that was taken less often is followed, and each such branch is named.
+A loop is followed until its state (place, variables that decide motions, position of the arm) repeats. If a condition
+depends on what only the cell knows, both sides are followed; a path that reaches a state that another path had ends
+there. Further rounds of a loop with an unknown end are postponed until all else was followed. Beyond the limit, the
+side that was taken less often is followed, and each such branch is named.
 
 Branches whose sides move nothing and meet again.
 
-A run that can't tell the condition of such a branch passes it: what a side may have changed is unclear from there on.
-So waits for signals with a timeout, and the code that a gripper brings along, do not multiply the ways to be followed.
-Where the sides meet is the branch's immediate postdominator [1]_.
+If the condition of such a branch is unknown, it is skipped: what a side may have changed is unknown from there on. So
+waits for signals with a timeout, and a gripper's code, do not multiply the paths to follow. Where the sides meet is the
+branch's immediate postdominator [1]_.
 
 References
 ----------

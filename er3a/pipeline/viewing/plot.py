@@ -1,4 +1,4 @@
-"""An arm drawn with Matplotlib, in a window or a notebook: one pose, or a motion with the tool's trail."""
+"""Draws an arm with Matplotlib, in a window or a notebook: one pose, or a motion with the tool's trail."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Rerun recordings: an arm and what stands around it, what it does one run after the other, with curves and events.
+"""Rerun recordings: an arm and its scene, its runs one after another, with curves and events.
 
-A stage hands over data; this module lays out the views, times the runs, and writes the file whole or not at all.
+A stage passes data; this module lays out the views, times the runs, and writes the file atomically.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What KRL's motions, frames and functions mean."""
+"""The meaning of KRL's motions, frames and functions."""
 
 from __future__ import annotations
 

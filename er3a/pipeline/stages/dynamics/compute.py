@@ -1,4 +1,4 @@
-"""Compute what the motors of a robot feel along its paths and at rest, and whether drives and wrist bear it."""
+"""Compute the torques of a robot's motors along its paths and at rest, and compare them with drives and wrist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with a motion, where, and the verdict on it."""
+"""The faults of a motion, their places, and the verdict."""
 
 from __future__ import annotations
 

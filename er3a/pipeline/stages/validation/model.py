@@ -1,4 +1,4 @@
-"""What the stage's results hold, and which model of a robot they are of."""
+"""The stage's results, and the model of the robot that they describe."""
 
 from __future__ import annotations
 
