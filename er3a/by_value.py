@@ -158,7 +158,7 @@ class Sheet:
     Attributes
     ----------
     heading : what it is, in a line
-    columns, rows : a table, as texts; ``left_out`` is the number of rows behind the last one that aren't shown
+    columns, rows : a table, as texts; ``left_out`` is the number of rows after the last one that aren't shown
     facts : lines below the table
     """
 

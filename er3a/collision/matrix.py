@@ -174,7 +174,7 @@ class JudgedPair:
     witness : (n,), rad or m, a joint vector in which watched bodies overlap; None where none was found
     least : m, a lower bound of the distance of bodies that never meet; NaN for others
     left_out : m, radius of the region around the joint that is left out, 0 where there is none
-    boxes : how many boxes of joint vectors were looked at
+    boxes : how many boxes of joint vectors were examined
     hub : (3,), m, in the outer link's frame, where a joint is proven to hold the two; None where none is
     """
 
@@ -190,7 +190,7 @@ class JudgedPair:
 @dataclass(frozen=True, eq=False)
 class Held:
     """That two bodies always overlap: ``hub`` (3,), m, in the outer link's frame, where their joint holds them; None
-    where that is unknown. ``boxes``: of joint vectors looked at for it."""
+    where that is unknown. ``boxes``: of joint vectors examined for it."""
 
     hub: Reals | None
     boxes: int

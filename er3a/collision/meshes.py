@@ -51,8 +51,8 @@ class ConvexPieces(ByValue):
     Attributes
     ----------
     pieces : corners (k, 3), m, of each
-    uncovered : m, a bound of how far the mesh stands out of the pieces, which are to be taken larger by it
-    excess : m, how far the pieces stand out of the mesh, as measured; NaN where it was not
+    uncovered : m, a bound of how far the mesh sticks out of the pieces, which are to be taken larger by it
+    excess : m, how far the pieces stick out of the mesh, as measured; NaN where it was not
     """
 
     pieces: tuple[Reals, ...]
@@ -155,7 +155,7 @@ def hull_of(points: Reals) -> ConvexPieces:
 
 
 def uncovered(vertices: Reals, faces: Integers, pieces: Sequence[Reals]) -> float:
-    """A bound (m) of how far a mesh's surface stands out of the union of convex pieces."""
+    """A bound (m) of how far a mesh's surface sticks out of the union of convex pieces."""
     triangles, settled, looked = vertices[faces], 0.0, 0
     for cut in range(CUTS + 1):
         corners, where = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -183,7 +183,7 @@ def _quartered(triangles: Reals) -> Reals:
 
 
 def _excess(vertices: Reals, faces: Integers, pieces: Sequence[Reals], seed: int) -> float:
-    """How far pieces stand out of a mesh (m), at random points of their faces and at their corners."""
+    """How far pieces stick out of a mesh (m), at random points of their faces and at their corners."""
     library, random = load_open3d(), np.random.default_rng(seed)
     scene = library.t.geometry.RaycastingScene()
     scene.add_triangles(vertices.astype(np.float32), faces.astype(np.uint32))

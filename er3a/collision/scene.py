@@ -112,7 +112,7 @@ class Mesh(ByValue):
     Attributes
     ----------
     T : (4, 4), T_world_mesh; pieces : vertices (k, 3), m, of each piece, in the mesh's frame
-    margin : m, by how far the mesh may stand out of the pieces; they are taken larger by it
+    margin : m, by how far the mesh may stick out of the pieces; they are taken larger by it
     """
 
     name: str

@@ -262,7 +262,7 @@ def best_of(
 ) -> list[tuple[str, Comparison]]:
     """A robot compared with several, the one that fits best first: fewest entries, then the smallest differences.
 
-    Causes are looked for in the best one alone.
+    Causes are searched for in the best one alone.
     """
     tolerances = Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
     found = [(name, _compared(robot, other, tolerances, explain=False)) for name, other in others.items()]

@@ -70,7 +70,7 @@ class Mechanism:
     alpha, beta : (m - 1,), rad; a : (m - 1,), m, of the links between two axes
     d : (m,), m; of the first joint and the last it is 0, for base and flange hold it
     offset, direction, sliding : (m,); start : (m,), m, what the shift of a joint that slides begins with
-    base, flange : (4, 4), m, before the first joint and behind the last
+    base, flange : (4, 4), m, before the first joint and after the last
     """
 
     a: Reals
@@ -620,7 +620,7 @@ def _entries(
 
     Returns
     -------
-    entries; how many lengths can be told apart, and by how much those differ that agree; what is unexplained, m
+    entries; how many lengths can be distinguished, and by how much those differ that agree; what is unexplained, m
     """
     links = len(one.a)
     if not links:

@@ -65,7 +65,7 @@ class RankedHypothesis:
     half_widths : largest difference that is left, in half-widths of its reference
     indistinguishable_from : the faults of other hypotheses that no reference tells from this one; if it explains, all
         others that explain with as few faults
-    to_decide : what would distinguish them; None if there is nothing to tell apart
+    to_decide : what would distinguish them; None if there is nothing to distinguish
     score : what those that don't explain are ranked by, see :mod:`er3a.diagnosis.ranking`; smaller is better
     """
 

@@ -60,7 +60,7 @@ def deciding_measurement(tables: Tables, robot: Robot) -> NextMeasurement | None
 
     Parameters
     ----------
-    tables : H hypotheses, which the references at hand can't tell apart; of very many the first are compared
+    tables : H hypotheses, which the references at hand can't distinguish; of very many the first are compared
 
     Returns
     -------

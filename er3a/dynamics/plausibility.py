@@ -127,7 +127,7 @@ MassFinding = (
 
 
 def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
-    """What stands out of a robot's masses, link by link, then of their sum."""
+    """Implausible values among a robot's masses: link by link, then their sum."""
     shapes = link_shapes(robot)
     beyond = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
     armature = drives_of(robot).armature

@@ -100,7 +100,7 @@ def hanging_of(model: ArmModel) -> list[Hanging]:
 
 
 def point_of(robot: Robot, point: Reals) -> list[Hanging]:
-    """A point (3,) of the flange as 1 kg that hangs on the last row."""
+    """A point (3,) of the flange as a point mass of 1 kg on the last row."""
     placed = flange_in_last_link(robot) @ np.append(point, 1.0)
     none = [_alone(np.zeros(3))] * 3
     return [*[Hanging(0.0, *none)] * (robot.rows - 1), Hanging(1.0, _alone(placed[:3]), *none[1:])]

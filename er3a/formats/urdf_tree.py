@@ -831,7 +831,7 @@ EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xa
 def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
     """The file itself if it is a URDF; of xacro the expanded URDF, for as long as the block lasts.
 
-    Packages that the file names are looked for in the four folders above it and beside it, then where ROS has them.
+    Packages that the file names are searched for in the four folders above it and beside it, then where ROS has them.
 
     Parameters
     ----------

@@ -459,7 +459,7 @@ class Extents:
         return [self.seen.index(k) for k in self.speaking]
 
     def _challenge(self) -> bool:
-        """Look once for tables that speak against what was found; whether there are any."""
+        """Look once for tables that contradict what was found; whether there are any."""
         if self._challenged or self.start is None or not self.met:
             return False
         self._challenged = True
@@ -538,7 +538,7 @@ class Extents:
 
     def _reached(self, factors: Reals) -> tuple[float, bool]:
         """How far a combination was found, in its scale, and whether that is its end: the end of the start's own
-        surroundings, with nothing beyond it from other starts, or all that is looked for."""
+        surroundings, with nothing beyond it from other starts, or all that is searched for."""
         toward = factors[self.seen]
         best = max(self.elsewhere, key=lambda each: float(toward @ each.point.amounts), default=None)
         own = float(toward @ best.point.amounts) if best else -np.inf

@@ -80,7 +80,7 @@ class Reached:
 
 
 def largest_length(table: Tables) -> float:
-    """How far in mm a length is looked for from the table's: all its lengths together, a metre at least."""
+    """How far in mm a length is searched for from the table's: all its lengths together, a metre at least."""
     return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()) * 1000.0, LEAST_MM)
 
 
@@ -119,7 +119,7 @@ class Region:
 
     def start(self, amounts: Reals, few_first: bool = True) -> OpenTable:
         """A table that is left open near one. What meets everything stays as it is; else one that differs in one entry,
-        or two or three, is looked for, then any, by damped Gauss-Newton steps."""
+        or two or three, is searched for, then any, by damped Gauss-Newton steps."""
         off = self.off(amounts, afresh=True)
         if self.excess(off) > MET and few_first:
             amounts, off = self._few_changed(amounts, off)

@@ -13,7 +13,7 @@ In this order:
   attained before, by Newton's method with Levenberg's damping; bounds that are in the way are held, derivatives are
   central differences;
 - :func:`peak`: the largest value of any smooth function over a box of joint angles. Points spread evenly over the box
-  and its corners are looked at in one batch; from the best of them Newton's method, its Hessian made definite by the
+  and its corners are evaluated in one batch; from the best of them Newton's method, its Hessian made definite by the
   absolute values of its eigenvalues. Nothing is random;
 - :class:`Asked`: the requirements on a table, and by how much tables miss them.
 """
@@ -679,7 +679,7 @@ class Asked:
         return len(self.order)
 
     def off(self, table: Tables, afresh: bool = False) -> Reals:
-        """Components (m,) of a table (a batch of one); ``afresh``: extremes are looked for all over the joint
+        """Components (m,) of a table (a batch of one); ``afresh``: extremes are searched for all over the joint
         ranges."""
         extremes = []
         for each, followed in self.extreme:

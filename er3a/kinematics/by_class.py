@@ -216,7 +216,7 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
 
 @dataclass(frozen=True, eq=False)
 class LazySelfMotions(Sequence[SelfMotionCurve]):
-    """What :func:`all_motions` gives, traced when it is first looked at."""
+    """What :func:`all_motions` gives, traced when it is first read."""
 
     robot: Robot
     T: Reals
@@ -276,7 +276,7 @@ class ClassSlots:
     Attributes
     ----------
     q : (N, S, n), by the turns nearest to the reference; inside : (N, S), whether within the limits
-    certainty : (N,); settled : what was looked at one by one, by the pose's number
+    certainty : (N,); settled : what was examined one by one, by the pose's number
     """
 
     q: Reals

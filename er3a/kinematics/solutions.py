@@ -269,7 +269,7 @@ class Solutions(ByValue, Displayed):
     unsolved : ``inverse``: per shoulder side without solution, why (both sides: the pose can't be reached);
         ``solve``: per pose without solution, why
     families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest; of arms with more
-        than six joints traced when they are first looked at
+        than six joints traced when they are first read
     turn_range : (..., 6, 2) int8, smallest and largest number of whole turns that can be added to each joint within its
         limits (smallest above largest: none); None unless ``inverse_batch`` was asked for it
     position_error, rotation_error : (...,), m and rad, of the degrees of freedom that ``solve`` was asked for

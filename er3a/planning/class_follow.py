@@ -384,7 +384,7 @@ def _first_within_limits(
     robot: Robot, path: ToolPath, ways: Iterable[tuple[Reals, Callable[[Reals], Reals]]], *, turns_open: bool
 ) -> PiecewiseMotion:
     """The first of the motions from starts (n,), with what tells all rows (N, slots, n) at times, that keeps all
-    limits; else the first one. ``turns_open`` tells whether whole turns of the starts may be changed."""
+    limits; else the first one. ``turns_open`` says whether whole turns of the starts may be changed."""
     found: list[PiecewiseMotion] = []
     ends: list[PathEndsError] = []
     for start, rows_at in ways:

@@ -410,7 +410,7 @@ EQUAL = 6  # digits of rad to which travel and margin count
 
 @dataclass(frozen=True, eq=False)
 class _Sequence:
-    """One way through a stretch: angles (n, 6) in rad, slots (n,), jumps behind points (n - 1,), and its cost."""
+    """One way through a stretch: angles (n, 6) in rad, slots (n,), jumps after points (n - 1,), and its cost."""
 
     q: Reals
     slot: Integers

@@ -501,7 +501,8 @@ def _where_positive(t: Reals, values: Reals, function: Callable[[float], float])
 def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) -> list[tuple[float, float, float]]:
     """Stretches of positive values about a peak between grid points that are not positive themselves.
 
-    A peak is looked for where the parabola through a highest point and its neighbours rises half way to zero at least.
+    A peak is searched for where the parabola through a highest point and its neighbours rises half way to zero at
+    least.
     """
     inner = values[1:-1]
     tops = 1 + np.flatnonzero((inner <= 0) & (inner > values[:-2]) & (inner >= values[2:]))

@@ -481,7 +481,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
     Returns
     -------
     parts : its stretches
-    rest : the program's lines that may move the arm otherwise: on other ways, behind the last, or not understood
+    rest : the program's lines that may move the arm otherwise: on other ways, after the last, or not understood
 
     Raises
     ------

@@ -301,7 +301,7 @@ def _quiet_in(
 
 
 class _Graph:
-    """What follows what in a routine; the number behind the last operation stands for its end.
+    """What follows what in a routine; the number after the last operation stands for its end.
 
     Attributes
     ----------

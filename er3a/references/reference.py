@@ -117,7 +117,7 @@ class Reference:
 
     Attributes
     ----------
-    subject : what it is about, as people name it
+    subject : what it is about, as it is named in practice
     group : a key of :data:`er3a.references.rows.GROUPS`
     quantity : what it is about, as a model has it
     expected : in the quantity's unit; None where the source says that it gives no value

@@ -77,7 +77,7 @@ class CombinedLimit:
 class ConvexPiece:
     """A convex piece of a link: all points within ``margin`` (m) of the hull of ``points`` (m, frame as of Envelope).
 
-    The margin is by how far the mesh that the piece is part of may stand out of its pieces.
+    The margin is by how far the mesh that the piece is part of may stick out of its pieces.
     """
 
     link: int

@@ -115,7 +115,7 @@ def shortest_move(robot: Robot, move: Reals) -> Reals:
 
 
 def rows_within(robot: Robot, q: Reals, q_ref: Reals, most: int) -> Reals:
-    """The same arm (k, n) as joints (n,) by all turns that keep all limits; at most ``most`` + 1 are looked for.
+    """The same arm (k, n) as joints (n,) by all turns that keep all limits; at most ``most`` + 1 are searched for.
 
     Of continuous joints those that lie as near to q_ref (n,) as half of what a turn of each row moves them by.
     """

@@ -1,4 +1,4 @@
-"""Hand-eye calibration: the likeliest poses of camera and board, how sure they are, and what speaks against them.
+"""Hand-eye calibration: the likeliest poses of camera and board, how sure they are, and what contradicts them.
 
 Outliers, samples that can't be right: found without any calibration, by angles (:func:`check_angles`), and with one,
 by residuals (:func:`worst_sample`).

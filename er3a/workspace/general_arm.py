@@ -270,7 +270,7 @@ def _along_slide(arm: GeneralArm, first: Reals) -> tuple[GeneralArm, Reals, Real
 
 
 def _box(arm: GeneralArm, link: Reals) -> tuple[Reals, Reals]:
-    """Lowest and highest corner (3,), m, of what the joints behind joint 1 reach, after the link (3, 4) behind it."""
+    """Lowest and highest corner (3,), m, of what the joints after joint 1 reach, with its link (3, 4)."""
     middles = link[:, 3] + np.outer(arm.heights[1], link[:, 2])
     across = np.hypot(link[:, 0], link[:, 1]) * arm.radii[1]
     return middles.min(axis=0) - across, middles.max(axis=0) + across

@@ -488,7 +488,7 @@ class Chosen:
     ----------
     row : their rows of the places; slot : the branch that serves each, or MIXED
     proven : whether each is proven, or else rests on samples; branch_proven : whether that one branch serves it all is
-    refuted : how many better-ranked places the proof refused; poses : how many neighbourhoods it looked at
+    refuted : how many better-ranked places the proof refused; poses : how many neighbourhoods it examined
     """
 
     row: list[int]
@@ -638,7 +638,7 @@ def prove_place(
     Returns
     -------
     answer : refuted: no branch reaches some point and direction, with any of the rolls
-    used : how many neighbourhoods were looked at
+    used : how many neighbourhoods were examined
 
     Raises
     ------

@@ -538,7 +538,7 @@ def _outline(proven: Proven, cavity: Cavity) -> tuple[Blocks, Flags]:
 
 
 def pocket_block(proven: Proven) -> float:
-    """Edge (m) of the blocks that open pockets are looked for on."""
+    """Edge (m) of the blocks that open pockets are searched for on."""
     cells = proven.proof.cells
     low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
     size = float((cells[:, 1] - cells[:, 0]).max())

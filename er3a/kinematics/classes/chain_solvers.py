@@ -284,7 +284,7 @@ def _completions(links: Reals, n: int) -> list[tuple[class_solvers.ArmClassCode,
 
 
 def _with_any_joints(links: Reals, n: int) -> Reals:
-    """Links (7, 4, 4) with joints behind the tool about axes without special places."""
+    """Links (7, 4, 4) with joints after the tool about axes without special places."""
     size, more = size_of(links), []
     for k in range(6 - n):
         step = np.eye(4)

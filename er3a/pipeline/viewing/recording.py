@@ -321,7 +321,7 @@ def _log_run(stream: rr.RecordingStream, shown: Recorded, run: Run, start: float
 
 
 def _send_curves(stream: rr.RecordingStream, entity: str, times: Reals, values: Reals) -> None:
-    """Curves, with a gap behind the last point, so that the next run's don't join them."""
+    """Curves, with a gap after the last point, so that the next run's don't join them."""
     known: Flags = np.asarray(np.isfinite(values).all(axis=1))
     stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=values[known]))
     gaps = times[~known & np.append(True, known[:-1])]

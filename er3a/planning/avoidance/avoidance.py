@@ -210,7 +210,7 @@ class SingularSegment:
 
     @cached_property
     def regions(self) -> list[tuple[int, int]]:
-        """Stretches that are not good: index ranges (first, behind the last)."""
+        """Stretches that are not good: index ranges (first, after the last)."""
         return runs(~self.good)
 
     @cached_property
