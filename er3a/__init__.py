@@ -1,6 +1,6 @@
 """er3a: can this kinematic model of an industrial robot be trusted, and what can the robot do?
 
-The names below are imported on first use, so that one part of the package does not depend on all others.
+The public names below are imported on first use, so importing er3a loads only the parts that are needed.
 """
 
 from importlib import import_module

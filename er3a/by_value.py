@@ -1,23 +1,22 @@
-"""Frozen dataclasses as values: equal where all they hold is equal, and whole in a pickle, a copy, another process.
+"""Frozen dataclasses as values: equal if all fields are equal, and safe to pickle, copy and send to another process.
 
-What ``@dataclass`` writes by itself compares arrays with ``==``, which has no one truth, takes NaN for unequal to
-itself, and hashes no array at all. A class of this module is declared with ``eq=False`` instead::
+The methods of ``@dataclass`` compare arrays with ``==``, which is ambiguous, treat NaN as unequal to itself, and can't
+hash arrays. Classes based on this module are declared with ``eq=False`` instead::
 
     @dataclass(frozen=True, eq=False)
     class Ray(ByValue):
         origin: Reals
         direction: Reals
 
-How objects show themselves to people in Python: a few lines of text, or a table in a notebook.
+How objects print in Python: a few lines of text, or a table in a notebook.
 
-What is shown is a :class:`Sheet`; codes and numbers stand in it as they are, since sentences are no business of the
-library. Every sheet is short however much the object holds.
+An object prints as a :class:`Sheet` of codes and numbers, because the library contains no sentences. A sheet is always
+short, whatever the size of the object.
 
-What computation finds: codes with typed parameters, from which sentences are made elsewhere.
+Findings: codes with typed parameters. Their sentences are made in ``er3a.pipeline.messages``.
 
 The fields of a :class:`Finding` but its code are the parameters, plain or findings themselves, with the unit in the
-name. Several kinds of finding in one place are a union. Nothing decides by a sentence: code asks for the type or the
-code.
+name. Several kinds of finding in one place are a union. Code decides by type or code, never by a sentence.
 """
 
 from __future__ import annotations
@@ -160,7 +159,7 @@ class Sheet:
     Attributes
     ----------
     heading : what it is, in a line
-    columns, rows : a table, as texts; ``left_out`` is the number of rows behind the last one that aren't shown
+    columns, rows : a table, as texts; ``left_out`` is the number of rows after the last one that aren't shown
     facts : lines below the table
     """
 

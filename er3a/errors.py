@@ -1,4 +1,4 @@
-"""Every error that er3a raises on purpose derives from :class:`Er3aError`.
+"""The errors of er3a: all derive from :class:`Er3aError`.
 
 The command line prints such an error as one line and ends with exit code 2; anything else is a defect.
 """
@@ -12,18 +12,18 @@ from er3a.by_value import Finding
 
 
 class Er3aError(Exception):
-    """Root of all errors that a user can cause and correct."""
+    """Base class of all errors that a user can cause and correct."""
 
 
 class InputError(Er3aError):
-    """A file holds something that can't be used; the message is one line, whatever the file holds.
+    """A file holds a value that can't be used. The message is always one line.
 
     Parameters
     ----------
     file : path of the file, or None for values given in Python
     field : where in the file, e.g. ``limits.rows[2].lower_deg`` or ``row 4, column x_mm``
     problem : what is wrong, with the offending value
-    remedy : what would be right
+    remedy : how to correct it
     """
 
     def __init__(self, file: str | Path | None, field: str | None, problem: str, remedy: str):
@@ -37,11 +37,11 @@ class InputError(Er3aError):
 
 
 class InputWarning(UserWarning):
-    """Something in a file or an argument that can be meant as it is written, and looks like a slip."""
+    """A value in a file or an argument is allowed but looks like a mistake."""
 
 
 class ArgumentError(Er3aError, TypeError):
-    """An argument in Python is of a kind that can't be used."""
+    """An argument has a type that can't be used."""
 
     def __init__(self, argument: str, given: object, expected: str):
         self.argument, self.expected = argument, expected
@@ -50,7 +50,7 @@ class ArgumentError(Er3aError, TypeError):
 
 
 class RobotError(Er3aError, ValueError):
-    """A robot's numbers can't be those of an arm; ``problem`` names entry and joint."""
+    """A robot has values that no arm can have; ``problem`` names entry and joint."""
 
     def __init__(self, robot: str, problem: str):
         self.robot, self.problem = robot, problem
@@ -66,11 +66,11 @@ class ShapeError(Er3aError, ValueError):
 
 
 class PoseError(Er3aError, ValueError):
-    """A 4x4 matrix is no rigid transform, or holds NaN."""
+    """A 4x4 matrix is not a rigid transform, or holds NaN."""
 
 
 class PathError(Er3aError, ValueError):
-    """A segment (numbered from 1) that no sequence can hold."""
+    """A segment of a sequence (numbered from 1) can't be used."""
 
     def __init__(self, segment: int, problem: str):
         self.segment, self.problem = segment, problem
@@ -89,7 +89,7 @@ class NotWristPartitionedError(Er3aError):
 
 
 class ResultError(Er3aError):
-    """A results file is missing, damaged or of another format version; a rerun of its stage corrects it."""
+    """A results file is missing, damaged or of another format version; run its stage again."""
 
     def __init__(
         self,
@@ -104,7 +104,7 @@ class ResultError(Er3aError):
 
 
 class WriteError(Er3aError):
-    """A file can't be written: the disk is full, or the folder does not allow it. What was there before stays."""
+    """A file can't be written: the disk is full or permission is missing. An existing file stays unchanged."""
 
     def __init__(self, file: str | Path, error: OSError):
         self.file = str(file)
@@ -114,6 +114,6 @@ class WriteError(Er3aError):
 
 
 def _line(text: str, most: int | None = None) -> str:
-    """Text from a file made fit for one line of a terminal: no control characters, and shortened."""
+    """Text from a file, shortened and without control characters, so that it fits one line of a terminal."""
     shown = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
     return shown if most is None or len(shown) <= most else f"{shown[: most - 40]} ... {shown[-30:]}"

@@ -1,9 +1,9 @@
-"""The edge of the library: what every public function checks before it begins.
+"""Argument checks of the public functions, those that ``er3a`` exports.
 
-Public functions are those that ``er3a`` names. Arguments of er3a's own types are compared with the function's
-annotations, robots are asked for numbers that can't be an arm's, and joint values for NaN and for degrees
-(:mod:`er3a.robots.usable`). Other arrays are checked by the functions themselves. The same functions inside the library
-take what they are given, because validation computes with tables that no arm can have.
+Arguments of er3a's own types are compared with the function's annotations. Robots are checked for values that no arm
+can have, and joint values for NaN and degrees (:mod:`er3a.robots.usable`). The functions themselves check other arrays.
+Inside the library the same functions are called without these checks, because validation computes with tables that no
+arm can have.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CALLED = {str: "a text", Path: "a path", NoneType: "None"}
 
 
 def checked(function: Function) -> Function:
-    """The function as ``er3a`` offers it: it refuses unusable arguments with an :class:`er3a.Er3aError`."""
+    """The public form of a function, which refuses unusable arguments with an :class:`er3a.Er3aError`."""
     checks = _checks(function)
     places = list(signature(function).parameters)
     joints = [(places.index(name), name) for name in JOINT_VALUES if name in places and places[0] == "robot"]
@@ -61,7 +61,7 @@ def _checks(function: Callable[..., Any]) -> tuple[tuple[int, str, Check], ...]:
 
 
 def _check_of(name: str, hint: Any, crossed_limits: bool) -> Check | None:
-    """What checks an argument of this annotation; None for those that functions check themselves."""
+    """The check for an argument with this annotation; None if the function checks it itself."""
     if hint is Robot:
         return lambda value: check_robot(value, crossed_limits)
     if hint == Robot | None:

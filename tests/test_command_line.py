@@ -44,7 +44,7 @@ def test_the_version_stands_in_one_place(call):
 
 def test_all_commands_have_help(call):
     shown = call("--help").stdout
-    assert shown.index("A study") < shown.index("Robot files") < shown.index("Single jobs")
+    assert shown.index("Studies") < shown.index("Robot files") < shown.index("Single jobs")
     assert "\x1b" not in shown
 
 

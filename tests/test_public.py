@@ -481,7 +481,7 @@ def test_a_table_s_units_and_meanings_reach_pandas(tmp_path):
     assert frame.attrs == table.frame().attrs
     assert (frame == table.frame()).all(axis=None)
     assert GrowthCurve.read((tmp_path / "curve.parquet").read_bytes()) == table
-    assert "no Parquet file" in refusal(lambda: er3a.load_table(__file__))
+    assert "not a Parquet file" in refusal(lambda: er3a.load_table(__file__))
     assert "No such file" in refusal(lambda: er3a.load_table(tmp_path / "none.parquet"))
 
 

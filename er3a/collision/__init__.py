@@ -1,1 +1,1 @@
-"""What stands around an arm."""
+"""Shapes of arms and scenes, distances, and collision checks along motions."""

@@ -1,20 +1,19 @@
-"""Clearance along a motion, with nothing skipped between the points at which it is measured.
+"""Clearance along a motion, bounded between the points at which it is measured.
 
-The distance of two bodies changes by no more than they move against each other. If they are d0 apart at one time and
-d1 at another, and move by M in between, they stay (d0 + d1 - M) / 2 apart [1]_: an interval in which that is positive
-for every pair is free as a whole. Overlap counts as negative distance (the depth), for which the same holds: an
-interval in which a pair overlaps at both ends by more than M in sum overlaps as a whole. Any other one is halved.
-Halving ends where M is twice the ``depth`` asked for, so that no overlap deeper than that is missed, however small or
-thin the obstacle, and the smallest clearance is found to within it.
+The distance of two bodies changes by no more than they move against each other. If they are d0 apart at one time and d1
+at another, and move by M in between, they stay (d0 + d1 - M) / 2 apart [1]_: an interval in which that is positive for
+every pair is free as a whole. Overlap counts as negative distance (the depth), for which the same holds: if the depths
+at both ends of an interval add up to more than M, the pair overlaps in the whole interval. Other intervals are halved
+until M is twice the requested ``depth``. So no overlap deeper than that is missed, however small or thin the obstacle,
+and the smallest clearance is found to within it.
 
 M is the longer way of a capsule's two ends (its other points move no farther), in space for a solid, in the frame of
 the other link for two links. The way is bounded on a grid of the motion so fine that no end moves by more than
 twice the depth from point to point: a chord over a time h, plus A h^2 / 3, where A bounds the end's acceleration.
-With levers of at most L, rows that turn at speeds v and accelerations a and rows that slide at w and b,
-``A = L (sum |a| + (sum |v|)^2) + sum |b| + 2 sum |v| sum |w|``: bounds over the whole interval, which whoever knows the
-motion gives for the joints, and which a coupling turns into those of rows. Where the motion has no such bounds (at
-singular poses of a path of the tool, through which nothing is proven) the bulge of the parabola through three points
-takes the place of A h^2 / 3.
+With levers of at most L, revolute rows with speeds v and accelerations a, and prismatic rows with w and b,
+``A = L (sum |a| + (sum |v|)^2) + sum |b| + 2 sum |v| sum |w|``: these are bounds over the whole interval. The caller
+gives them for the joints; a coupling converts them to rows. If the motion has no such bounds (at singular poses of a
+tool path, through which nothing is proven), the bulge of the parabola through three points replaces A h^2 / 3.
 
 References
 ----------
@@ -341,12 +340,12 @@ def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
 
 
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
-    """Smallest distance of each arm (N, n) in rad or m from the scene's solids and from itself.
+    """Smallest distance of the arm, at each joint vector (N, n) in rad or m, from the scene's solids and from itself.
 
     Raises
     ------
     Er3aError
-        if the scene is none
+        if the scene is not a scene of er3a
     """
     bodies = bodies_of(robot, scene)
     distance, pair = bodies.min_distance(np.asarray(q, float).reshape(-1, robot.joints))

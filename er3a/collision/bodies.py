@@ -1,6 +1,6 @@
-"""The pairs of bodies that can meet: of an arm with itself (:mod:`er3a.collision.matrix`) and with a scene's solids.
+"""The pairs of bodies that can collide: of an arm with itself (:mod:`er3a.collision.matrix`) and with a scene's solids.
 
-The base does not move, so it is no pair with what stands around it: an arm is mounted on something.
+The base is not paired with the scene: it does not move, and it is mounted on something.
 """
 
 from __future__ import annotations

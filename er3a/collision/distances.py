@@ -457,7 +457,7 @@ def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers
 
     ``found`` (N, K) gets them all; if it has no columns, only ``least`` (N,) and its number ``pair`` (N,) are worked
     out, and pairs that can't be the least are left out. Joined pairs are the least only where they overlap. ``deep``
-    (N,) tells whether cores overlapped.
+    (N,) says whether cores overlapped.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w = np.empty(layout.links.shape), np.empty(layout.points.shape)
@@ -595,7 +595,7 @@ def _box_state(
 
 @kernel
 def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: int) -> tuple[int, int]:
-    """Whether a straight move of the joints is free of overlap, proven, with the number of arms looked at.
+    """Whether a straight move of the joints is free of overlap, proven, with the number of joint vectors examined.
 
     Returns
     -------
@@ -646,7 +646,7 @@ def search_boxes(
     Returns
     -------
     FREE if so, proven; MEETS with the joint vector ``at`` (n,) in which it is otherwise; or UNDECIDED
-    looked : how many boxes were looked at
+    looked : how many boxes were examined
     least : m, of FREE a lower bound of how far apart (or deep) the two stay
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))

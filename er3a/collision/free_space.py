@@ -1,11 +1,12 @@
-"""How much of an arm's joint space is free of overlap, where its tool gets free of it, and what can be joined to home.
+"""The collision-free share of joint space, the places that the tool reaches without collision, and those connected to
+home.
 
 Shares are those of random joint vectors, with Wilson's interval [1]_. A place (a cell of space) counts as reached if a
-joint vector with the tool point in it was found, and as clear if one of those is free of overlap: that is proven by the
-vector itself. A place without one may be lost or not: how often it was tried is stated.
+joint vector with the tool point in it was found, and as clear if one of these is free of overlap; that vector proves
+it. For a place without one nothing is proven; the number of tries is stated.
 
-Two free joint vectors are joined if the straight move between them is proven free along its whole way; places are
-joined to home if a chain of such moves leads there (a roadmap [2]_). What is not joined may be or not.
+Two free joint vectors are connected if the straight move between them is proven free. Places are connected to home if a
+chain of such moves leads there (a roadmap [2]_). For other places nothing is proven.
 
 References
 ----------

@@ -1,7 +1,7 @@
-"""Which pairs of an arm's bodies have to be looked at for collisions, each with its reason.
+"""The collision matrix: which pairs of an arm's bodies are checked for collisions, each with its reason.
 
-Bodies of one link never move against each other, so they are no pair. Every other pair is looked at unless it is proven
-harmless:
+Bodies of one link never move against each other, so they are not a pair. Every other pair is checked unless it is
+proven harmless:
 
 - *never*: the two are apart in all joint vectors within the limits, proven by bounds of the distance over boxes of
   joint values, which are halved until each is decided;
@@ -9,24 +9,23 @@ harmless:
   is between the two (of neighbours, being less than ``TOUCH`` apart counts as overlap if it is proven). Or there are
   two joints between them (more if their axes meet), and a ball in the outer link about a point of its joint's axis, or
   in its middle, is proven to touch the inner link in all joint vectors, as in a wrist. Only the region around that
-  joint is left out: what lies within the two bodies' girths of it, of hulls from the point that is proven to hold them,
-  of lines from where they are nearest in the pose that holds them farthest apart. What is left of them is judged again,
-  so that an arm that folds onto itself is seen.
-  A default shape that slides in a thicker one is joined to it likewise: of the guide only what lies along the sliding
-  axis is left out, and of what slides nothing. Of links with several bodies those that lie beside two that a joint
-  holds are joined too, if what is left without that joint's region comes apart; and so are all bodies of two links
-  that overlap always only as a whole;
-- *overlaps*: they overlap in all joint vectors drawn, none in which they don't was found in the boxes, and no joint
-  explains it. No arm is built like that, so the shapes are wrong: what overlaps is left out, and has to be named
-  wherever it is not examined;
+  joint is left out, within the girth of both bodies: for hulls, measured from the point that is proven to belong to
+  both; for lines, from where they are nearest in the pose in which they are farthest apart. The rest is classified
+  again, so that an arm that folds onto itself is seen. A default shape that slides in a thicker one is joined to it in
+  the same way: only the part of the guide along the sliding axis is left out, and nothing of the sliding shape. In
+  links with several bodies, those beside two joined bodies are joined too, if the rest without that joint's region
+  comes apart. So are all bodies of two links that always overlap only as a whole;
+- *overlaps*: they overlap in all joint vectors drawn, the boxes show none in which they don't, and no joint explains
+  it. No arm is built like that, so the shapes are wrong: the overlap is left out, and every result that does not
+  examine it has to say so;
 - *guessed*: shapes guessed from a table (:mod:`er3a.collision.shapes`) that would be joined, but the table gives the
-  link between them no length, so that the guess leaves its housing no room, and what is left of the two overlaps in
-  many of the joint vectors drawn (``POOR_GUESS``). The pair is left out, and has to be named too;
-- *meets*: a joint vector in which they overlap was found, and one in which they don't: watched;
-- *undecided*: none of this within the number of boxes: watched.
+  link between them no length (its housing is missing), and the rest of the two overlaps in many of the joint vectors
+  drawn (``POOR_GUESS``). The pair is left out, and results have to say so;
+- *meets*: a joint vector in which they overlap was found, and one in which they don't: checked;
+- *undecided*: none of this within the number of boxes: checked.
 
-What a person decided (``Robot.pair_rules``) goes first: *allowed* pairs are not looked at (only whether there is
-something to be seen, which no verdict passes without), *watched* ones as a whole.
+Decisions in the robot file (``Robot.pair_rules``) come first. *Allowed* pairs are not checked; but whether they ever
+overlap is determined, and if they do, no verdict passes. *Watched* pairs are checked as a whole.
 """
 
 from __future__ import annotations
@@ -175,7 +174,7 @@ class JudgedPair:
     witness : (n,), rad or m, a joint vector in which watched bodies overlap; None where none was found
     least : m, a lower bound of the distance of bodies that never meet; NaN for others
     left_out : m, radius of the region around the joint that is left out, 0 where there is none
-    boxes : how many boxes of joint vectors were looked at
+    boxes : how many boxes of joint vectors were examined
     hub : (3,), m, in the outer link's frame, where a joint is proven to hold the two; None where none is
     """
 
@@ -191,7 +190,7 @@ class JudgedPair:
 @dataclass(frozen=True, eq=False)
 class Held:
     """That two bodies always overlap: ``hub`` (3,), m, in the outer link's frame, where their joint holds them; None
-    where that is unknown. ``boxes``: of joint vectors looked at for it."""
+    where that is unknown. ``boxes``: of joint vectors examined for it."""
 
     hub: Reals | None
     boxes: int

@@ -1,9 +1,9 @@
-"""Closed meshes as convex pieces, and how far pieces and mesh stand out of each other.
+"""Closed meshes as convex pieces, and how far pieces and mesh stick out of each other.
 
-Pieces neither surely hold the mesh nor equal it. How far the mesh stands out of them is bounded: a triangle whose three
-corners are within a distance of one convex piece is so as a whole, and those that no one piece holds well are cut
-finer until bound and measurement agree. Taken larger by that distance, the pieces hold the mesh's surface, and nothing
-reaches the inside but through it. How far the pieces stand out of the mesh is measured at points of their surfaces.
+The pieces do not equal the mesh and need not contain it. How far the mesh sticks out of them is bounded: a triangle
+whose three corners are within a distance of one convex piece is so as a whole; other triangles are subdivided until
+bound and measurement agree. Enlarged by that distance, the pieces contain the mesh's surface, through which anything
+must pass to get inside. How far the pieces stick out of the mesh is measured at points of their surfaces.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class ConvexPieces(ByValue):
     Attributes
     ----------
     pieces : corners (k, 3), m, of each
-    uncovered : m, a bound of how far the mesh stands out of the pieces, which are to be taken larger by it
-    excess : m, how far the pieces stand out of the mesh, as measured; NaN where it was not
+    uncovered : m, a bound of how far the mesh sticks out of the pieces, which are to be taken larger by it
+    excess : m, how far the pieces stick out of the mesh, as measured; NaN where it was not
     """
 
     pieces: tuple[Reals, ...]
@@ -155,7 +155,7 @@ def hull_of(points: Reals) -> ConvexPieces:
 
 
 def uncovered(vertices: Reals, faces: Integers, pieces: Sequence[Reals]) -> float:
-    """A bound (m) of how far a mesh's surface stands out of the union of convex pieces."""
+    """A bound (m) of how far a mesh's surface sticks out of the union of convex pieces."""
     triangles, settled, looked = vertices[faces], 0.0, 0
     for cut in range(CUTS + 1):
         corners, where = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -183,7 +183,7 @@ def _quartered(triangles: Reals) -> Reals:
 
 
 def _excess(vertices: Reals, faces: Integers, pieces: Sequence[Reals], seed: int) -> float:
-    """How far pieces stand out of a mesh (m), at random points of their faces and at their corners."""
+    """How far pieces stick out of a mesh (m), at random points of their faces and at their corners."""
     library, random = load_open3d(), np.random.default_rng(seed)
     scene = library.t.geometry.RaycastingScene()
     scene.add_triangles(vertices.astype(np.float32), faces.astype(np.uint32))

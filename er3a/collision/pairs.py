@@ -1,4 +1,4 @@
-"""Pairs of bodies that can meet, by number and name."""
+"""Pairs of bodies that can collide, by number and name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Solids of simple shape around an arm, in the frame that its base is placed in; metres."""
+"""Solids of simple shape around an arm, in the world frame in which its base is placed; metres."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class Mesh(ByValue):
     Attributes
     ----------
     T : (4, 4), T_world_mesh; pieces : vertices (k, 3), m, of each piece, in the mesh's frame
-    margin : m, by how far the mesh may stand out of the pieces; they are taken larger by it
+    margin : m, by how far the mesh may stick out of the pieces; they are taken larger by it
     """
 
     name: str

@@ -1,16 +1,17 @@
 """The convex bodies of an arm, of what it carries and of a scene, in one form, and as arrays for kernels.
 
-The shapes of an arm's links are those that its file gives, else capsules guessed from its table. A file that gives any
-shape gives them all: a link without one has none. Links are often left without a shape because the shapes of their
-neighbours cover them (frames in a wrist, rings between two housings), and a capsule guessed along the table's lengths
-lies inside what the file draws around the next joint, so that the two would overlap in every pose. Which links have
-none is said (``ArmShapes.bare``), because nothing that they hit is seen; those whose lengths reach out of their
-neighbours' shapes are no frames in a wrist, and no verdict passes without them (``ArmShapes.uncovered``). Nor does one
-where a link looks larger than its shapes: its visual mesh reaches out of them and of its neighbours' by ``VISIBLE``.
+The shapes of an arm's links are those of its file, or, if the file gives none at all, capsules guessed from its table.
+A file that gives any shape has to give all: a link without one has none. Files often leave links without a shape
+because the shapes of their neighbours cover them (frames in a wrist, rings between two housings). A guessed capsule
+would overlap the shape around the next joint in every pose.
 
-The guess puts a capsule around each straight piece of a link, along its joint's axis and across to the next. Its
-radius is a share of the arm's size (the sum of all link lengths): 5.5 % at the shoulder, falling to 3 % at the wrist,
-which is about how thick small industrial arms are: an estimate. The column below axis 2 counts as base.
+``ArmShapes.bare`` lists the links without a shape, because their contacts are not seen. No verdict passes if such a
+link reaches out of its neighbours' shapes (``ArmShapes.uncovered``), or if a link's visual mesh reaches out of its own
+and its neighbours' shapes by ``VISIBLE``.
+
+The guess puts a capsule around each straight piece of a link, along its joint's axis and across to the next. Its radius
+is a share of the arm's size (the sum of all link lengths): 5.5 % at the shoulder, falling to 3 % at the wrist, an
+estimate of how thick small industrial arms are. The column below axis 2 counts as base.
 """
 
 from __future__ import annotations

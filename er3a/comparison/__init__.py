@@ -1,1 +1,1 @@
-"""Whether two tables describe the same arm."""
+"""Comparison of two tables: do they describe the same arm?"""

@@ -1,8 +1,8 @@
-"""Whether two tables are of one arm, and if not, which entries differ and what made them.
+"""Whether two tables describe one arm; if not, which entries differ and which mistake explains them.
 
-The answer comes in layers. Geometry is what no choice of base, flange, zeros and directions changes; only if it differs
-is the other table another arm (:mod:`er3a.comparison.mechanism`). The layers behind it are conventions: they matter to
-whoever commands joints or places the base by the table.
+The result has layers. Geometry is what no choice of base, flange, zeros and directions changes; only if it differs does
+the other table describe another arm (:mod:`er3a.comparison.mechanism`). The other layers are conventions. They matter
+for commanding joints and for placing the base.
 """
 
 from __future__ import annotations
@@ -168,10 +168,11 @@ class Comparison(ByValue):
     Attributes
     ----------
     verdict : equal; same_arm (geometry agrees, something else differs); other_arm; other_joint_count
-    geometry, zero, directions, base, flange, coupling, limits, speeds : the layers; None where joints can't be paired
-    as_printed_mm : largest distance of both flanges over the joint ranges, joint values as the tables have them
-    aligned_mm : the same after base, flange, zeros and directions of B are brought to A's
-    corrected : A's table with all entries corrected that differ, which makes it B's arm; None for another joint count
+    geometry, zero, directions, base, flange, coupling, limits, speeds : the layers; None if joints can't be paired
+    as_printed_mm : largest distance between the two flanges over the joint ranges, for equal joint values
+    aligned_mm : the same, after base, flange, zeros and directions of B are aligned with A's
+    corrected : A's table with all differing entries corrected, so that it describes B's arm; None if the numbers of
+        joints differ
     """
 
     verdict: VerdictWord
@@ -199,9 +200,9 @@ def compare(robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = 0.5, tolera
 
     Parameters
     ----------
-    robot_a : the table in question, whose entries are named
-    robot_b : the table that it is compared with
-    tolerance_mm, tolerance_deg : entries that differ by no more agree
+    robot_a : the table to test; differences are named by its entries
+    robot_b : the table to compare with
+    tolerance_mm, tolerance_deg : entries that differ by at most this are equal
 
     Raises
     ------
@@ -261,7 +262,7 @@ def best_of(
 ) -> list[tuple[str, Comparison]]:
     """A robot compared with several, the one that fits best first: fewest entries, then the smallest differences.
 
-    Causes are looked for in the best one alone.
+    Causes are searched for in the best one alone.
     """
     tolerances = Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
     found = [(name, _compared(robot, other, tolerances, explain=False)) for name, other in others.items()]

@@ -1,22 +1,23 @@
-"""Two arms matched axis by axis: what of their tables is geometry, and what is a free choice.
+"""Two arms matched axis by axis: geometry separated from free choices.
 
-Two serial arms are the same mechanism if rigid transforms bring each of their joint axes, as lines (of joints that
-slide: as directions), together at some joint values. Of a table with rows
-``L_k = Tz(d_k) Tx(a_k) Rx(alpha_k) Ry(beta_k)`` between the motions ``Rz(theta_k)`` this leaves free [1]_ [2]_:
+Two serial arms are the same mechanism if, at some joint values, a rigid transform maps the joint axes of one onto those
+of the other (as lines; for prismatic joints, as directions). Of a table with rows ``L_k = Tz(d_k) Tx(a_k) Rx(alpha_k)
+Ry(beta_k)`` between the motions ``Rz(theta_k)`` these are free choices [1]_ [2]_:
 
 - the sense of each axis and of each common normal (``senses``, ``normals``): signs of a, alpha, d, half turns of theta;
-- at each joint what commutes with its motion: the zero, and a shift along the axis. That shift has no effect on the
-  next row where neighbouring axes are parallel, so d is known there as a sum alone; joints that slide have no place;
-- all that stands before the first joint and behind the last: base and flange.
+- at each joint what commutes with its motion: the zero, and a shift along the axis. Between parallel axes that shift
+  moves to the next row without effect, so only the sum of the d is known; prismatic joints have no location;
+- everything before the first joint and after the last: base and flange.
 
-Signs are counted out. Everything else is linear once the directions agree: translations ``t_k`` of the rows differ by
-``c_k - R_k c_(k+1)`` with free shifts c, and by what entries differ. The fewest entries that explain it are taken.
+All sign choices are tried. Everything else is linear once the directions agree: translations ``t_k`` of the rows differ
+by ``c_k - R_k c_(k+1)`` with free shifts c, and by what entries differ. The smallest set of entries that explains the
+difference is taken.
 
-Axes less than ``NEARLY_PARALLEL`` apart have common normals far away, which errors of measurement move by metres.
-They are compared in two forms, and the one with fewer differences counts: by their normals, which is exact, and by
-where the next axis crosses the plane across this one (Hayati's beta), which does not magnify errors. There they count
-as parallel, as long as a shift along one stays on the other to within the tolerances. Of axes that are parallel in one
-of the two arms alone, the second form is all there is.
+Axes less than ``NEARLY_PARALLEL`` apart have common normals far away, which measurement errors move by metres. They are
+compared in two forms, and the one with fewer differences counts: by their normals, which is exact, and by where the
+next axis crosses the plane across this one (Hayati's beta), which does not magnify errors. In the second form they
+count as parallel, as long as a shift along one stays on the other to within the tolerances. Axes that are parallel in
+only one of the two arms can be compared in the second form only.
 
 References
 ----------
@@ -69,7 +70,7 @@ class Mechanism:
     alpha, beta : (m - 1,), rad; a : (m - 1,), m, of the links between two axes
     d : (m,), m; of the first joint and the last it is 0, for base and flange hold it
     offset, direction, sliding : (m,); start : (m,), m, what the shift of a joint that slides begins with
-    base, flange : (4, 4), m, before the first joint and behind the last
+    base, flange : (4, 4), m, before the first joint and after the last
     """
 
     a: Reals
@@ -619,7 +620,7 @@ def _entries(
 
     Returns
     -------
-    entries; how many lengths can be told apart, and by how much those differ that agree; what is unexplained, m
+    entries; how many lengths can be distinguished, and by how much those differ that agree; what is unexplained, m
     """
     links = len(one.a)
     if not links:

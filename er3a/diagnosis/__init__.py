@@ -1,1 +1,1 @@
-"""Which fault of a table explains its disagreement with the references."""
+"""Diagnosis: which fault of a table explains its disagreement with the references."""

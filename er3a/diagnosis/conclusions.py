@@ -1,4 +1,4 @@
-"""What a diagnosis concludes, and which further measurement would say more."""
+"""The conclusion of a diagnosis, and the measurement that would narrow it down."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class RankedHypothesis:
     half_widths : largest difference that is left, in half-widths of its reference
     indistinguishable_from : the faults of other hypotheses that no reference tells from this one; if it explains, all
         others that explain with as few faults
-    to_decide : what would distinguish them; None if there is nothing to tell apart
+    to_decide : what would distinguish them; None if there is nothing to distinguish
     score : what those that don't explain are ranked by, see :mod:`er3a.diagnosis.ranking`; smaller is better
     """
 

@@ -1,9 +1,10 @@
-"""Whether a table is the arm that references describe, with zeros, directions, base or flange defined otherwise.
+"""Whether a table describes the references' arm, with zeros, directions, base or flange defined differently.
 
-Where references state the line of every joint axis, these lines are an arm, and the table is matched with it
-(:mod:`er3a.comparison.mechanism`): geometry first. Zeros, directions, base and flange are taken from the match, any
-number of them at once, and fitted to all references that the arm's shape and place answer. If all of these are met the
-table is the same arm; with up to ``MOST_WRONG`` entries of geometry that are wrong besides, a faulty table of it.
+If references state the line of every joint axis, these lines describe an arm, and the table is matched with it
+(:mod:`er3a.comparison.mechanism`): geometry first. Zeros, directions, base and flange, any number of them at once, are
+taken from the match and fitted to all references about the arm's shape and place. If all of these are met, the table
+describes the same arm. If up to ``MOST_WRONG`` entries of the geometry are wrong as well, it is a faulty table of that
+arm.
 """
 
 from __future__ import annotations

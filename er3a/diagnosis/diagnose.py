@@ -1,4 +1,4 @@
-"""What is most likely wrong with a table."""
+"""The most likely faults of a table, ranked."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def deciding_measurement(tables: Tables, robot: Robot) -> conclusions.NextMeasur
 
     Parameters
     ----------
-    tables : H hypotheses, which the references at hand can't tell apart; of very many the first are compared
+    tables : H hypotheses, which the references at hand can't distinguish; of very many the first are compared
 
     Returns
     -------

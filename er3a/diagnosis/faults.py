@@ -1,5 +1,5 @@
-"""The faults without a free number that tables are known to have, as repairs: what to change so that a faulty table
-becomes right again. Faults with a free number are in :mod:`er3a.diagnosis.fitting`.
+"""Common faults of tables that have no free number, each as a repair: the change that corrects the faulty table. Faults
+with a free number are in :mod:`er3a.diagnosis.fitting`.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 Residuals are in half-widths of the references. A scan over a grid finds the basins (predictions are trigonometric
 polynomials of low degree in an angle and, but for unsigned coordinates, linear in a length), damped least squares [1]_
-go down to their bottoms, and where the bottom meets not all references, though its sum of squares leaves that open, the
-largest residual is minimised instead, by Lawson's weights [2]_: a half-width is a bound and no standard deviation.
+find the minima. If a minimum does not meet all references although its sum of squares does not exclude that another
+point does, the largest residual is minimised instead, by Lawson's weights [2]_, because a half-width is a bound, not a
+standard deviation.
 
 References
 ----------

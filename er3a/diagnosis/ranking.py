@@ -1,17 +1,17 @@
 """Rank single and double faults.
 
 A hypothesis that meets all references comes before every one that doesn't, and of those that meet them, one with fewer
-faults comes first: pairs are searched only if no single fault will do. What is left open by the references is a bound,
-so all that meet them with the same number of faults are one set: nothing tells them apart.
+faults comes first: pairs are searched only if no single fault meets them. The references state bounds, so all
+hypotheses that meet them with the same number of faults form one set: nothing distinguishes them.
 
-Those that leave references missed are ranked by the score
+Hypotheses that do not meet all references are ranked by the score
 
     sum over mm and deg of n ln(max(chi2 / n, 1)) + c k,
 
-the Gaussian log-likelihood of n references of a unit with unknown noise in that unit, floored where the references'
-own uncertainty is met, plus a cost c for each of k faults (half as much again for one with a free number), after
-Schwarz [1]_. c grows with the number of hypotheses, because the best of many fits noise better than one does. One that
-scores no better than the table as it is (k = 0) is no hypothesis.
+the Gaussian log-likelihood of n references of a unit with unknown noise in that unit, with a floor at the references'
+own uncertainty, plus a cost c for each of k faults (half as much again for one with a free number), after Schwarz [1]_.
+c grows with the number of hypotheses, because the best of many fits noise better than one does. A hypothesis that
+scores no better than the unchanged table (k = 0) is dropped.
 
 References
 ----------

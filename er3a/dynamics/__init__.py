@@ -1,6 +1,6 @@
-"""What the motors feel: torques, powers and holding loads of an arm whose masses are known.
+"""Dynamics: torques, powers and holding loads of an arm with known masses.
 
-``arm_model`` is the one place that calls Pinocchio; ``torques`` of motions and at rest, ``torque_timing`` (the
-shortest time under them), ``margins`` (of payload and speed, and the wrist's), ``pose_bound`` (over all poses),
-``plausibility`` (whether masses can be right).
+Only ``arm_model`` calls Pinocchio. ``torques``: of motions and at rest. ``torque_timing``: the shortest time under
+torque limits. ``margins``: of payload, speed and wrist. ``pose_bound``: bounds over all poses. ``plausibility``: of
+masses.
 """

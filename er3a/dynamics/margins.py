@@ -1,17 +1,17 @@
-"""How much more a motion could carry, how much faster it could be, under the drives' torques and the wrist's limits.
+"""Margins of payload and speed of a motion, under the drives' torques and the wrist's limits.
 
 Torques are linear in the mass of a payload whose centre and radii of gyration stay, and quadratic in a scale of speed:
 gravity and Coulomb friction stay, viscous friction goes with it, inertia and velocity terms with its square [1]_. So
 the square of the effective torque is a polynomial of degree two in the one and of degree four in the other.
 
-How far torques can be off because masses and centres are is linear, by the regressor: ``tau = Y(q, qd, qdd) p`` is
-linear in each body's ten parameters p [2]_. A body's mass is off with its centre and radii of gyration kept, so p moves
-along itself; its centre is off with mass and inertia about it kept. Worst cases add.
+The error of torques from errors of masses and centres is linear, by the regressor: ``tau = Y(q, qd, qdd) p`` is linear
+in each body's ten parameters p [2]_. A body's mass is off with its centre and radii of gyration kept, so p moves along
+itself; its centre is off with mass and inertia about it kept. Worst cases add.
 
 The wrist's limits and load diagram are the manufacturer's. A load of mass m whose centre is at distance L from a
-joint's axis asks for the moment ``m g L`` and the inertia ``m L^2`` and its own about that axis [3]_. L is the largest
-over all positions of the joints behind. Its own inertia counts with its largest principal moment, but for the last
-axis, which it is fixed to.
+joint's axis makes the moment ``m g L`` and the inertia ``m L^2`` plus its own about that axis [3]_. L is the largest
+over all positions of the joints after it. Its own inertia counts with its largest principal moment, except for the last
+axis, to which the load is fixed.
 
 References
 ----------

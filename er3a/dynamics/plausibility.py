@@ -1,8 +1,8 @@
-"""Whether masses can be right: what stands out of the data of links, entry by entry.
+"""Plausibility of masses: implausible values in the data of links, entry by entry.
 
-Numbers that no body can have are refused where a file is read (:func:`er3a.robots.masses.no_body`); here stand those
-that a body may have but hardly this one. Shapes are those of the links' meshes or capsules; where they are guessed from
-the table, only what is off by orders of magnitude counts.
+Values that no body can have are refused when a file is read (:func:`er3a.robots.masses.no_body`). Here are values that
+are possible but unlikely for this link. Shapes are the links' meshes or capsules; if they are guessed from the table,
+only errors by orders of magnitude count.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ MassFinding = (
 
 
 def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
-    """What stands out of a robot's masses, link by link, then of their sum."""
+    """Implausible values among a robot's masses: link by link, then their sum."""
     shapes = link_shapes(robot)
     beyond = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
     armature = drives_of(robot).armature

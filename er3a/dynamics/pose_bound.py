@@ -1,4 +1,4 @@
-"""Upper bounds of what is largest over all poses within the limits, by branch and bound [1]_.
+"""Upper bounds of a maximum over all poses within the limits, by branch and bound [1]_.
 
 A box of joint values has a bound by the corners of its hulls (:mod:`er3a.dynamics.pose_bound`). Boxes that can't
 hold more than what is found already are dropped, the others halved, the highest bound first. What is left in the end,
@@ -100,7 +100,7 @@ def hanging_of(model: ArmModel) -> list[Hanging]:
 
 
 def point_of(robot: Robot, point: Reals) -> list[Hanging]:
-    """A point (3,) of the flange as 1 kg that hangs on the last row."""
+    """A point (3,) of the flange as a point mass of 1 kg on the last row."""
     placed = flange_in_last_link(robot) @ np.append(point, 1.0)
     none = [_alone(np.zeros(3))] * 3
     return [*[Hanging(0.0, *none)] * (robot.rows - 1), Hanging(1.0, _alone(placed[:3]), *none[1:])]

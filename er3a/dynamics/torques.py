@@ -49,15 +49,15 @@ class TorqueParts:
 
 
 def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = None) -> Reals:
-    """Torques that the drives must give for a motion, friction and rotors included as far as the file knows them.
+    """Torques that the drives must supply for a motion, including friction and rotors if the robot file gives them.
 
     Links without mass in the file count as massless. Gravity is 9.81 m/s^2 along -z of the world, in which the robot's
-    base places the arm, so that a base turned to a wall or a ceiling turns gravity.
+    base places the arm; for a wall or ceiling mount, rotate the base.
 
     Parameters
     ----------
     q, qd, qdd : (..., n), rad, rad/s, rad/s^2 (m for prismatic joints), in the manufacturer's signs
-    load : what hangs on the flange and what the surroundings do to the tool
+    load : the load on the flange and the wrench of the surroundings on the tool
 
     Returns
     -------
@@ -68,7 +68,7 @@ def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = N
     ShapeError, PoseError
         if an array has the wrong shape
     RobotError
-        if the robot's links have no masses, or such as no body can have
+        if the robot's links have no masses, or impossible ones
     """
     (q, qd, qdd), shape = _flat(robot, {"q": q, "qd": qd, "qdd": qdd})
     tau: Reals = torque_parts(arm_model(robot, load), q, qd, qdd).total.reshape(shape)

@@ -1,4 +1,4 @@
-"""How far the values in an input file can be relied on: the grades that stand in it."""
+"""Grades and translations in input files."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def grades_in(file: Path) -> dict[str, list[str]] | dict[str, int]:
 
     Returns
     -------
-    grades : by grade, of a YAML file the groups of values that have it, of a table the number of rows; empty for files
-        that grade nothing
+    grades : for each grade, the groups of values with it (YAML) or the number of rows (CSV); empty for files without
+        grades
     """
     if file.suffix == ".csv":
         return dict(Counter(read_column(file, "grade")))
@@ -35,10 +35,10 @@ TITLES = ("title", "note")
 
 
 def translations_in(files: Iterable[Path], language: str) -> dict[str, str]:
-    """The translations into a language of people's texts in files, by the text that they translate.
+    """Translations of the texts in input files into a language, by the original text.
 
-    Those of titles and notes stand beside them in YAML files (``title_zh``), those of other texts, such as sources and
-    names of poses, in a gettext catalogue in the file's folder (``zh.po``).
+    Titles and notes are translated in the YAML file itself (``title_zh``), other texts, such as sources and names of
+    poses, in a gettext catalogue in the file's folder (``zh.po``).
 
     Raises
     ------
@@ -56,7 +56,7 @@ def translations_in(files: Iterable[Path], language: str) -> dict[str, str]:
 
 
 def catalogues_beside(files: Iterable[Path], language: str) -> list[Path]:
-    """The catalogues of people's texts in the folders of files, in a language."""
+    """The translation catalogues in the folders of input files, for a language."""
     return sorted(place for folder in {file.parent for file in files} if (place := folder / f"{language}.po").is_file())
 
 

@@ -1,5 +1,4 @@
-"""Arms by name or file, whatever kind of file describes them; and a URDF as a reference set, for tables that others
-made to be held against."""
+"""Arms by name or by any kind of file that describes one; and URDFs as reference sets, to compare tables with."""
 
 from __future__ import annotations
 
@@ -29,7 +28,7 @@ READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
 
 @dataclass(frozen=True)
 class ReadArm:
-    """``printed``: whether someone wrote its table, rather than that it was derived; ``notes``: what was assumed."""
+    """``printed``: whether the table was given, not derived; ``notes``: assumptions."""
 
     robot: Robot
     printed: bool
@@ -51,10 +50,10 @@ def read_arm(
     Parameters
     ----------
     source : a robot's name, or a path that ends in .csv, .yaml, .urdf or .xacro
-    convention : of a D-H table; a column ``convention`` in it counts more
-    length_unit, angle_unit : of a D-H table whose columns are named mm and deg all the same; if None what its values
-        can be
-    base, tip, xacro : of a URDF, as :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree`` have them
+    convention : of a D-H table; a column ``convention`` in the table takes precedence
+    length_unit, angle_unit : of a D-H table whose column names say mm and deg although its values are in another unit;
+        None to detect that from the values
+    base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
 
     Raises
     ------
@@ -73,11 +72,13 @@ def read_arm(
         return ReadArm(robot.replace(name=robot_name(path)), False, assumed)
     if path.suffix in (".yaml", ".yml") or (not path.suffix and not path.exists()):
         return ReadArm(load_robot(source), True)
-    raise InputError(path, None, "is no kind of file that describes an arm", f"Give one that ends in {', '.join(READ)}")
+    raise InputError(
+        path, None, "is not a kind of file that describes an arm", f"Give one that ends in {', '.join(READ)}"
+    )
 
 
 def read_arms(folder: Path, **options: str | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
-    """All arms in a folder by the names of their files, and what was not read, with why.
+    """All arms in a folder, by file name, and the files that were not read, with the reason.
 
     Raises
     ------
@@ -109,7 +110,7 @@ def write_urdf_references(
     base: str | None = None,
     tip: str | None = None,
 ) -> list[Path]:
-    """Write axes, flange poses with orientation, limits and speeds as a URDF has them, with their document.
+    """Write a URDF's axes, flange poses with orientation, limits and speeds as a reference set, with its document.
 
     The flange is the tip; half-widths follow from the digits that the URDF prints, and are no less than those of a
     printed table. What it does not state is left out: limits of continuous joints, and those of prismatic joints, which

@@ -1,4 +1,4 @@
-"""Diagnosis, evidence and calibration by names and paths of the files that they take."""
+"""Diagnosis, evidence and calibration, called with names or paths of their input files."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ APART_DEVIATIONS = 8.0
 
 def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Measurement, ...]:
     """Read measured positions: joint values ``q1_deg`` ... (``q3_mm`` of a prismatic joint), ``point`` (flange or
-    tool), ``x_mm``, ``y_mm``, ``z_mm``, and, if it is known, ``standard_deviation_mm``. In place of coordinates
-    ``place`` or ``plane`` names a fixed point or a plane, of which nobody knows where it is, that was touched there;
-    ``pair`` two rows whose points are ``length_mm`` apart, ``bar`` a ball bar whose other end is in a fixed socket.
+    tool), ``x_mm``, ``y_mm``, ``z_mm``, and, if it is known, ``standard_deviation_mm``. Instead of coordinates, a row
+    may name a ``place`` or ``plane`` (a fixed point or plane at an unknown location that was touched), a ``pair`` (two
+    rows whose points are ``length_mm`` apart) or a ``bar`` (a ball bar whose other end is in a fixed socket).
 
     Parameters
     ----------
-    robot : whose joints the columns have to be; else as many as the header has
+    robot : the robot that was measured; without it, the header decides the number of joints
 
     Raises
     ------
@@ -93,7 +93,7 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
             remedy = "Write the distance of a pair's points, or of a bar's point from its socket"
             raise InputError(path, f"row {fields['row']}, column length_mm", problem, remedy)
         if xyz == (None, None, None) and not given:
-            raise InputError(path, f"row {fields['row']}, column x_mm", "no coordinate is given", "Give one at least")
+            raise InputError(path, f"row {fields['row']}, column x_mm", "no coordinate is given", "Give at least one")
         if deviation is not None and deviation <= 0:
             where, problem = f"row {fields['row']}, column standard_deviation_mm", f"{deviation:g} is not positive"
             remedy = "Write the measuring device's standard deviation, or leave the column out to have it estimated"
@@ -129,7 +129,7 @@ def _units_in(path: Path) -> list[str]:
     named = {int(found[1]): found[2] for name in read_header(path) if (found := JOINT_COLUMN.fullmatch(name))}
     if max(named, default=0) > MOST_JOINTS:
         column = f"q{max(named)}_{named[max(named)]}"
-        raise InputError(path, f"column {column}", f"er3a knows arms of {MOST_JOINTS} joints at most", "Remove it")
+        raise InputError(path, f"column {column}", f"er3a supports at most {MOST_JOINTS} joints", "Remove it")
     return [named.get(joint, "deg") for joint in range(1, max(named, default=6) + 1)]
 
 
@@ -170,7 +170,7 @@ def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
 
 
 def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> Hypotheses:
-    """Hypotheses about what is wrong with a table, best first; see :func:`er3a.diagnosis.diagnose.diagnose`.
+    """Hypotheses about the faults of a table, best first; see :func:`er3a.diagnosis.diagnose.diagnose`.
 
     Parameters
     ----------
@@ -190,19 +190,20 @@ References = ReferenceSet | Sequence[Reference] | Sequence[ReferenceSet] | Seque
 
 
 def evidence(robot: Robot, references: References | None = None, tolerance: Tolerance | None = None) -> Evidence:
-    """What independent documents settle of a robot's table; see :func:`er3a.identifiability.evidence.evidence_of`.
+    """Which entries of a robot's table independent documents settle; see
+    :func:`er3a.identifiability.evidence.evidence_of`.
 
     Parameters
     ----------
-    references : a reference set, its name or folder, several of them, or single references; those that the robot's file
-        names by default
-    tolerance : how far the tool may be off for what counts as settled
+    references : a reference set, its name or folder, several of these, or single references; default: those that the
+        robot's file names
+    tolerance : an entry is settled if what is unknown of it moves the tool by less than this
 
     Raises
     ------
     InputError
-        if there is no such reference set, it can't be read, or the robot's own sets don't know a document that its
-        values name
+        if there is no such reference set, it can't be read, or a document that the robot's values name is not declared
+        in its sets
     """
     wanted = robot.references if references is None else references
     parts: list[Any] = [wanted] if isinstance(wanted, ReferenceSet | str | Path) else list(wanted)
@@ -225,12 +226,12 @@ def calibrate(
     Parameters
     ----------
     measurements : a CSV file of measured positions (:func:`er3a.load_measurements`), its rows, or a reference set,
-        whose key poses are used then
-    fixed : ``"base"``, ``"tool"``, ``"ratios"``: to be taken as the robot's file has them; by default all are free
+        whose positions are used
+    fixed : ``"base"``, ``"tool"``, ``"ratios"``: not to be estimated but kept as in the robot's file; default: none
 
     Returns
     -------
-    found : its robot says in its sources where the corrections come from
+    found : corrections and corrected robot, whose sources name the measurements
 
     Raises
     ------
@@ -253,16 +254,17 @@ def calibrate(
 
 
 def load_calibration(path: str | Path, robot: Robot) -> CorrectedModel:
-    """The model with all terms that ``er3a calibrate ROBOT MEASUREMENTS.csv --json`` has written, to predict with.
+    """The whole calibrated model, with all error terms, from the output of ``er3a calibrate ROBOT MEASUREMENTS.csv
+    --json``.
 
     Parameters
     ----------
-    robot : the one that the calibration started from
+    robot : the robot from which the calibration started
 
     Raises
     ------
     InputError
-        if the file holds no calibration, or that of another table
+        if the file holds no calibration, or a calibration of another table
     """
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -289,7 +291,7 @@ def load_calibration(path: str | Path, robot: Robot) -> CorrectedModel:
         if not (np.isfinite(amounts).all() and np.isfinite(errors.coefficients).all()):
             raise InputError(path, None, "a correction or coefficient is not finite", WRITE_CALIBRATION)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise InputError(path, None, "is no file with a calibration", WRITE_CALIBRATION) from None
+        raise InputError(path, None, "is not a calibration file", WRITE_CALIBRATION) from None
     return CorrectedModel(corrected(robot, kept, amounts), errors)
 
 
@@ -309,16 +311,16 @@ def _both(first: Robot, second: Robot, name: str) -> tuple[Reals, Reals]:
 
 
 def load_table(path: str | Path) -> pd.DataFrame:
-    """A table of results, such as ``results/er3_600/validation/checks.parquet``, as it was written.
+    """Read a table of results, such as ``results/er3_600/validation/checks.parquet``.
 
     Returns
     -------
-    frame : ``frame.attrs["columns"]`` has unit and meaning of each column by its name
+    frame : ``frame.attrs["columns"]`` has unit and meaning of each column, by the column's name
 
     Raises
     ------
     InputError
-        naming the file that is missing, or none of er3a's tables
+        if the file is missing or is not a table of er3a
     """
     remedy = "Give a .parquet file of a study's results"
     try:
@@ -326,10 +328,10 @@ def load_table(path: str | Path) -> pd.DataFrame:
     except OSError as error:
         raise InputError(path, None, error.strerror or str(error), remedy) from None
     except ValueError:
-        raise InputError(path, None, "this is no Parquet file", remedy) from None
+        raise InputError(path, None, "this is not a Parquet file", remedy) from None
     columns = {part.name: {k.decode(): v.decode() for k, v in (part.metadata or {}).items()} for part in stored.schema}
     if not all({"unit", "meaning"} <= set(described) for described in columns.values()):
-        raise InputError(path, None, "its columns don't say unit and meaning", remedy)
+        raise InputError(path, None, "its columns have no unit and meaning", remedy)
     frame = stored.to_pandas()
     frame.attrs["columns"] = columns
     return frame

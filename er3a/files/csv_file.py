@@ -21,7 +21,7 @@ MOST_BYTES = 50_000_000
 
 
 class Written(float):
-    """A number that knows with how many decimals it was written."""
+    """A number, with the number of decimals with which it was written."""
 
     decimals: int
 
@@ -41,8 +41,8 @@ class CsvColumn:
     type : float, Written, int or str
     optional : an empty field is read as None
     choices : the allowed values, for columns of words
-    always : whether the table must have the column; without it all its values are None
-    digits : of a number in front of the point, at most; quantity : what such numbers are
+    always : whether the table must have the column; if not, all its values are None
+    digits : greatest number of digits before the decimal point; quantity : what such numbers are
     """
 
     type: type = float
@@ -103,7 +103,7 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
 def _check_header(path: Path, header: list[str], columns: Mapping[str, CsvColumn]) -> None:
     for name in filter(None, header):
         if header.count(name) > 1:
-            raise InputError(path, f"column {name}", "stands in the header twice", "Keep one of the two")
+            raise InputError(path, f"column {name}", "is in the header twice", "Keep one of the two")
     missing = [name for name, column in columns.items() if column.always and name not in header]
     for name in header:
         if name in columns:

@@ -1,12 +1,12 @@
 """D-H tables as CSV: one row per joint, mm and degrees.
 
-Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, where they are known, ``offset_deg`` and
-``direction`` (theta = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. Where a joint slides,
-``type`` says "prismatic" (else "revolute") and ``theta_deg`` where its theta stands; its limits and speed stand in
-``lower_mm``, ``upper_mm``, ``speed_mm_s``. Calibrated tables may have ``beta_deg``, Hayati's turn about y, and
-``calibrated`` (true), which admits lengths below 2 mm. A cell that does not apply to a joint is left empty. A column
-``convention`` (standard or modified, the same in all rows) counts more than what the reader is asked for. Any of these
-columns may be in metres, inches or radians instead, and named so: ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``.
+Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, if known, ``offset_deg`` and ``direction`` (theta
+= direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. For a prismatic joint, ``type`` is "prismatic"
+(otherwise "revolute"), ``theta_deg`` is its constant theta, and its limits and speed are in ``lower_mm``, ``upper_mm``,
+``speed_mm_s``. Calibrated tables may have ``beta_deg``, Hayati's rotation about y, and ``calibrated`` (true), which
+allows lengths below 2 mm. Leave a cell empty if it does not apply to a joint. A column ``convention`` (standard or
+modified, the same in all rows) takes precedence over the reader's argument. Columns may be in metres, inches or radians
+instead, and are then named ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``.
 """
 
 from __future__ import annotations
@@ -64,25 +64,24 @@ def read_dh_table(
     angle_unit: AngleUnit | None = None,
     as_printed: bool = False,
 ) -> tuple[RobotFile, tuple[str, ...]]:
-    """A robot file made of a D-H table.
+    """Make a robot file from a D-H table.
 
     Parameters
     ----------
     name : of the robot
-    length_unit, angle_unit : what the numbers of a table are in whose columns are named mm and deg all the same; if
-        None they are mm and deg unless they can't be
-    as_printed : read values that look like another unit's all the same, with a note on what they were taken for; else
-        they are refused
+    length_unit, angle_unit : units of a table whose column names say mm and deg although its values are in other units;
+        None means mm and deg, unless the values can't be
+    as_printed : convert values that look like another unit, with a note; otherwise they are refused
 
     Returns
     -------
-    content : grade "claim" where the table gives a value, "inferred" where one was assumed
-    notes : what was assumed, in words
+    content : values of the table have grade "claim", assumed values "inferred"
+    notes : the assumptions, as sentences
 
     Raises
     ------
     InputError
-        naming row and column, or the field of the robot file that the values can't make
+        naming row and column, or the field of the robot file that the values do not fit
     """
     path = Path(path)
     names = {_usual_unit(column)[0]: column for column in read_header(path)}

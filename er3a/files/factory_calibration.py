@@ -1,10 +1,10 @@
-"""A Universal Robots arm's own calibration: ``calibration.conf`` of its controller, or the YAML that
-``ur_calibration``'s ``extract_calibration`` (ROS) makes of it.
+"""The factory calibration of a Universal Robots arm: ``calibration.conf`` of its controller, or the YAML that
+``extract_calibration`` of the ROS package ``ur_calibration`` makes from it.
 
-The controller's file holds what is to be added to the nominal table: ``delta_theta``, ``delta_a``, ``delta_d``,
-``delta_alpha``, in rad and m. Axes 2, 3 and 4 are parallel but for an error, so that d of these rows may be hundreds of
-metres that cancel. The YAML holds the same arm as the poses of its links (``kinematics``, ``shoulder``: x, y, z, roll,
-pitch, yaw; ...), m and rad, each joint turning about its link's z. Either becomes rows with Hayati's beta.
+The controller's file holds corrections to the nominal table: ``delta_theta``, ``delta_a``, ``delta_d``,
+``delta_alpha``, in rad and m. Axes 2, 3 and 4 are nearly parallel, so the d of these rows may be hundreds of metres and
+cancel. The YAML holds the same arm as the poses of its links (``kinematics``, ``shoulder``: x, y, z, roll, pitch, yaw;
+...), m and rad, each joint turning about its link's z. Either becomes rows with Hayati's beta.
 """
 
 from __future__ import annotations
@@ -66,13 +66,13 @@ class KinematicsFile(StrictModel):
 
 
 def load_factory_calibration(path: str | Path, nominal: Robot) -> Robot:
-    """An arm as its factory has measured it.
+    """Load a robot with its factory calibration.
 
     Parameters
     ----------
     path : ends in .conf, or in .yaml
-    nominal : the arm's table as published, whose limits and speeds count on; bodies and masses are left out, because
-        their frames are those of its rows
+    nominal : the published table of the arm; its limits and speeds are kept. Shapes and masses are dropped, because
+        they refer to the frames of its rows
 
     Raises
     ------
@@ -81,7 +81,7 @@ def load_factory_calibration(path: str | Path, nominal: Robot) -> Robot:
     """
     path = Path(path)
     if nominal.rows != len(LINKS) or nominal.joints != len(LINKS) or nominal.sliding.any():
-        raise InputError(path, None, f"{nominal.name} is no arm of six joints that turn", "Name its nominal table")
+        raise InputError(path, None, f"{nominal.name} is not an arm with six revolute joints", "Name its nominal table")
     bare = nominal.replace(envelopes=(), hulls=(), pair_rules=(), masses=Masses(), references=())
     found = _of_links(path, bare) if path.suffix in (".yaml", ".yml") else _of_deltas(path, bare)
     longest = float(max(np.abs(found.a).max(), np.abs(found.d).max()))
@@ -95,7 +95,7 @@ def load_factory_calibration(path: str | Path, nominal: Robot) -> Robot:
 def _of_deltas(path: Path, nominal: Robot) -> Robot:
     text = read_text(path, MOST_BYTES)
     if nominal.convention != "standard":
-        raise InputError(path, None, f"{nominal.name}'s table is no standard one", "Name the table as published")
+        raise InputError(path, None, f"{nominal.name}'s table is not standard D-H", "Name the table as published")
     columns = {column: getattr(nominal, column) + _list(path, text, key) for column, key in DELTAS.items()}
     return with_near_rows(nominal.replace(**columns))
 

@@ -1,13 +1,13 @@
-"""Calibration sets of cameras: a YAML file that says what was recorded, and CSV tables beside it with the samples.
+"""Calibration sets of cameras: a YAML file that describes the recording, and CSV tables beside it with the samples.
 
-A table of samples has one row for each: where the flange was, as joint angles (``q1_deg`` ..) or as a pose
-(``flange_x_mm`` ..), and where the camera saw the board (``target_x_mm`` ..) or in which ``image``. Orientations are
-``_qw`` .. ``_qz``, ``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), ``_r11`` ..
-``_r33`` by rows, or ``_rx_rad`` .. ``_rz_rad`` (a rotation vector). ``name`` is optional.
+A table has one row for each sample: the flange, as joint angles (``q1_deg`` ..) or as a pose (``flange_x_mm`` ..), and
+the board as the camera saw it (``target_x_mm`` ..), or an ``image``. Orientations are ``_qw`` .. ``_qz``,
+``_roll_deg``, ``_pitch_deg``, ``_yaw_deg`` (R = Rz(yaw) Ry(pitch) Rx(roll)), ``_r11`` .. ``_r33`` by rows, or
+``_rx_rad`` .. ``_rz_rad`` (a rotation vector). ``name`` is optional.
 
-Poses in CSV tables: a position in mm and an orientation in one of four forms, by row and column in every error.
+Poses in CSV tables: a position in mm and an orientation in one of four forms. Errors name row and column.
 
-Rotation vectors (axis times angle, in rad) are what OpenCV's detectors and the pendants of Universal Robots give.
+Rotation vectors (axis times angle, in rad) are used by OpenCV and by the pendants of Universal Robots.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def _rotations(path: Path, rows: list[dict[str, Any]], stream: str, R: Reals) ->
             raise InputError(path, where, problem, "Correct the sample, or write more digits")
         if np.linalg.det(M) < 0:
             problem = "the matrix is left-handed (its determinant is -1)"
-            raise InputError(path, where, problem, "Turn the sign of one axis, in every sample alike")
+            raise InputError(path, where, problem, "Change the sign of one axis in every sample")
     U, _, Vt = np.linalg.svd(R)
     rotations: Reals = U @ Vt
     return rotations
@@ -142,7 +142,7 @@ Positive = Annotated[float, Field(gt=0, le=1e5)]
 
 
 class StandardDeviations(StrictModel):
-    """Of a pose: by the axes of the frame that it is given in, alike for all or for x, y and z."""
+    """Standard deviations of a pose, in the axes of its frame: one value for all axes, or values for x, y and z."""
 
     position_mm: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
     rotation_deg: Positive | Annotated[list[Positive], Field(min_length=3, max_length=3)]
@@ -184,7 +184,7 @@ class BoardEntry(StrictModel):
 
 
 class Intrinsics(StrictModel):
-    """A camera's focal lengths and principal point in pixels, and distortion k1, k2, p1, p2, k3 as OpenCV has them."""
+    """A camera's focal lengths and principal point in pixels, and distortion k1, k2, p1, p2, k3 as in OpenCV."""
 
     fx: Positive
     fy: Positive
@@ -202,7 +202,7 @@ class ImageEntry(StrictModel):
 
 
 class StreamsEntry(StrictModel):
-    """Two tables with clocks of their own (``t_s``); the offset between them is estimated within +-``widest_s``."""
+    """Two tables with separate clocks (``t_s``); the offset between the clocks is estimated within +-``widest_s``."""
 
     flange: Text
     target: Text
@@ -219,12 +219,13 @@ class SeenImages:
 
 
 class HandEyeFile(StrictModel):
-    """A calibration set. ``simulated``: no camera took it, which verdicts then say.
+    """A calibration set. ``simulated: true``: it was not recorded by a camera; verdicts say so.
 
-    ``camera_standard_deviation`` is that of T_camera_board by the camera's axes; without it, it is estimated.
-    ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points that the camera placed
-    (``seen_x_mm``; with the camera on the flange: that lie on the board) and the robot touched (``touched_x_mm``).
-    ``table_corrections``: entries of the arm's table that are estimated with the poses; samples with joint angles only.
+    ``camera_standard_deviation`` is that of T_camera_board in the camera's axes; it is estimated if not given.
+    ``board_mm``: the board's edges along its x and y, for views. ``touched``: a table of points as the camera located
+    them (``seen_x_mm``; with the camera on the flange: points on the board) and as the robot touched them
+    (``touched_x_mm``). ``table_corrections``: entries of the arm's table to estimate with the poses; needs samples with
+    joint angles.
     """
 
     kind: Literal["hand_eye"]
@@ -246,17 +247,21 @@ class HandEyeFile(StrictModel):
     @model_validator(mode="after")
     def _one_source_of_samples(self) -> Self:
         if (self.samples is None) == (self.streams is None):
-            raise ValueError("samples and streams: one of the two says where the poses are | Give one")
+            raise ValueError("samples and streams: only one of the two is allowed, and one is needed | Give one")
         if self.flange_standard_deviation and not (self.camera_standard_deviation or self.images):
             raise ValueError(
-                "flange_standard_deviation: is of no use while the camera's is estimated from the same residuals | "
+                "flange_standard_deviation: can't be used while the camera's is estimated from the same residuals |  "
                 "State camera_standard_deviation too, or remove it"
             )
         return self
 
 
 def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
-    """Read a calibration set; the arm's table turns joint angles into poses.
+    """Read a calibration set.
+
+    Parameters
+    ----------
+    arm : the robot that was used, to convert joint angles into flange poses; not needed for sets with flange poses
 
     Raises
     ------

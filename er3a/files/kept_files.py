@@ -1,7 +1,7 @@
-"""Files that are written whole or not at all, and read with one clear error.
+"""Atomic writes of files, and reading with one clear error.
 
-Where the project's own robots, references, schemas and workflow stand: beside the package in a checkout, in it
-where a wheel was installed (``tool.hatch.build.targets.wheel.force-include`` in ``pyproject.toml``).
+Location of er3a's own robots, references, schemas and workflow: beside the package in a checkout, inside it in an
+installed wheel (``tool.hatch.build.targets.wheel.force-include`` in ``pyproject.toml``).
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ ROOT = _IN_WHEEL if INSTALLED else _PACKAGE.parent
 
 
 def own_or_shipped(place: str) -> Path:
-    """The file or folder at a place such as ``data/robots/arm.yaml``: the study's own, else the project's.
+    """The file or folder at a place such as ``data/robots/arm.yaml``: the study's own, otherwise er3a's.
 
-    The study's folder is the one that er3a is called in, from which all paths of a study count.
+    The study's folder is the current folder; all paths of a study are relative to it.
     """
     own = Path(place)
     return own if own.exists() else ROOT / place
 
 
 def given_file(path: Path) -> Path:
-    """A file that a person names: their own, else the project's at a place such as ``data/paths/arm.yaml``."""
+    """A file named by the user: their own, otherwise er3a's at a place such as ``data/paths/arm.yaml``."""
     shipped = ROOT / path
     return shipped if path.parts[:1] == ("data",) and not path.exists() and shipped.is_file() else path
 
@@ -43,7 +43,7 @@ def names(folder: str, pattern: str) -> list[str]:
 
 
 def view_command(robot: str | None = None) -> str:
-    """What a person types to see the recordings, of one robot or of all."""
+    """The command that shows the recordings of one robot or of all."""
     if INSTALLED:
         return f"er3a view {robot}" if robot else "er3a view"
     return f"make view ROBOT={robot}" if robot else "make view"
@@ -54,12 +54,12 @@ _TEMPORARY = re.compile(r"\..+\.[0-9]+(\.\w+)?")  # as `write_atomically` names 
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
-    """Call ``write`` with a temporary path beside ``path``, then move the finished file, kept on disk, into place.
+    """Call ``write`` with a temporary path beside ``path``, then flush the finished file to disk and rename it.
 
     Raises
     ------
     WriteError
-        naming ``path``, if the system refuses; the file that was there before stays
+        naming ``path``, if the system refuses; an existing file stays unchanged
     """
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:

@@ -1,4 +1,4 @@
-"""From a mesh to a file of convex pieces: done once, so that studies need neither the mesh nor what reads it."""
+"""Makes a file of convex pieces from a mesh, once, so that studies need neither the mesh nor a mesh library."""
 
 from __future__ import annotations
 

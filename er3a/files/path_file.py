@@ -1,15 +1,15 @@
-"""What a path file may hold (YAML, mm, degrees and seconds): data/paths/<robot>.yaml.
+"""Path files (YAML, mm, degrees and seconds): data/paths/<robot>.yaml.
 
 Paths as CSV tables, one point per row: of the tool, or of the joints; with or without times.
 
 Columns of the tool: ``x_mm``, ``y_mm``, ``z_mm`` and those of one form of orientation
-(:data:`er3a.files.target_file.FORMS`). Columns of the joints: ``q1_deg`` .. ``qn_deg``, of those that
-slide ``q3_mm``. Either with ``t_s``, which
-starts at 0 and rises. A row that repeats the point before is a halt if the table has times, else it is left out.
+(:data:`er3a.files.target_file.FORMS`). Columns of the joints: ``q1_deg`` .. ``qn_deg``, or ``q3_mm`` for a prismatic
+joint. Both may have ``t_s``, which starts at 0 and rises. A row that repeats the point before is a stop if the table
+has times; otherwise it is left out.
 
 A joint trajectory of ROS or MoveIt (``trajectory_msgs/JointTrajectory``, or ``moveit_msgs/RobotTrajectory`` around it)
-as YAML or JSON is a timed table of joints. Of its points positions and times count; which joint is which says the
-number in its name.
+as YAML or JSON is a timed table of joints. Only positions and times of its points are used; the number in a joint's
+name is its place.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ class PathTable:
     times : (n,), s, rising from 0; None for a table without
     poses : (n, 4, 4), T_base_tool; None for a table of joints
     joints : (n, joints), rad or m; None for a table of the tool
-    sliding : of a table of joints, which of them it gives in mm; None where units don't say, as in ROS
+    sliding : for a table of joints, which of them are in mm; None if the units are not stated, as in ROS
     repeated : (n,) bool, whether a row repeats the point before
-    unread : what else a trajectory of ROS gives at its points, which is not taken
+    unread : other values at the points of a ROS trajectory, which are not used
     """
 
     file: Path
@@ -81,8 +81,8 @@ def read_path_table(path: str | Path) -> PathTable:
     Raises
     ------
     InputError
-        naming row and column: no known columns, too few points, NaN, times that do not rise, wrong units, an
-        orientation that is none
+        naming row and column: no known columns, too few points, NaN, times that do not rise, wrong units, an invalid
+        orientation
     """
     path = given_file(Path(path))
     if path.suffix in (".yaml", ".yml", ".json"):
@@ -107,7 +107,7 @@ def read_path_table(path: str | Path) -> PathTable:
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
     rows = read_csv(path, timed | {name: CsvColumn() for name in columns})
     if len(rows) < 2:
-        raise InputError(path, None, f"the path has {_points(len(rows))}", "Give two rows at least")
+        raise InputError(path, None, f"the path has {_points(len(rows))}", "Give at least two rows")
     if len(rows) > MOST_ROWS:
         raise InputError(path, None, f"{len(rows)} rows are more than {MOST_ROWS}", "Split the path")
     lines = np.array([row["row"] for row in rows])
@@ -153,7 +153,7 @@ def _ros_trajectory(path: Path) -> tuple[Reals, Reals, tuple[str, ...]]:
     if np.abs(joints).max() > MOST_RAD:
         k = int(np.abs(joints).max(axis=1).argmax())
         problem = f"{np.abs(joints[k]).max():g} rad are more than ten turns"
-        raise InputError(path, f"points[{k}].positions", problem, "Write radians, and metres where a joint slides")
+        raise InputError(path, f"points[{k}].positions", problem, "Write radians, or metres for a prismatic joint")
     return times, joints[:, order], tuple(name for name in UNREAD if any(point.get(name) for point in points))
 
 
@@ -303,9 +303,9 @@ class PoseEntry(Orientation):
 
 
 class NamedPath(StrictModel):
-    """What every path has.
+    """The keys of every path.
 
-    ``expect`` is the verdict that is to come out: any other then counts as a fault, and this one does not.
+    ``expect`` is the expected verdict: another one is a fault, and the expected one is not.
     """
 
     name: Name
@@ -316,10 +316,10 @@ class NamedPath(StrictModel):
 
 
 class Profiled(NamedPath):
-    """A path that runs from rest to rest, or from halt to halt.
+    """A path from rest to rest, or from stop to stop.
 
-    ``profile`` is the position's law of time; ``ramp_share`` is the share of the time of each ramp of a trapezoid
-    (1/3 if left out).
+    ``profile`` is the time law of the position; ``ramp_share`` is the share of the time of each ramp of a trapezoid
+    (default 1/3).
     """
 
     duration_s: Duration
@@ -339,9 +339,9 @@ class Profiled(NamedPath):
 
 
 class JointPath(NamedPath):
-    """A joint move: quintic in time, all joints together; at rest at the ends unless their rates are given.
+    """A joint move: quintic in time, all joints together; at rest at the ends unless rates are given.
 
-    It starts at ``start_deg``, or where the arm stands ``after`` an earlier path of the file.
+    It starts at ``start_deg``, or where an earlier path of the file ends (``after``).
     """
 
     kind: Literal["joint"]
@@ -381,7 +381,7 @@ class JointPath(NamedPath):
 class JointSequencePath(Profiled):
     """Joint moves through points, all joints together; each corner rounded over ``blend_deg`` on either side.
 
-    ``blend_deg`` counts in the joint that turns most; with 0 the arm stops at each corner.
+    ``blend_deg`` is measured in the joint that turns most; with 0 the arm stops at each corner.
     """
 
     kind: Literal["joint_sequence"]
@@ -396,9 +396,9 @@ class JointSequencePath(Profiled):
 
 
 class ToolStart(Profiled):
-    """Where a path of the tool starts: at joint angles, at a pose, or where the arm stands ``after`` an earlier path.
+    """The start of a tool path: joint angles, a pose, or where an earlier path ends (``after``).
 
-    ``start_branch`` (only with a start pose) fixes the branch to begin on, in the words of the inverse's solutions.
+    ``start_branch`` (only with a start pose) sets the branch at the start, by the name of an inverse solution.
     """
 
     start_deg: JointsDeg | None = None
@@ -506,7 +506,7 @@ class TablePath(NamedPath):
     """A path through the rows of a CSV table (:mod:`er3a.files.path_file`).
 
     ``duration_s`` is for tables without times. Corners are rounded over ``blend_mm`` (``blend_deg`` for joint angles)
-    on either side, less where half of a side is shorter; left out, over half of the shorter side.
+    on either side, or over half of a side if that is shorter; by default over half of the shorter side.
     """
 
     kind: Literal["table"]
@@ -563,14 +563,14 @@ class TablePath(NamedPath):
 
 
 class PlanEnds(StrictModel):
-    """Between what a motion is planned: joint angles, or poses of the tool."""
+    """The ends of a planned motion: joint angles, or poses of the tool."""
 
     from_: Annotated[JointsDeg | PoseEntry, Field(alias="from")]
     to: JointsDeg | PoseEntry
 
 
 class PlanPath(NamedPath):
-    """A motion that the planner finds: from rest to rest, clear of the scene and of the arm itself."""
+    """A planned motion from rest to rest, clear of the scene and of the arm itself."""
 
     kind: Literal["plan"]
     plan: PlanEnds
@@ -585,7 +585,7 @@ class PlanPath(NamedPath):
 
 
 class ProgramPath(NamedPath):
-    """A robot program: a path for each stretch of joint moves, and each stretch of lines and arcs."""
+    """A robot program: one path for each stretch of joint moves, and for each stretch of lines and arcs."""
 
     kind: Literal["program"]
     program: Text
@@ -608,7 +608,7 @@ class PathFile(StrictModel):
         for i, entry in enumerate(self.paths):
             after = getattr(entry, "after", None)
             if after and after not in names[:i]:
-                raise ValueError(f"paths[{i}].after: no earlier path is named '{after}' | Name one that stands above")
+                raise ValueError(f"paths[{i}].after: no earlier path is named '{after}' | Name one that is above")
         return self
 
 

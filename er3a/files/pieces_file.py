@@ -1,4 +1,4 @@
-"""Files of convex pieces, as ``er3a mesh`` writes them; studies need neither the mesh nor what reads it."""
+"""Files of convex pieces, written by ``er3a mesh``; studies need neither the mesh nor a mesh library."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ MOST_BYTES = 20_000_000
 class PiecesFile(StrictModel):
     """Convex pieces of a mesh, in mm; ``sha256`` is of the pieces, ``source_sha256`` of the mesh's file.
 
-    ``uncovered_mm`` bounds how far the mesh stands out of the pieces, which are taken larger by it; ``excess_mm`` is
-    how far the pieces stand out of the mesh, as measured.
+    ``uncovered_mm`` bounds how far the mesh sticks out of the pieces, which are enlarged by it; ``excess_mm`` is how
+    far the pieces stick out of the mesh, as measured.
     """
 
     kind: Literal["pieces"]
@@ -50,12 +50,12 @@ def load_pieces(path: str | Path) -> PiecesFile:
     Raises
     ------
     InputError
-        if it is missing, no such file, or not as it was written
+        if it is missing, not a file of pieces, or changed since it was written
     """
     path = Path(path)
     if path.suffix.lower() != ".json":
         remedy = f"Make one of the mesh: er3a mesh {path.name} --unit mm --output {path.stem}.json"
-        raise InputError(path, None, "is no file of convex pieces", remedy)
+        raise InputError(path, None, "is not a file of convex pieces", remedy)
     try:
         data = json.loads(read_text(path, MOST_BYTES))
     except (json.JSONDecodeError, RecursionError):
@@ -64,7 +64,9 @@ def load_pieces(path: str | Path) -> PiecesFile:
         raise InputError(path, None, f"the top level is a {type(data).__name__}", "Import the mesh again: er3a mesh")
     content = parse(PiecesFile, data, path)
     if checksum_of(content.pieces_mm) != content.sha256:
-        raise InputError(path, "sha256", "the pieces are not as they were written", "Import the mesh again: er3a mesh")
+        raise InputError(
+            path, "sha256", "the pieces were changed after er3a wrote them", "Import the mesh again: er3a mesh"
+        )
     return content
 
 

@@ -1,4 +1,4 @@
-"""Program files (YAML): which programs a robot's cell has, and what their tools and bases stand for."""
+"""Program files (YAML): the robot programs of a cell, and the frames of their tools and bases."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from er3a.robots.robot import Robot
 
 
 class ProgramEntry(StrictModel):
-    """A program; ``start_deg`` is where the arm stands before it, ``expect`` the verdict that is to come out."""
+    """A program; ``start_deg`` is the joint position before it, ``expect`` the expected verdict."""
 
     name: Name
     title: Text
@@ -33,8 +33,8 @@ class ProgramEntry(StrictModel):
 class ProgramsFile(StrictModel):
     """Programs and frames.
 
-    ``frames`` maps what programs call their tools and bases (``TOOL_DATA[3]``, ``tool1``) to where these are: a tool in
-    the flange's frame, a base in the robot's.
+    ``frames`` maps names of tools and bases in programs (``TOOL_DATA[3]``, ``tool1``) to frames: a tool in the flange's
+    frame, a base in the robot's.
     """
 
     kind: Literal["programs"]

@@ -68,12 +68,12 @@ class Format:
 
     Attributes
     ----------
-    columns : without source, grade, origin and what its uncertainties are, which every table has
-    digits, sliding_digits : where a line gives no uncertainty, it is half the last digit of these columns; the latter
-        of a prismatic joint
-    gather : makes a line's fields, which it may change, to those of the row
-    faults : what is wrong with a line
-    coarse : the uncertainty where a line gives none, of tables without digits
+    columns : without source, grade, origin and uncertainty, which every table has
+    digits, sliding_digits : if a line gives no uncertainty, it is half the last digit of these columns; the latter for
+        prismatic joints
+    gather : converts a line's fields to those of the row
+    faults : errors of a line
+    coarse : the default uncertainty of tables without digits
     mixed_lengths, mixed_limits : whether single lines in metres, or limits in radians, beside others are refused
     """
 
@@ -373,13 +373,13 @@ COLUMNS = {"name": _TEXT, "title": _TEXT, "publisher": _TEXT, "derived_from": Cs
 
 
 def load_documents(path: str | Path) -> Documents:
-    """Read a set's documents; ``derived_from`` holds names, apart by semicolons.
+    """Read a set's documents; ``derived_from`` holds names, separated by semicolons.
 
     Raises
     ------
     InputError
-        for a name that is none or stands twice, for one that ``derived_from`` does not know, and for documents that
-        were made from each other in a circle
+        for an invalid or repeated name, for an unknown name in ``derived_from``, and for documents that are derived
+        from each other in a circle
     """
     path = Path(path)
     found: dict[str, Document] = {}
@@ -388,7 +388,7 @@ def load_documents(path: str | Path) -> Documents:
         name, where = fields["name"], f"row {fields['row']}, column name"
         if not re.match(NAME_PATTERN, name) or name == NO_DOCUMENT:
             remedy = f"Write a short name in small letters, digits and _, other than '{NO_DOCUMENT}'"
-            raise InputError(path, where, f"'{name}' is no name of a document", remedy)
+            raise InputError(path, where, f"'{name}' is not a document's name", remedy)
         if name in found:
             raise InputError(path, where, f"the document '{name}' is given twice", "Keep one of the two")
         parents = tuple(part.strip() for part in fields["derived_from"].split(";")) if fields["derived_from"] else ()
@@ -457,8 +457,8 @@ def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> R
 
     Parameters
     ----------
-    robot : rows about joints that it does not have, a wrist centre or limits in the other unit are set aside, with a
-        warning (:class:`er3a.InputWarning`)
+    robot : rows that do not apply to it are left out with a warning (:class:`er3a.InputWarning`): joints that it does
+        not have, a wrist centre, or limits in the other unit
 
     Raises
     ------
@@ -505,7 +505,9 @@ def check_reference_file(path: str | Path) -> tuple[Row, ...]:
     path = Path(path)
     kind = path.stem
     if kind not in FORMATS:
-        raise InputError(path, None, f"'{path.name}' is no kind of reference table", f"Name it one of: {_file_names()}")
+        raise InputError(
+            path, None, f"'{path.name}' is not a kind of reference table", f"Name it one of: {_file_names()}"
+        )
     table = read_csv(path, FORMATS[kind].all_columns)
     if not table:
         raise InputError(path, None, "the table has a header but no rows", "Add a row, or remove the file")

@@ -1,4 +1,4 @@
-"""What a robot file may hold (YAML, mm and degrees), and the checks that need only the file itself."""
+"""Robot files (YAML, mm and degrees): their fields, and the checks that need only the file itself."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ IMPOSSIBLE = {
 
 def _positive(value: float) -> float:
     if value <= 0:
-        raise ValueError(f"{value:g} is no limit | Write a value above 0, or leave it out if it is unknown")
+        raise ValueError(f"{value:g} is not a limit | Write a value above 0, or leave it out if it is unknown")
     return value
 
 
@@ -106,13 +106,13 @@ class BodyFields(StrictModel):
 
 
 class LinkRow(BodyFields):
-    """The body of a link; link 0 is the base, link k moves with row k of the table."""
+    """The body of a link. Link 0 is the base; link k moves with row k of the table."""
 
     link: Annotated[int, Field(ge=0, le=MOST_JOINTS)]
 
 
 class JointOrigin(Placement):
-    """Where a URDF has a joint's frame, in the frame of the link before."""
+    """A joint's frame in a URDF, relative to the frame of the previous link."""
 
     joint: JointNumber
 
@@ -126,7 +126,7 @@ class Inertia(Sourced):
     """Bodies of the links, in one of three kinds of frames.
 
     ``joint``: on the axis of the link's joint and moving with it, as for the envelopes. ``dh``: the frame of the
-    table's row of that number. ``urdf``: the link frame of a URDF whose joint origins stand in ``origins``.
+    table's row of that number. ``urdf``: the link frame of a URDF; its joint origins are in ``origins``.
     """
 
     frame: Literal["joint", "dh", "urdf"]
@@ -139,7 +139,7 @@ class Inertia(Sourced):
         if len(set(numbers)) != len(numbers):
             raise ValueError("links: a link is named twice | Write one row for each link")
         if (self.frame == "urdf") != bool(self.origins):
-            raise ValueError("origins: they belong to frame urdf, and it to them | Give both or neither")
+            raise ValueError("origins: frame urdf needs them, and only frame urdf | Give both or neither")
         joints = [origin.joint for origin in self.origins]
         if self.frame == "urdf" and max(numbers) > len(joints):
             raise ValueError(f"links: there is no origin for link {max(numbers)} | Give that of each link's joint")
@@ -149,7 +149,7 @@ class Inertia(Sourced):
 
 
 class DriveRow(StrictModel):
-    """A joint's drive, at the joint: leave out what is unknown. Newton in place of newton metres for a prismatic joint.
+    """A joint's drive, with values at the joint. Leave out what is unknown. For a prismatic joint use N instead of N m.
 
     ``armature_kg_m2`` is the rotor's inertia times the gear ratio squared.
     """
@@ -169,13 +169,13 @@ class DriveRow(StrictModel):
 
 
 class DriveGroup(Sourced):
-    """One row for each joint of which something is known."""
+    """Drives, one row for each joint with known values."""
 
     rows: Annotated[list[DriveRow], Field(min_length=1, max_length=MOST_JOINTS)]
 
 
 class WristRow(StrictModel):
-    """What the manufacturer allows about a joint's axis."""
+    """The allowed moment and inertia about a joint's axis."""
 
     joint: JointNumber
     moment_n_m: Positive | None = None
@@ -211,7 +211,9 @@ def check_masses(
             raise ValueError(f"{group}.rows: the joints come as {joints} | Write one row for each joint of the arm")
     for i, about in enumerate(wrist.rows if wrist else []):
         if slides[about.joint - 1]:
-            raise ValueError(f"wrist_load.rows[{i}]: joint {about.joint} slides | Give moments about joints that turn")
+            raise ValueError(
+                f"wrist_load.rows[{i}]: joint {about.joint} is prismatic | Give moments about revolute joints only"
+            )
     for i, row in enumerate(drives.rows if drives else []):
         wrong = [key for key in (TURNING if slides[row.joint - 1] else SLIDING) if getattr(row, key) is not None]
         if wrong:
@@ -300,7 +302,7 @@ JointType = Literal["revolute", "prismatic"]
 def _inside_the_study(value: str) -> str:
     path = PurePosixPath(value)
     if path.is_absolute() or ".." in path.parts:
-        raise ValueError(f"'{value}' lies outside the study | Give a path below the folder that the study is run in")
+        raise ValueError(f"'{value}' is outside the study | Give a path below the folder in which the study is run")
     return value
 
 
@@ -309,16 +311,16 @@ PiecesPath = Annotated[Text, AfterValidator(_inside_the_study)]
 
 
 class OfOneJoint(StrictModel):
-    """A row; ``origin``: its document, if that is another one than the group's."""
+    """A row of a group; ``origin``: its document, if it differs from the group's."""
 
     joint: JointNumber
     origin: Name | None = None
 
 
 class DhRow(OfOneJoint):
-    """One row; ``beta_deg`` is Hayati's turn about y, in calibrated tables of arms with parallel axes.
+    """One row of the table; ``beta_deg`` is Hayati's rotation about y, in calibrated tables of arms with parallel axes.
 
-    A prismatic row has its fixed ``theta_deg``, and in ``d_mm`` the length that it has where the joint is at 0.
+    A prismatic row has its constant ``theta_deg``; its ``d_mm`` is the length with the joint at 0.
     """
 
     type: JointType = "revolute"
@@ -331,21 +333,21 @@ class DhRow(OfOneJoint):
     @model_validator(mode="after")
     def _theta_fixed(self):
         if self.type == "revolute" and self.theta_deg is not None:
-            raise ValueError("theta_deg: theta of a revolute joint is its variable | Write it as offset_deg in zero")
+            raise ValueError("theta_deg: theta of a revolute joint is variable | Write it as offset_deg in zero")
         return self
 
 
 def _sign(value: int) -> int:
     # A Literal[1, -1] would let `true` pass, which equals 1.
     if value not in (1, -1):
-        raise ValueError(f"{value} is no direction | Write 1 or -1")
+        raise ValueError(f"{value} is not a direction | Write 1 or -1")
     return value
 
 
 class ZeroRow(OfOneJoint):
-    """``direction_origin``: the direction's document, if that is another one than the offset's.
+    """Direction and offset of a joint; ``direction_origin``: the direction's document, if it differs from the offset's.
 
-    Prismatic joints have no ``offset_deg``: where they are at 0 is the row's ``d_mm``.
+    Prismatic joints have no ``offset_deg``: their zero is the row's ``d_mm``.
     """
 
     direction: Annotated[int, AfterValidator(_sign), Field(json_schema_extra={"enum": [1, -1]})]
@@ -354,7 +356,7 @@ class ZeroRow(OfOneJoint):
 
 
 class Ends(StrictModel):
-    """Limits in degrees, or in mm of what slides."""
+    """Limits in degrees, or in mm for prismatic joints."""
 
     lower_deg: float | None = None
     upper_deg: float | None = None
@@ -363,13 +365,13 @@ class Ends(StrictModel):
 
 
 class JointLimitRow(Ends, OfOneJoint):
-    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a revolute joint without end."""
+    """Limits in degrees, in mm for prismatic joints, or ``continuous: true`` for a revolute joint without limits."""
 
     continuous: bool = False
 
 
 class JointSpeedRow(OfOneJoint):
-    """Neither number: the speed is unknown."""
+    """The maximum speed of a joint; without a number it is unknown."""
 
     speed_deg_s: Annotated[float, Field(gt=0, le=FASTEST_DEG_S)] | None = None
     speed_mm_s: Annotated[float, Field(gt=0, le=FASTEST_MM_S)] | None = None
@@ -389,20 +391,20 @@ class WeightedJoints(StrictModel):
 
 
 class CombinedLimitRow(Ends, WeightedJoints):
-    """Limits of a sum of joints, such as J2 + J3; in mm if all of them are prismatic."""
+    """Limits on a sum of joints, such as J2 + J3; in mm if all of them are prismatic."""
 
 
 class CouplingRow(WeightedJoints):
-    """What a row of the table moves by: the sum of these joints, in place of its own joint."""
+    """The joints that move a row of the table: their sum replaces the row's own joint."""
 
     row: JointNumber
 
 
 class DhTable(Sourced):
-    """Denavit-Hartenberg rows. ``calibrated: true`` admits lengths below 2 mm, which otherwise count as metres.
+    """Denavit-Hartenberg rows. ``calibrated: true`` allows lengths below 2 mm, which are otherwise treated as metres.
 
-    It admits d of many metres that cancel, too, as factories' calibrations have them between nearly parallel axes: such
-    rows are taken to Hayati's (``beta_deg``) when the file is read.
+    It also allows d of many metres that cancel, as in factory calibrations of nearly parallel axes. Such rows are
+    converted to Hayati's form (``beta_deg``) when the file is read.
     """
 
     convention: Literal["standard", "modified"]
@@ -433,7 +435,8 @@ class Speeds(Sourced):
 
 
 class Coupling(Sourced):
-    """Rows of the table that are moved by sums of joints; those not listed by the joint of their number."""
+    """Rows of the table that are moved by sums of joints. A row that is not listed is moved by the joint of its
+    number."""
 
     rows: Annotated[list[CouplingRow], Field(min_length=1, max_length=MOST_JOINTS)]
 
@@ -468,7 +471,7 @@ class LinkPieces(Placement):
 
 
 class LinkHull(StrictModel):
-    """The hull of points, taken larger by ``margin_mm``, in the frame that turns with joint ``link``."""
+    """The convex hull of points, enlarged by ``margin_mm``, in the frame that moves with joint ``link``."""
 
     link: Annotated[int, Field(ge=0)]
     margin_mm: Annotated[float, Field(ge=0, le=LONGEST_LENGTH_MM)] = 0.0
@@ -476,7 +479,7 @@ class LinkHull(StrictModel):
 
 
 class Envelopes(Sourced):
-    """Capsules around links and tool, and convex pieces of their shapes, for clearance."""
+    """Shapes of links and tool, for collision checks: capsules and convex pieces."""
 
     capsules: Annotated[list[Capsule], Field(max_length=1000)] = []
     meshes: Annotated[list[LinkPieces], Field(max_length=100)] = []
@@ -490,8 +493,8 @@ class Envelopes(Sourced):
 
 
 class LinkVisual(StrictModel):
-    """Triangles that pictures show link ``link`` by, in the frame of its joint. They say too whether it reaches out of
-    its shapes.
+    """The visual mesh of link ``link``, in the frame of its joint. It also shows whether the link reaches out of its
+    shapes.
 
     In base64, as ``er3a import-urdf`` writes them: ``points_mm`` x, y, z of each corner as 32-bit floats, ``faces``
     three corners (from 0) of each triangle as 16-bit integers, both little-endian.
@@ -528,14 +531,14 @@ def link_visual(visual: Visual) -> dict[str, int | str]:
 
 
 class DecidedPair(StrictModel):
-    """Two bodies by name (``base``, ``link_1`` ..., in a scene also solids and what is carried), and why."""
+    """Two bodies by name (``base``, ``link_1`` ..., in a scene also solids and carried objects), with the reason."""
 
     pair: Annotated[list[Name], Field(min_length=2, max_length=2)]
     reason: Text
 
 
 class CollisionPairs(StrictModel):
-    """Pairs that are not looked at (``allow``), or looked at as a whole (``watch``), whatever the matrix finds."""
+    """Pairs that are not checked (``allow``), or checked as a whole (``watch``), regardless of the collision matrix."""
 
     allow: list[DecidedPair] = []
     watch: list[DecidedPair] = []
@@ -593,7 +596,9 @@ class RobotFile(StrictModel):
         if not 1 <= rows <= MOST_JOINTS:
             raise ValueError(f"dh.rows: a table of {rows} joints | er3a reads serial arms of 1 to {MOST_JOINTS} joints")
         if self.coupling and not 1 <= joints <= rows:
-            raise ValueError(f"limits.rows: {joints} joints for {rows} rows of the table | A joint moves a row or more")
+            raise ValueError(
+                f"limits.rows: {joints} joints for {rows} rows of the table | Every joint moves at least one row"
+            )
         counts = {"dh": rows, "zero": rows, "limits": joints if self.coupling else rows, "speeds": joints}
         for group, count in counts.items():
             if (table := getattr(self, group)) is not None:
@@ -640,7 +645,7 @@ class RobotFile(StrictModel):
             if row.row > len(self.dh.rows):
                 raise ValueError(f"coupling.rows[{i}].row: the table has no row {row.row} | Name one of dh.rows")
         if missing := [row for row in range(joints + 1, len(self.dh.rows) + 1) if row not in coupled]:
-            raise ValueError(f"coupling.rows: nothing moves row {missing[0]} of the table | Add a line for it")
+            raise ValueError(f"coupling.rows: no joint moves row {missing[0]} of the table | Add a line for it")
         matrix = coupling_matrix(self.coupling, len(self.dh.rows), joints)
         if np.linalg.matrix_rank(matrix) < joints:
             problem = "coupling.rows: joints move nothing by themselves"

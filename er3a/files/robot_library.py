@@ -1,4 +1,4 @@
-"""Robot files to :class:`Robot`."""
+"""Makes a :class:`Robot` from a robot file."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
     """Load a robot by the name of a file in data/robots, or by a path that ends in .yaml or .csv.
 
     A name is looked up below the working folder first, then among the robots that come with er3a. A .csv holds a D-H
-    table (:mod:`er3a.files.dh_table`), mm and degrees, in the convention given unless it says its own; what had to be
-    assumed is warned of (``er3a.InputWarning``).
+    table (:mod:`er3a.files.dh_table`), mm and degrees, in the given convention unless the file names one. Assumptions
+    give a warning (``er3a.InputWarning``).
 
     Raises
     ------
@@ -54,7 +54,7 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
 
 
 def read_table(path: Path, convention: Convention = "standard") -> robot_file.RobotFile:
-    """What a D-H table says, as a robot's file; warns of what had to be assumed."""
+    """A robot file made from a D-H table; assumptions give a warning."""
     content, notes = read_dh_table(path, robot_name(path), convention)
     if notes:
         warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=4)
@@ -128,8 +128,8 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
 
 
 def with_near_rows(robot: Robot) -> Robot:
-    """The same arm with rows between nearly parallel axes measured within it: by Hayati's beta in place of a common
-    normal far away. A standard table; base, flange and tool stay."""
+    """The same arm as a standard table in which rows between nearly parallel axes use Hayati's beta instead of a common
+    normal far away. Base, flange and tool stay."""
     before = to_standard(robot)
     found, last = without_far_normals(mechanism_of(robot)), robot.rows - 1
     found = with_senses(found, np.ones(robot.rows), np.where(found.a * before.a[:last] < 0, -1.0, 1.0))
@@ -221,7 +221,8 @@ Newton = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_len
 
 
 class MeshMass(robot_file.Placement):
-    """A body from a closed mesh: ``unit_mm`` is what a unit of the file is in mm; placed in the flange's frame."""
+    """A body from a closed mesh, placed in the flange's frame; ``unit_mm`` is the length of one unit of the file in
+    mm."""
 
     file: Annotated[str, Field(min_length=1, max_length=1000)]
     density_kg_m3: Annotated[float, Field(ge=1, le=25_000)]
@@ -229,9 +230,9 @@ class MeshMass(robot_file.Placement):
 
 
 class LoadFields(StrictModel):
-    """What hangs on the flange, in its frame, with source and grade: ``body`` or ``mesh``.
+    """A load on the flange, in the flange's frame, with source and grade: ``body`` or ``mesh``.
 
-    ``force_n`` and ``moment_n_m``: what the surroundings do to the tool at the tool point, in the tool's axes.
+    ``force_n`` and ``moment_n_m``: wrench of the surroundings on the tool, at the tool point, in the tool's axes.
     """
 
     source: Annotated[str, Field(min_length=1, max_length=2000)]
@@ -287,7 +288,9 @@ def mesh_body(given: MeshMass) -> MassBody:
             given.file, None, f"can't be read as a mesh ({error})", "Give an STL, OBJ or PLY file"
         ) from None
     if not (mesh.is_watertight and mesh.is_winding_consistent and abs(mesh.volume) > 0):
-        raise InputError(given.file, None, "is no closed mesh, so it has no volume", "Close its holes, or state a body")
+        raise InputError(
+            given.file, None, "is not a closed mesh, so it has no volume", "Close its holes, or state a body"
+        )
     if mesh.volume < 0:
         mesh.invert()
     mesh.apply_scale(given.unit_mm / 1000)

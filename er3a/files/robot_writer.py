@@ -1,4 +1,4 @@
-"""A :class:`Robot` as a robot file (YAML, mm and degrees)."""
+"""Writes a :class:`Robot` as a robot file (YAML, mm and degrees)."""
 
 from __future__ import annotations
 

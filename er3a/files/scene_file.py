@@ -1,4 +1,4 @@
-"""Scene files: obstacles of simple shape around an arm, in the frame that the robot's base is placed in."""
+"""Scene files: obstacles of simple shape around an arm, in the world frame in which the robot's base is placed."""
 
 from __future__ import annotations
 
@@ -126,13 +126,13 @@ class Carried(StrictModel):
 
 
 class AllowedPairs(CollisionPairs):
-    """Pairs that are not looked at; a scene can't ask for more than the matrix watches."""
+    """Pairs that are not checked. A scene can't add checks to those of the collision matrix."""
 
     watch: Annotated[list[DecidedPair], Field(max_length=0)] = []
 
 
 class SceneFile(StrictModel):
-    """data/scenes/NAME.yaml. ``collision``: contacts of the arm, of what is carried and of solids that are allowed."""
+    """data/scenes/NAME.yaml. ``collision``: allowed contacts between the arm, carried objects and solids."""
 
     kind: Literal["scene"]
     title: Text

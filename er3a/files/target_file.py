@@ -1,4 +1,4 @@
-"""Target files (YAML or CSV): the poses that the inverse-kinematics study asks for.
+"""Target files (YAML or CSV): the poses that the inverse stage solves.
 
 Targets as a CSV table: one row each, position in mm and the orientation in one of the four named forms.
 
@@ -136,11 +136,11 @@ class Orientation(StrictModel):
             worst = np.abs(R @ R.T - np.eye(3)).max()
         if not worst <= ORTHONORMAL_TOLERANCE:
             raise ValueError(
-                f"the matrix is no rotation: R R^T differs from 1 by {worst:.3g} | "
+                f"the matrix is not a rotation: R R^T differs from 1 by {worst:.3g} | "
                 f"Its rows must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; write more digits"
             )
         if np.linalg.det(R) < 0:
-            raise ValueError("the matrix mirrors (its determinant is -1) | Turn the sign of one axis")
+            raise ValueError("the matrix is a reflection (its determinant is -1) | Change the sign of one axis")
         return rows
 
     def forms(self) -> list[str]:
@@ -171,14 +171,14 @@ class Orientation(StrictModel):
 
 
 class TargetEntry(Orientation):
-    """One pose of the tool, in the frame that the robot's base is placed in.
+    """One pose of the tool, in the world frame in which the robot's base is placed.
 
     Either ``xyz_mm`` and one orientation form, or ``q_deg`` (the pose at these joint angles).
 
     Attributes
     ----------
-    q_deg, q_ref_deg : joint values in degrees, of prismatic joints in mm; the latter those that the arm comes from
-    expect : what is to come out; anything else then counts as a fault, and this does not
+    q_deg, q_ref_deg : joint values in degrees, of prismatic joints in mm; ``q_ref_deg`` are the joint values before
+    expect : the expected outcome; another outcome is a fault, and the expected one is not
     """
 
     name: Name
@@ -240,7 +240,8 @@ class TargetFile(StrictModel):
 
 
 def load_targets(path: str | Path, robot: Robot) -> tuple[Target, ...]:
-    """The targets of a YAML or CSV file, in its order; the robot places those that are given by joint angles.
+    """The targets of a YAML or CSV file, in file order; targets given by joint angles are placed with the robot's
+    forward kinematics.
 
     Raises
     ------
@@ -254,7 +255,7 @@ def load_targets(path: str | Path, robot: Robot) -> tuple[Target, ...]:
 
 
 def read_targets(path: str | Path) -> tuple[TargetEntry, ...]:
-    """A target file as it is written.
+    """The contents of a target file, checked.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Types and checks of file fields that catch metres or radians where mm and degrees are asked for.
+"""Types and checks of file fields that detect metres or radians in place of mm and degrees.
 
-A check raises ``ValueError`` with a text ``problem | remedy``, which the YAML reader turns into an InputError. Degrees
-below a full turn's radians are legal everywhere: several that look like radians are worth a warning, no more.
+A check raises ``ValueError`` with a text ``problem | remedy``, which the YAML reader turns into an InputError. Angles
+below 2 pi are always legal as degrees; several that look like radians give only a warning.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a robot with a camera is to grasp: the calibration, the camera's view, detected objects and their grasps."""
+"""Vision files: the calibration, the camera's view, detected objects and their grasps."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Tolerances = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 
 
 class ViewEntry(StrictModel):
-    """What the camera sees: whole angles of view, and distances along its axis of sight."""
+    """The camera's view: full angles of view, and distances along its optical axis."""
 
     horizontal_deg: Angle
     vertical_deg: Angle
@@ -50,7 +50,8 @@ class ViewEntry(StrictModel):
 
 
 class ArmAccuracyEntry(StrictModel):
-    """What is stated of the arm: RP of ISO 9283, and standard deviations of its table's lengths and angles."""
+    """Stated errors of the arm: pose repeatability RP (ISO 9283), and standard deviations of its table's lengths and
+    angles."""
 
     source: Text
     repeatability_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
@@ -73,7 +74,7 @@ class ArmAccuracyEntry(StrictModel):
 
 
 class GripperEntry(StrictModel):
-    """Errors that the gripper forgives, along and about the tool's x, y and z."""
+    """Errors that the gripper tolerates, along and about the tool's x, y and z."""
 
     source: Text
     tolerance_mm: Tolerances
@@ -93,9 +94,9 @@ class GraspEntry(Placement):
 
 
 class ObjectEntry(StrictModel):
-    """A detected object: its pose in the camera's frame, the detector's standard deviations by the camera's axes.
+    """A detected object: its pose in the camera's frame, and the detector's standard deviations in the camera's axes.
 
-    ``symmetry_turns``: turns about its z axis in which it looks alike; 0 for any.
+    ``symmetry_turns``: number of turns about its z axis in which it looks the same; 0 for any angle.
     """
 
     name: Name
@@ -139,7 +140,8 @@ class ObjectEntry(StrictModel):
 class VisionFile(StrictModel):
     """data/vision/NAME.yaml. ``calibration``: a calibration set beside it.
 
-    ``home_deg``: joints that the arm comes from; ``picture_deg``: where a camera on the flange saw the objects.
+    ``home_deg``: joint position before the grasp; ``picture_deg``: joint position in which a camera on the flange saw
+    the objects.
     """
 
     kind: Literal["vision"]

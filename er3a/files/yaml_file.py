@@ -121,7 +121,7 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
         where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else None
         raise InputError(path, where, error.problem or "not valid YAML", "Correct this line") from None
     except RecursionError:
-        raise InputError(path, None, "nested too deeply", "Input tables are flat; mend the brackets") from None
+        raise InputError(path, None, "nested too deeply", "Input tables are flat; correct the brackets") from None
     except (yaml.YAMLError, ValueError) as error:
         reason = " ".join(str(error).split())[:200]
         raise InputError(path, None, f"not valid YAML ({reason})", "Correct the file") from None
@@ -132,9 +132,9 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 
 
 def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> Model:
-    """Validate ``data`` as ``model``; the first fault found is raised as :class:`InputError`.
+    """Validate ``data`` as ``model``; the first fault is raised as :class:`InputError`.
 
-    What only looks like a slip is an :class:`InputWarning` that names the file.
+    Values that look like a mistake give an :class:`InputWarning` that names the file.
     """
     try:
         with warnings.catch_warnings(record=True) as seen:

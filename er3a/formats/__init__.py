@@ -1,3 +1,3 @@
-"""Robots in other people's formats: ``urdf`` in and out and tables from joint axes; ``urdf_tree`` reads what a URDF
-holds (chain, masses, shapes), ``mesh_file`` its meshes.
+"""Foreign robot formats: ``urdf`` (import, export, and tables from joint axes), ``urdf_tree`` (chain, masses and shapes
+of a URDF) and ``mesh_file`` (its meshes).
 """

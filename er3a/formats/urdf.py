@@ -5,14 +5,14 @@ matrix as R = Rz(yaw) Ry(pitch) Rx(roll)).
 
 The standard D-H table follows from the joint axes, as a URDF or a measurement gives them. Frames are placed by the
 common normals of neighbouring axes (Denavit and Hartenberg 1955; Siciliano et al., *Robotics: Modelling, Planning and
-Control*, section 2.8.2). What the rule leaves open is chosen so that usual arms get their usual table: z axes along the
-base frame's positive axes or along a positive d, parallel axes with equal sense and d = 0, x axes turned as little as
-possible from one joint to the next.
+Control*, section 2.8.2). Free choices are made so that common arms get their usual table: z axes along the base frame's
+positive axes or along a positive d, parallel axes with equal sense and d = 0, x axes turned as little as possible from
+one joint to the next.
 
-Axes that are parallel but for an error have a common normal kilometres away. Between them d is 0 and the table takes
-Hayati's turn beta about y [1]_, which needs no normal.
+Nearly parallel axes have a common normal kilometres away. Between them d is 0, and the table uses Hayati's rotation
+beta about y [1]_, which needs no normal.
 
-An arm's SRDF is what MoveIt reads beside its URDF to plan with it: its group, and pairs of links not to check [2]_.
+MoveIt reads an SRDF beside the URDF: the arm's planning group, and the pairs of links not to check [2]_.
 
 References
 ----------
@@ -236,27 +236,27 @@ def import_urdf(
     snap: bool = False,
     split: bool | urdf_tree.Split = False,
 ) -> UrdfImport:
-    """Derive D-H table, directions, offsets, limits and speeds from a URDF's axes; take over shapes, looks and masses.
+    """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
 
-    The flange is the tip: the link that ``tip`` names, else the end of the fixed joints behind the last joint, or that
-    joint's own link if they branch. Loads, cameras and tools are mounted there.
-    What a file gets wrong of limits, speeds, shapes and inertias is corrected or left out, with a note that names joint
-    or link and the value.
-    Joints in the chain that follow others (mimic) become a coupling; grippers, and linkages that only follow, are left
-    out with a note.
+    The flange is the tip: the link that ``tip`` names, otherwise the end of the fixed joints after the last joint, or
+    that joint's own link if they branch. Loads, cameras and tools are mounted there.
+
+    Wrong limits, speeds, shapes and inertias are corrected or left out, with a note that names joint or link and the
+    value. Joints in the chain that follow others (mimic) become a coupling. Grippers, and linkages that only follow,
+    are left out with a note.
 
     Parameters
     ----------
     path : a URDF, or expanded xacro
-    base, tip : links at which the arm begins and ends; None where the file leaves no choice
-    snap : take angles within 1e-4 rad of a multiple of 90 deg for that multiple; each such change is noted
+    base, tip : links at which the arm begins and ends; None if the file has only one arm
+    snap : round angles within 1e-4 rad of a multiple of 90 deg to that multiple, with a note for each
     split : split meshes that fill less than nine tenths of their hulls into at most 8 convex pieces, which takes
-        seconds for each; a function gets each mesh's file before that. Else their hulls are taken
+        seconds each; if a function, it is called with the file of each mesh before. Otherwise convex hulls are used
 
     Raises
     ------
     InputError
-        if the file is no URDF, has several arms (candidates are named), or none of 1 to 10 joints
+        if the file is not a URDF, has several arms (candidates are named), or no arm of 1 to 10 joints
     """
     path = Path(path)
     found = urdf_tree.read_chain(path, base, tip, snap)
@@ -627,19 +627,19 @@ def _followers_beyond(moving: Sequence[urdf_tree.UrdfJoint], coupling: Reals, sh
 def export_urdf(robot: Robot, meshes: str | Path | None = None) -> str:
     """The arm as URDF text: joints with limits, speeds, peak torques and friction, links with masses and shapes.
 
-    Behind the last joint's link stand those named ``flange`` and ``tool``, whose frames are the robot's. Unknown speeds
-    and peak torques are written as 0, as URDFs usually do. A URDF has no place for rotors, gear ratios, torques that a
-    drive gives on and on, limits of sums of joints and what the wrist may carry.
+    After the last joint's link come links named ``flange`` and ``tool`` with the robot's frames. Unknown speeds and
+    peak torques are written as 0, as URDFs usually do. A URDF has no place for rotors, gear ratios, rated torques,
+    limits on sums of joints and the wrist's load limits.
 
     Parameters
     ----------
-    meshes : folder for the convex pieces of the links and for how they look, one OBJ file each, which the text names by
-        the folder's name as if it were beside the URDF; None leaves them out
+    meshes : folder for the convex pieces and visual meshes of the links, one OBJ file each; the URDF refers to them by
+        the folder's name, as if the folder were beside it. None leaves them out
 
     Raises
     ------
     Er3aError
-        for an arm with a row that is moved by a sum of joints, which URDF can't say
+        for an arm with a row that is moved by a sum of joints, which URDF can't express
     """
     links, rows = constant_links(robot.without_tool()), robot.rows
     moved_by = _moved_by(robot)

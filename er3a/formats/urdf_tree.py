@@ -1,18 +1,18 @@
-"""The serial chain in a URDF's tree, from a base link to a tip link, and what stands beside it: masses, drives, shapes.
+"""The serial chain in a URDF's tree, from a base link to a tip link, with masses, drives and shapes.
 
 Reference: the ROS URDF specification (joint origin, axis, limit, mimic; an inertia is about the centre of mass, in the
 axes of the inertial's origin).
 
 URDFs that are written as xacro are expanded by xacrodoc (the extra ``xacro``); ROS is not needed.
 
-Masses and drives are ``<inertial>`` of links, ``<dynamics>`` and efforts of joints. Links that are fixed to one another
-count as one. An effort of 0 means that it is unknown, as most files have it.
+Masses and drives are ``<inertial>`` of links, ``<dynamics>`` and efforts of joints. Links connected by fixed joints
+count as one. An effort of 0 means unknown, as in most files.
 
 Collision geometry becomes capsules and convex hulls: boxes become hulls, cylinders prisms around them, spheres capsules
-without length; a cylinder of a link with a sphere of its radius about each end is the capsule that they make. A mesh is
-taken as its hull, which holds it, or split into convex pieces if that is asked for. The way back writes a mesh for each
-hull, and for a capsule its cylinder and two spheres. By how much a hull is to be taken larger stands beside its mesh as
-``<collision margin="...">`` (m), which other readers pass over.
+without length; a cylinder with a sphere of its radius at each end becomes a capsule. A mesh becomes its convex hull or,
+on request, several convex pieces. The export writes a mesh for each hull, and a cylinder and two spheres for a capsule.
+The amount by which a hull has to be enlarged is written as ``<collision margin="...">`` (m), which other readers
+ignore.
 """
 
 from __future__ import annotations
@@ -831,7 +831,7 @@ EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xa
 def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
     """The file itself if it is a URDF; of xacro the expanded URDF, for as long as the block lasts.
 
-    Packages that the file names are looked for in the four folders above it and beside it, then where ROS has them.
+    Packages that the file names are searched for in the four folders above it and beside it, then where ROS has them.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Rigid transforms, vectors and directions. The lowest room that knows space."""
+"""Rigid transforms, vectors and directions."""

@@ -1,18 +1,17 @@
-"""Tables that differ by discrete changes and that evidence allows as well.
+"""Other tables, different by discrete changes, that the evidence allows as well.
 
-Only what others don't compose counts: a combination that contains another that is allowed adds nothing to it, and so
-does one whose tool moves as that of several allowed ones together.
+Only minimal changes count: a combination that contains another allowed one adds nothing, nor does one whose tool moves
+as several allowed ones together move it.
 
 Discrete changes of a table: directions reversed, half turns, signs, the other convention.
 
-None of them is near the table, so none can be found by linearisation: they and their combinations are tried.
+They are not near the table, so linearisation can't find them: they and their combinations are tried.
 
-A table that requirements leave open, looked for far from one that misses them: joints reversed, all else free.
+A table that meets the requirements, searched far from one that does not: joints reversed, all else free.
 
-No continuous change reverses a joint, and a wrong sign leads the search for the rest astray. So the patterns of
-directions are gone through, those with few joints reversed first, and from each the search starts again. Of what is
-found, and of what discrete changes make of it that requirements leave open as well, the table nearest to the given one
-is taken.
+No continuous change reverses a joint, and a wrong sign misleads the search for the rest. So the search starts again
+from each pattern of directions, those with few reversed joints first. The tables that are found, and their discrete
+alternatives that also meet the requirements, are compared; the one nearest to the given table is taken.
 """
 
 from __future__ import annotations

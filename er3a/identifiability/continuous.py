@@ -1,18 +1,18 @@
-"""What a set of references leaves open for each entry that can take any value.
+"""The interval that a set of references allows for each continuous entry.
 
-Tables far from a given one that requirements leave open as well.
+Tables far from a given one that also meet the requirements.
 
-At a table with right angles the requirements often have no slope along what they leave open: the search for an extent
-by small steps ends there though the set goes on, or goes on elsewhere. So the search starts again at places spread
-evenly about the table, near and far. What is found is written as near the table as rows allow: turning the x axis of a
-frame round, or the z axis with its joint reversed, changes rows but no robot.
+At a table with right angles the requirements often have no slope along the free directions, so a search by small steps
+ends early although the set continues, there or elsewhere. So the search is repeated from points spread evenly about the
+table, near and far. A result is written in the equivalent rows nearest to the table: reversing the x axis of a frame,
+or the z axis with its joint, changes rows but not the robot.
 
-Tables that speak against what would count as settled: looked for from very many places at once.
+Counterexamples to entries that would count as settled, searched from many starts at once.
 
-Starts are spread near and far about an open table, some with joints reversed and angles turned round; then each entry
-is held some way off, both ways, from the open table and from what was found. From each start damped Gauss-Newton steps
-go toward what is asked for, all of them in one batch, so that hundreds cost what a few would one by one. Extremes over
-the joint limits are left aside meanwhile: what meets the rest is put to them afterwards.
+Starts are spread near and far about a table that meets the requirements, some with joints reversed and angles negated.
+Then each entry is held at an offset, in both directions, from that table and from what was found. From each start
+damped Gauss-Newton steps go towards the requirements, all in one batch, so that hundreds cost as much as a few one by
+one. Extremes over the joint limits are ignored meanwhile and checked afterwards.
 """
 
 from __future__ import annotations
@@ -459,7 +459,7 @@ class Extents:
         return [self.seen.index(k) for k in self.speaking]
 
     def _challenge(self) -> bool:
-        """Look once for tables that speak against what was found; whether there are any."""
+        """Look once for tables that contradict what was found; whether there are any."""
         if self._challenged or self.start is None or not self.met:
             return False
         self._challenged = True
@@ -538,7 +538,7 @@ class Extents:
 
     def _reached(self, factors: Reals) -> tuple[float, bool]:
         """How far a combination was found, in its scale, and whether that is its end: the end of the start's own
-        surroundings, with nothing beyond it from other starts, or all that is looked for."""
+        surroundings, with nothing beyond it from other starts, or all that is searched for."""
         toward = factors[self.seen]
         best = max(self.elsewhere, key=lambda each: float(toward @ each.point.amounts), default=None)
         own = float(toward @ best.point.amounts) if best else -np.inf

@@ -1,4 +1,4 @@
-"""The entries of a table, and the document that each rests on."""
+"""The entries of a table, each with the document that it comes from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What evidence of a table consists of."""
+"""The result types: evidence of a table, entry by entry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Evidence, entry by entry: what independent documents settle of a table, what they leave open, what they exclude."""
+"""Evidence, entry by entry: values that independent documents settle, allow or exclude."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
-"""The tables that requirements leave open: a point of that set, and how far it extends along an entry.
+"""The set of tables that meet the requirements: a point of it, and its extent along an entry.
 
 Extents are found by sequential linear programming: each step maximises over the requirements linearised at the last
 table, within a trust region that grows while steps succeed; a step that leaves the set is brought back by Gauss-Newton
 steps on what it exceeds. Angles to a direction (cones) are bounded by eight tangents and one that follows the point.
 Standard deviations bound the likelihood: chi squared may exceed its least by 3.84, the 95 % profile interval of one
 number [1]_; that ball is bounded by tangents, one of them across the direction that is maximised, so that the extent is
-exact where nothing else bounds it and on the safe side elsewhere. Combinations that move no tool are held. An extreme
-over the joint limits that is attained in several places at once has kinks, at which such steps can end too early; so
-each extent is looked for a second time with the entries held that make them. An extent is one that tables attain; what
-lies beyond was not found.
+exact if nothing else bounds it, and on the safe side otherwise. Combinations that do not move the tool are held. An
+extreme over the joint limits that is attained in several places at once has kinks, at which such steps can end too
+early; so each extent is computed a second time with the entries that cause them held. Tables attain the extent; nothing
+beyond it was found.
 
 References
 ----------
@@ -80,7 +80,7 @@ class Reached:
 
 
 def largest_length(table: Tables) -> float:
-    """How far in mm a length is looked for from the table's: all its lengths together, a metre at least."""
+    """How far in mm a length is searched for from the table's: all its lengths together, a metre at least."""
     return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()) * 1000.0, LEAST_MM)
 
 
@@ -119,7 +119,7 @@ class Region:
 
     def start(self, amounts: Reals, few_first: bool = True) -> OpenTable:
         """A table that is left open near one. What meets everything stays as it is; else one that differs in one entry,
-        or two or three, is looked for, then any, by damped Gauss-Newton steps."""
+        or two or three, is searched for, then any, by damped Gauss-Newton steps."""
         off = self.off(amounts, afresh=True)
         if self.excess(off) > MET and few_first:
             amounts, off = self._few_changed(amounts, off)

@@ -1,7 +1,7 @@
-"""The cheapest measurement that would settle an entry: a look before a rule, a rule before a tracker.
+"""The cheapest measurement that would settle an entry: by eye before a ruler, a ruler before a tracker.
 
-A direction is settled by jogging the joint and looking; where to look is chosen so that the answer does not hang on
-what else is open. A length or an angle is measured by itself, as finely as its tolerance asks for.
+A direction is settled by jogging the joint and looking; the pose is chosen so that the answer does not depend on other
+open entries. A length or an angle is measured directly, as finely as its tolerance requires.
 """
 
 from __future__ import annotations

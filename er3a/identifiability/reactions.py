@@ -1,4 +1,4 @@
-"""Which references react to which entries, and which of them are independent of which."""
+"""Which references depend on which entries, and which of them are independent of an entry's document."""
 
 from __future__ import annotations
 

@@ -1,20 +1,20 @@
-"""What references ask of a table's geometry, as smooth numbers that an optimiser can follow.
+"""The requirements of references on a table's geometry, as smooth functions for an optimiser.
 
-A reference with a half-width asks for ``|off| <= half-width``; one with a standard deviation is a term of a likelihood.
-Of references that contradict each other, either may be right, so they ask for no more than the hull of what they leave
-open. Extremes over the joint limits are followed along with where they are attained: their derivative with respect to
+A reference with a half-width requires ``|off| <= half-width``; one with a standard deviation is a term of a likelihood.
+Of references that contradict each other, either may be right, so they require only the hull of the values they allow.
+Extremes over the joint limits are tracked with the pose at which they are attained: their derivative with respect to
 the table is that at the maximiser (envelope theorem).
 
 In this order:
 
-- :class:`Components`: how far many tables are off what references state, as each quantity says it
+- :class:`Components`: how far many tables are from the references' values, as each quantity measures it
   (:meth:`~er3a.references.quantities.Quantity.off`), those of one kind at once;
 - :func:`climber`: kernels that climb to the largest or smallest value of a measure of one arm, from where it was
   attained before, by Newton's method with Levenberg's damping; bounds that are in the way are held, derivatives are
   central differences;
 - :func:`peak`: the largest value of any smooth function over a box of joint angles: from the best of given points
   Newton's method, its Hessian made definite by the absolute values of its eigenvalues. Nothing is random;
-- :class:`Asked`: what is asked of a table, and by how much tables miss it.
+- :class:`Asked`: the requirements on a table, and by how much tables miss them.
 """
 
 from __future__ import annotations
@@ -651,7 +651,7 @@ class Asked:
         return len(self.order)
 
     def off(self, table: Tables, afresh: bool = False) -> Reals:
-        """Components (m,) of a table (a batch of one); ``afresh``: extremes are looked for all over the joint
+        """Components (m,) of a table (a batch of one); ``afresh``: extremes are searched for all over the joint
         ranges."""
         extremes = []
         for each, followed in self.extreme:

@@ -1,5 +1,5 @@
-"""Two statements about a table that are never mixed: that it is not the robot which other documents describe, and that
-it does not agree with its own text.
+"""Two separate statements about a table: it does not describe the robot of other documents; it contradicts its own
+text.
 """
 
 from __future__ import annotations

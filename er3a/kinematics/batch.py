@@ -37,27 +37,30 @@ def inverse_batch(
     threads: int = 1,
     redundancy: Reals | None = None,
 ) -> Solutions:
-    """All solutions for many poses of the tool, in as many slots as the class of the arm's geometry has.
+    """All joint solutions for many poses of the tool, in the slots of the arm's class.
 
-    At a singularity of a wrist-partitioned arm both branches that meet keep their slots: a free joint has its value of
-    ``q_ref`` in one and half a turn more in the other. Next to two singularities, where the pose does not determine
-    joints 4 and 6, a ``q_ref`` that solves it to 1e-12 and keeps the limits is in the slot of its branch. Of other arms
-    a self-motion has the member nearest to ``q_ref`` in a slot, and chains for which no class knows all solutions have
-    what iteration finds; next to two singularities ``q_ref`` may be missing. The numbers do not depend on
-    the number of threads, nor on a pose's place in the batch.
+    Arms with a spherical wrist: at a singularity both branches that meet keep their slots. A free joint has its value
+    of ``q_ref`` in one slot and half a turn more in the other. Next to two singularities, where the pose does not
+    determine joints 4 and 6, a ``q_ref`` that solves the pose to 1e-12 and keeps the limits is in the slot of its
+    branch.
+
+    Other arms: for a self-motion, a slot holds the member nearest to ``q_ref``. Chains without a class have the
+    solutions that iteration finds. Next to two singularities ``q_ref`` may be missing.
+
+    The numbers do not depend on the number of threads, nor on a pose's place in the batch.
 
     Parameters
     ----------
     T : (N, 4, 4), T_base_tool, m
-    q_ref : (n,) or (N, n), rad or m, what turns and free joints are chosen by; None means zeros
-    turns : also return in how many turns each joint can stand
-    threads : how many to use
+    q_ref : (n,) or (N, n), rad or m, reference for the choice of whole turns and free joints; None means zeros
+    turns : also return the number of whole turns that each joint can have within its limits
+    threads : number of threads
     redundancy : (k,) or (N, k), for arms with more than six joints, as :func:`er3a.kinematics.inverse.inverse` takes it
 
     Raises
     ------
     ShapeError, PoseError, Er3aError
-        naming the first pose that is no rigid transform, the wrong shape, or the argument that can't be used
+        naming the first pose that is not a rigid transform, the wrong shape, or the argument that can't be used
     """
     T = np.ascontiguousarray(as_floats(T, "T"))
     if T.ndim != 3 or T.shape[1:] != (4, 4):

@@ -38,7 +38,7 @@ class BlockConstants(NamedTuple):
     ``to_frame_1`` and ``origin`` place frame 1, ``*_in_tool`` are vectors in the tool frame, ``point_2`` is the point
     on axis 2 in the plane across it, ``sideways`` the wrist centre's constant component along axis 2. ``turn_2``,
     ``turn_3``, ``turn_4``, ``turn_5`` are what the geometric angles have too much. ``lean`` is the angle between axis 4
-    and the plane across axis 2; ``edges`` tells whether the wrist's tilt ends before 0 and before pi.
+    and the plane across axis 2; ``edges`` says whether the wrist's tilt ends before 0 and before pi.
     """
 
     to_frame_1: tuple[Vector, Vector, Vector]

@@ -1,9 +1,9 @@
 """All joint solutions of any arm, by the class of its geometry, from blocks of poses to self-motions.
 
-The chain's solver (:mod:`er3a.kinematics.classes.chain_solvers`) speaks of rotations and shifts of the table's rows;
-here direction, offset and coupling are put on and off. Poses at which branches meet, a joint is free, or the solver
-leaves a doubt are looked at one by one: rows that can move with the tool at rest are members of a self-motion, which
-is traced and stands with its member nearest to the reference; starts from everywhere look for what is left.
+The chain's solver (:mod:`er3a.kinematics.classes.chain_solvers`) works with rotations and shifts of the table's rows;
+this module converts them by direction, offset and coupling. Poses at which branches meet, a joint is free, or the
+solver is in doubt are treated one by one. Rows that can move without moving the tool are members of a self-motion,
+which is traced and listed with its member nearest to the reference. Random starts search for missing solutions.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def all_motions(robot: Robot, T: Reals, q_ref: Reals, values: Reals) -> Settled:
 
 @dataclass(frozen=True, eq=False)
 class LazySelfMotions(Sequence[SelfMotionCurve]):
-    """What :func:`all_motions` gives, traced when it is first looked at."""
+    """What :func:`all_motions` gives, traced when it is first read."""
 
     robot: Robot
     T: Reals
@@ -276,7 +276,7 @@ class ClassSlots:
     Attributes
     ----------
     q : (N, S, n), by the turns nearest to the reference; inside : (N, S), whether within the limits
-    certainty : (N,); settled : what was looked at one by one, by the pose's number
+    certainty : (N,); settled : what was examined one by one, by the pose's number
     """
 
     q: Reals

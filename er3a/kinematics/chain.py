@@ -2,10 +2,10 @@
 
 Both D-H conventions are the product ``links[0] J(x_1) links[1] ... J(x_m) links[m]`` with constant ``links``, J a
 rotation about z by x (a revolute joint) or a shift along z by x (a prismatic one; its fixed theta is in the links):
-standard rows put ``Tz(d) Tx(a) Rx(alpha)`` behind their joint [1]_, modified rows put ``Rx(alpha) Tx(a)`` before it and
-``Tz(d)`` behind [2]_ (Rx and Tx commute). A calibrated table may add ``Ry(beta)`` behind ``Rx(alpha)``, for axes that
-are parallel but for an error [3]_. Joint axes are the z axes of the frames before each joint. Solvers by class take
-such links alone, of a robot or of rows that they make up.
+standard rows put ``Tz(d) Tx(a) Rx(alpha)`` after their joint [1]_, modified rows put ``Rx(alpha) Tx(a)`` before it and
+``Tz(d)`` after it [2]_ (Rx and Tx commute). A calibrated table may add ``Ry(beta)`` after ``Rx(alpha)``, for nearly
+parallel axes [3]_. Joint axes are the z axes of the frames before each joint. Solvers by class take only such links, of
+a robot or constructed.
 
 References
 ----------

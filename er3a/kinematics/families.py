@@ -1,12 +1,12 @@
-"""Continua of joint solutions: where a joint can turn with the tool at rest.
+"""Self-motions of arms with a spherical wrist: continua of joint solutions of one pose.
 
-Three kinds exist for a wrist-partitioned arm, each a line or curve of solutions in joint space:
+There are three kinds, each a line or curve of solutions in joint space:
 
 - *wrist*: axes 4 and 6 in one line; joints 4 and 6 turn against each other, a straight line;
 - *shoulder*: the wrist centre on axis 1; joint 1 turns and the wrist follows;
 - *elbow*: upper arm and forearm of equal length folded onto each other; joint 2 turns and the wrist follows.
 
-Arms that solve a pose with axes 4 and 6 in one line, so that joints 4 and 6 can turn against each other.
+Solutions with axes 4 and 6 in one line, in which joints 4 and 6 can turn against each other.
 
 The closed form alone does not show them all. Where the arm is nearly straight, rounding moves the elbow by 1e-8 rad
 without moving the wrist centre, and with it axis 4; where the wrist centre is on axis 1 (or 2), that joint is free and

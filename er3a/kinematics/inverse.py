@@ -1,4 +1,4 @@
-"""All joint solutions of one pose, with the limits' verdict and a reason for each refusal."""
+"""All joint solutions of one pose; each solution outside the limits has a reason."""
 
 from __future__ import annotations
 
@@ -48,26 +48,26 @@ def inverse(
 ) -> solutions.Solutions:
     """All joint solutions of one pose of the tool, by the class of the arm's geometry.
 
-    Where a joint is free, the member of each family within the limits that is nearest to ``q_ref`` is among the rows,
-    and for the branch that meets there (spherical wrist) the one half a turn further. Arms with more than six joints
-    have rows at the given value of their redundancy parameter; their self-motions (``families``) are traced when they
-    are first looked at, which takes some 0.3 s. Arms with fewer meet what
-    :func:`er3a.kinematics.by_class.task_mask` tells.
+    If a joint is free (a self-motion), the member within the limits that is nearest to ``q_ref`` is among the rows;
+    with a spherical wrist also the one half a turn further, for the branch that meets there. Arms with more than six
+    joints have rows at the given value of their redundancy parameter. Their self-motions (``families``) are traced when
+    they are first read, which takes about 0.3 s. Arms with fewer than six joints meet the part of the pose that
+    :func:`er3a.kinematics.by_class.task_mask` returns.
 
     Parameters
     ----------
     T : (4, 4), T_base_tool, m
-    q_ref : (6,), rad, what members of families and turns are chosen by: rows of a branch come nearest turn first. None
-        means zeros.
-    redundancy : (k,), values of what the pose leaves open (``parameters_of``): an arm angle in rad, or a joint's value;
+    q_ref : (n,), rad or m, reference for the choice of members of self-motions and of whole turns: in each branch the
+        nearest turn comes first. None means zeros.
+    redundancy : (k,), values of the redundancy parameters (``parameters_of``): an arm angle in rad, or a joint's value;
         None means those of ``q_ref``
-    self_motion_rows : of an arm with one redundancy parameter, also list of each self-motion the member nearest to
-        ``q_ref`` and the one farthest from the limits; done anyway if no row has the parameter's value
+    self_motion_rows : for an arm with one redundancy parameter, add for each self-motion the member nearest to
+        ``q_ref`` and the one farthest from the limits as rows; always done if no row has the parameter's value
 
     Raises
     ------
     ShapeError, PoseError
-        if T is no rigid transform, or q_ref not as many finite numbers as the arm has joints
+        if T is not a rigid transform, or q_ref does not have one finite number for each joint
     """
     T = check_poses(T)
     if T.shape != (4, 4):

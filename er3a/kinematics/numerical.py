@@ -1,17 +1,17 @@
-"""The numerical inverse: any arm, from a start guess, with or without limits, for parts of a pose.
+"""The numerical inverse: any arm, from a start guess, with or without limits, for a full or partial pose.
 
 Levenberg-Marquardt on the pose error in the tool frame of the target: the position in parts of a length, the rotation
 as a rotation vector [2]_. The damping falls with the squared error [3]_, so that convergence is quadratic. Joints at a
-limit that the step would leave are held there (projected Gauss-Newton). A start that stalls is given up for a random
+limit that the step would leave are held there (projected Gauss-Newton). A start that stalls is replaced by a random
 one; random numbers depend on seed, pose and start alone [4]_.
 
-``LANES`` poses are iterated side by side, so that the arithmetic becomes vector instructions; a lane that is done takes
-the next pose. What a lane computes depends on its own pose alone. Its six equations with a symmetric positive matrix
-are solved by Cholesky's factors, written out [1]_ so that one pass over the lanes does it all: ``l_ij`` are the entries
-of the lower factor, ``r_i`` the reciprocals of its diagonal.
+``LANES`` poses are iterated in parallel, so that the arithmetic becomes vector instructions; a lane that is done takes
+the next pose. The result of a lane depends on its own pose only. Its six equations with a symmetric positive matrix are
+solved by Cholesky's factors, written out [1]_ so that one pass over the lanes does it all: ``l_ij`` are the entries of
+the lower factor, ``r_i`` the reciprocals of its diagonal.
 
-Arms of any other number of joints, or with sliding or coupled ones, take the same steps without lanes. Joints that
-slide count in parts of the arm's length.
+Arms with another number of joints, or with prismatic or coupled ones, take the same steps without lanes. Values of
+prismatic joints are divided by the arm's length.
 
 References
 ----------
@@ -531,8 +531,8 @@ def solve(
     q0 : (n,) or (..., n), rad or m, where to start; None means the middle of the limits
     mask : 6 of 1 or 0: which of x, y, z and the rotations about x, y, z of the target's tool frame must be met; None
         means all. ``[1, 1, 1, 1, 1, 0]`` leaves the rotation about the tool's axis free.
-    respect_limits : keep to the joint limits inside the iteration; else angles come in (-pi, pi]
-    restarts : how many random starts to try after ``q0`` (0 to 65535)
+    respect_limits : keep the joint limits inside the iteration; otherwise angles are returned in (-pi, pi]
+    restarts : number of random starts after ``q0`` (0 to 65535)
     position_tolerance : m; rotation_tolerance : rad
     seed : of the random starts; equal seeds give equal results, whatever the number of threads
 

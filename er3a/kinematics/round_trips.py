@@ -1,7 +1,7 @@
 """Random joint angles to poses and back: does the inverse find the joints that made the pose?
 
-``batch_round_trips`` asks the solver of many poses for all solutions, ``slot_round_trips`` the closed form itself, and
-leaves out of the joint errors what is near a singularity.
+``batch_round_trips`` tests the batch inverse, ``slot_round_trips`` the closed form; its joint errors leave out poses
+near a singularity.
 """
 
 from __future__ import annotations

@@ -99,12 +99,12 @@ def characteristic_length(robot: Robot) -> float:
 def conditioning(robot: Robot, q: Reals, length: float | None = None) -> Conditioning:
     """Manipulability, condition number and smallest singular value at joint values (..., n) in rad or m.
 
-    Of an arm with fewer than six joints the singular values are those of its n columns. Columns of prismatic joints
-    are multiplied by the length too, so that they compare with those of revolute joints.
+    For an arm with fewer than six joints these are the singular values of its n columns. Columns of prismatic joints
+    are multiplied by the length, so that they are comparable with those of revolute joints.
 
     Parameters
     ----------
-    length : characteristic length, m; the linear rows of the Jacobian are divided by it. None for that of
+    length : characteristic length, m, by which the linear rows of the Jacobian are divided; None means
         :func:`characteristic_length`
     """
     length = characteristic_length(robot) if length is None else length

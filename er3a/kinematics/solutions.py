@@ -1,4 +1,4 @@
-"""What the inverse gives: joint solutions with their verdict, and why there are none where there are none.
+"""Result types of the inverse: joint solutions with their verdict, and the reason if there are none.
 
 The eight branches of a wrist-partitioned arm are slots: ``4 * shoulder + 2 * elbow + wrist``. Each part is the sign of
 one factor of the Jacobian's determinant, so that a branch can only change where the arm passes a singularity of it:
@@ -236,7 +236,7 @@ class Solutions(ByValue, Displayed):
     unsolved : ``inverse``: per shoulder side without solution, why (both sides: the pose can't be reached);
         ``solve``: per pose without solution, why
     families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest; of arms with more
-        than six joints traced when they are first looked at
+        than six joints traced when they are first read
     turn_range : (..., 6, 2) int8, smallest and largest number of whole turns that can be added to each joint within its
         limits (smallest above largest: none); None unless ``inverse_batch`` was asked for it
     position_error, rotation_error : (...,), m and rad, of the degrees of freedom that ``solve`` was asked for

@@ -1,8 +1,8 @@
 """Transforms of a table's links and of the whole arm as polynomials: sines, cosines, and the d of prismatic joints.
 
-Each entry is a sum of products, so no algebra system is needed. Joints whose axes are parallel turn as one: of
-``Rz(a) L Rz(b)`` with a link L that does not turn, the rotation is ``Rz(a + b)``, so sums of angles appear where a
-person writes them (c23 for the upper arm and forearm). A prismatic joint along their direction leaves them one.
+Each entry is a sum of products, so no algebra system is needed. Angles of parallel axes are added: for ``Rz(a) L
+Rz(b)`` with a link L that does not rotate, the rotation is ``Rz(a + b)``, so sums appear as textbooks write them (c23
+for upper arm and forearm). A prismatic joint along the same direction does not change that.
 """
 
 from __future__ import annotations

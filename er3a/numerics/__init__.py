@@ -1,1 +1,1 @@
-"""What kernels are made of: compiling, threads, vectorised functions, small linear systems, even points."""
+"""Numerical basics: compiled kernels, threads, vectorised functions, small linear systems, quasi-random points."""

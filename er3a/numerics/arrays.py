@@ -46,6 +46,6 @@ def as_floats(values: Reals, argument: str) -> Reals:
 
 
 def runs(flags: Flags) -> list[tuple[int, int]]:
-    """Index ranges (first, behind the last) of the stretches of True."""
+    """Index ranges (first, after the last) of the stretches of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

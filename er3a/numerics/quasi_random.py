@@ -1,4 +1,4 @@
-"""Joint angles spread evenly over the limits, without randomness.
+"""Quasi-random joint angles: spread evenly over the limits, the same in every run.
 
 The additive recurrence R_d: x_n = n (1/g, 1/g^2, ...) mod 1, where g is the root of g^(d+1) = g + 1 [1]_.
 

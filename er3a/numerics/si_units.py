@@ -1,7 +1,7 @@
-"""The unit of a quantity stands at the end of its name.
+"""Units by the ending of a quantity's name.
 
-Files, tables and summaries say ``clearance_mm`` and ``q_deg``; the library has the same quantities in SI, as
-``clearance`` and ``q``. This one rule leads from either to the other.
+Files, tables and summaries use names such as ``clearance_mm`` and ``q_deg``; the library has the same quantities in SI,
+as ``clearance`` and ``q``. This module converts between them.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""From a study file to results, recordings and pages: everything that is no library."""
+"""From a study file to results, recordings and pages."""

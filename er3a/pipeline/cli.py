@@ -1,6 +1,6 @@
-"""The command line: what the workflow's rules call, and what a person may call by hand.
+"""The command line, used by people and by the workflow's rules.
 
-Exit codes: 0; 1 for findings that were asked for with ``--fail-on``, and for a difference; 2 for what a person has to
+Exit codes: 0; 1 for findings at the level of ``--fail-on``, and for a difference; 2 for an error that the user can
 correct; 143 for a command that SIGTERM ended. Results go to standard output, notes and progress to standard error.
 """
 
@@ -50,7 +50,7 @@ def main() -> None:
         if "failed to map" not in str(error):
             raise
         _complain_of_memory()
-    except BrokenPipeError:  # whoever reads has read enough
+    except BrokenPipeError:  # the reader closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     except OSError as error:
@@ -59,19 +59,19 @@ def main() -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    """What SIGTERM does: all that stands in ``finally`` is done, temporary files go."""
+    """End on SIGTERM: ``finally`` blocks run, so temporary files are removed."""
     print_error("ended by SIGTERM")
     raise SystemExit(128 + number)
 
 
 def _complain_of_usage(error: Any) -> None:
-    """One line for a wrong option or argument; where a group of commands was called without any, its help."""
+    """Print one line for a wrong option or argument; the help of a group that was called without a command."""
     if type(error).__name__ == "NoArgsIsHelpError":
         error.show()
         return
     problem = re.sub(r"\bValue error, ", "", " ".join(error.format_message().split())).rstrip(".")
     command = error.ctx.command_path if error.ctx else "er3a"
-    print_error(f"{problem}{'' if problem.endswith('?') else '.'} All that it takes: {command} --help")
+    print_error(f"{problem}{'' if problem.endswith('?') else '.'} See: {command} --help")
 
 
 def _complain_of_memory() -> None:

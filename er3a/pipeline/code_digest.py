@@ -1,8 +1,7 @@
-"""A digest of just the modules that a module uses, so that an edit reruns what depends on it and nothing else.
+"""A digest of the modules that a module uses, so that an edit reruns only what depends on it.
 
-Imports are read from the source text and followed inside this package, by its name: where it is installed, other
-packages stand beside it. The packages' ``__init__`` files hold no code that computes, so only the modules that are
-named count.
+Imports are read from the source text and followed inside this package. The packages' ``__init__`` files compute
+nothing, so only the named modules count.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What results hold, as documents: a JSON Schema of each stage's summary, and a dictionary of all tables."""
+"""Documents about results: a JSON Schema of each stage's summary, and a dictionary of all tables."""
 
 from __future__ import annotations
 

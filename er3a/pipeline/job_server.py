@@ -1,13 +1,13 @@
-"""Jobs without start-up: a process with all libraries loaded forks one child for each job of a run.
+"""Jobs without start-up time: a process with all libraries loaded forks one child for each job of a run.
 
-A study is some fifty short jobs, and loading NumPy, pandas, Matplotlib, numba and the others takes longer than many of
-them do their work. While a study runs on this machine, ``er3a compute``, ``er3a report`` and the like, as Snakemake's
-rules call them, therefore only hand their words, working folder, environment and standard streams to this server, which
-forks a child that does the job in their name. Without a server (on a cluster, by hand, where forking is
-not safe) they do the job themselves; results are the same bytes.
+A study has about fifty short jobs, and importing NumPy, pandas, Matplotlib, numba and others takes longer than many of
+them need. While a study runs on this machine, ``er3a compute``, ``er3a report`` and the other commands called by
+Snakemake's rules only pass their arguments, working folder, environment and standard streams to this server, which
+forks a child to do the job. Without a server (on a cluster, by hand, or where forking is not safe) they do the job
+themselves; results have the same bytes.
 
-A child ends when the command that asked for it does, and the server when the run that started it does, however those
-end: each sees the other end of its connection closed by the system.
+A child ends with the command that requested it, and the server with the run that started it, in whatever way those end,
+because the system closes the connection.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a check of programs found, for terminals, other programs and code hosts: lines, JSON, SARIF.
+"""Results of a program check as lines, JSON or SARIF.
 
 References
 ----------

@@ -1,4 +1,5 @@
-"""Progress of long work on standard error: a bar or a line that changes on a terminal, a line now and then in a log."""
+"""Progress of long work on standard error: a bar or a changing line on a terminal, a line from time to time in a
+log."""
 
 from __future__ import annotations
 

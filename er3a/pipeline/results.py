@@ -1,4 +1,4 @@
-"""What a stage computes, as one typed model, and how it is kept: ``summary.json``, Parquet tables, checksums.
+"""The results of a stage as a typed model, and their files: ``summary.json``, Parquet tables, checksums.
 
 A stage's ``model.py`` declares a summary and its results::
 
@@ -11,8 +11,8 @@ A stage's ``model.py`` declares a summary and its results::
     class ReachResults(Results[ReachSummary]):
         points: Points  # a Table, written as points.parquet
 
-``compute`` returns the results, views take what :func:`read_results` reads. The summary's verdict is a finding with a
-status; in the file it is ``{status, code, params}``. Its sentence is made where it is shown.
+``compute`` returns the results; views use what :func:`read_results` returns. The summary's verdict is a finding with a
+status; in the file it is ``{status, code, params}``. Its sentence is made when it is shown.
 """
 
 from __future__ import annotations

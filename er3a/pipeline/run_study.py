@@ -1,9 +1,9 @@
-"""What `make run` and `er3a run` do: one run at a time, inputs checked first, then Snakemake.
+"""`make run` and `er3a run`: one run at a time, inputs checked first, then Snakemake.
 
-After `kill -9` Snakemake's own lock stays behind. The lock of the operating system that is taken here goes with its
-process, so whoever gets it knows that no run is active and may clear Snakemake's.
+After `kill -9` Snakemake's own lock remains. The lock of the operating system that is taken here ends with its process,
+so a run that gets it knows that no other run is active, and may clear Snakemake's lock.
 
-What a person sees of a run: a line for each verdict as it falls, and how long the rest will take.
+The progress display of a run: a line for each verdict, and the time left.
 
 A logger plugin of Snakemake, which writes its own log into ``.snakemake/log/`` besides.
 """
@@ -297,7 +297,7 @@ def _parsed(words: Sequence[str]) -> Namespace:
         if not end.code:
             raise
         problem = said.getvalue().strip().rpartition("error: ")[2]
-        raise RunError(f"{' '.join(problem.split())}. All that it takes: snakemake --help") from None
+        raise RunError(f"{' '.join(problem.split())}. See: snakemake --help") from None
 
 
 def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str]) -> bool:

@@ -1,4 +1,4 @@
-"""Settings of a study that several stages read; those of one stage stand in its ``entry.py``."""
+"""Settings of a study that several stages read; those of one stage are in its ``entry.py``."""
 
 from __future__ import annotations
 

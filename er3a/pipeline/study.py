@@ -1,4 +1,4 @@
-"""The study: which robots, which budgets, which targets and paths. Read from one YAML file."""
+"""The study: robots, budgets, targets and paths, read from one YAML file."""
 
 from __future__ import annotations
 

@@ -9,10 +9,10 @@ every row::
         q_deg: Reals = per_joint("joint angle")
         point_mm: Reals = vector("{}_mm", "tool point in the base frame")
 
-``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg`` (of prismatic joints ``q3_mm``, in mm), ``point_mm``
-(rows, 3) as ``x_mm, y_mm, z_mm``. Unit and meaning go into the file; the unit is the name's ending
-(:mod:`er3a.numerics.si_units`) unless a column states another, and the annotation says what kind of numbers it holds. A
-column of findings is written as JSON texts, with each finding's code and parameters.
+``q_deg`` is (rows, n) and written as ``q1_deg ... qn_deg`` (of prismatic joints ``q3_mm``, in mm), ``point_mm`` (rows,
+3) as ``x_mm, y_mm, z_mm``. Unit and meaning are stored in the file. The unit is the name's ending
+(:mod:`er3a.numerics.si_units`) unless a column states another; the annotation gives the type of the values. A column of
+findings is written as JSON texts, with each finding's code and parameters.
 """
 
 from __future__ import annotations

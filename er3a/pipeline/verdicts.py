@@ -1,4 +1,4 @@
-"""The verdicts of a finished study, for whoever reads no page: a terminal, another program, continuous integration."""
+"""The verdicts of a finished study, for the terminal, other programs and continuous integration."""
 
 from __future__ import annotations
 

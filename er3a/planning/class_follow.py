@@ -1,24 +1,23 @@
-"""Paths of the tool for arms without the eight branches of six joints, under the task that their class can meet.
+"""Tool paths for arms without the eight branches of six joints, for the part of a pose that their class can meet.
 
-An arm with fewer than six joints meets a part of the pose (:func:`er3a.kinematics.by_class.task_mask`): a SCARA leaves
-the tool's tilt, five joints the turn about the tool's axis, three the orientation. Seven joints with spherical shoulder
-and wrist meet it at the arm angle that :mod:`er3a.planning.class_follow` takes along the path. The joints' values
-are interpolated at Chebyshev points by polynomials, piece by piece; the pieces are halved until between these points,
-too, they are those that the closed form has there [1]_. What the arm then runs is that curve, and it is judged exactly,
-as moves of joints are.
+An arm with fewer than six joints meets part of the pose (:func:`er3a.kinematics.by_class.task_mask`): a SCARA not the
+tool's tilt, five joints not the rotation about the tool's axis, three not the orientation. Seven joints with spherical
+shoulder and wrist meet it at the arm angle that is chosen below. The joints' values are interpolated at Chebyshev
+points by polynomials, piece by piece; the pieces are halved until they equal the closed form between these points too
+[1]_. The arm runs that curve, which is checked exactly, like a joint move.
 
 References
 ----------
 .. [1] L. N. Trefethen, *Approximation Theory and Approximation Practice*, SIAM 2013, chapter 8.
 
-Which arm angle a seven-joint arm takes along a path of the tool: that which keeps most distance from the limits.
+The arm angle of a seven-joint arm along a tool path: the one that keeps the most distance from the limits.
 
 The arm angle is a polynomial of degree 2 in the share of the path, given by its values at the start, half way and at
-the end. Margins of all eight solutions on a grid of paths and arm angles show which of many such polynomials keeps
-most; that one is improved by smaller and smaller changes. Where none of these keeps the limits, polynomials of higher
-degree are fitted to a way through the grid: the evenest of those that keep half of the margin that any can keep.
-Nothing is proven by this choice: what the joints then do is judged exactly, as for every other motion, and a path could
-in principle be followed by a law of another form.
+the end. The margins of all eight solutions on a grid of path positions and arm angles show which of many such
+polynomials is best; it is improved by smaller and smaller changes. If none keeps the limits, polynomials of higher
+degree are fitted to a way through the grid: the smoothest of those that keep half of the greatest possible margin. The
+choice proves nothing: the joint motion is checked exactly, like every other motion, and another law might follow a path
+that this one can't.
 """
 
 from __future__ import annotations
@@ -385,7 +384,7 @@ def _first_within_limits(
     robot: Robot, path: ToolPath, candidates: Iterable[tuple[Reals, Callable[[Reals], Reals]]], *, turns_open: bool
 ) -> PiecewiseMotion:
     """The first of the motions from starts (n,), with what tells all rows (N, slots, n) at times, that keeps all
-    limits; else the first one. ``turns_open`` tells whether whole turns of the starts may be changed."""
+    limits; else the first one. ``turns_open`` says whether whole turns of the starts may be changed."""
     found: list[PiecewiseMotion] = []
     ends: list[PathEndsError] = []
     for start, rows_at in candidates:

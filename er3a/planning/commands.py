@@ -1,6 +1,6 @@
-"""What a path is asked to be, in arrays: joint moves, lines and arcs of the tool, sequences, points of a table.
+"""Descriptions of paths, as arrays: joint moves, lines and arcs of the tool, sequences, points of a table.
 
-:func:`build` makes of each a move of the joints or a path of the tool. SI units; poses are T_base_tool.
+:func:`build` turns each into a joint move or a tool path. SI units; poses are T_base_tool.
 """
 
 from __future__ import annotations

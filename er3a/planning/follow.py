@@ -1,25 +1,25 @@
-"""Joint angles along a line of the tool: the sequence of closed-form branches that is best as a whole.
+"""Joint angles along a tool path: the best sequence of closed-form branches as a whole.
 
-On the grid of :mod:`er3a.planning.follow`, dynamic programming [1]_ finds for each branch at the start the
-best way to continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time),
-least time outside the limits, of joints and of sums of joints, least joint travel, and among equals the largest
-distance from the limits. Whole turns cost no states of their own: along a continuous sequence they are fixed by the
-first angle, so each joint's turn is chosen once per stretch, by least time outside the limits, then nearest to the
-joints before. Among the branches at the start, the best whole sequence wins; given start joints admit only the branches
-that they lie on (several, if the start is singular).
+On the grid of :mod:`er3a.planning.follow`, dynamic programming [1]_ finds for each branch at the start the best way to
+continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time), least time
+outside the limits, of joints and of sums of joints, least joint travel, and among equals the largest distance from the
+limits. Whole turns need no states of their own: along a continuous sequence the first angle fixes them, so each joint's
+turn is chosen once per stretch, by least time outside the limits, then nearest to the joints before. The best whole
+sequence over all branches at the start is taken; given start joints allow only the branches that they lie on (several,
+if the start is singular).
 
-An unreachable pose interrupts the sequence; the stretch behind it is solved on its own.
+An unreachable pose interrupts the sequence; the stretch after it is solved separately.
 
-All closed-form branches along a line, on a grid that is refined until each branch can be told from the others.
+All closed-form branches along a line, on a grid that is refined until each branch can be distinguished from the others.
 
 Between two grid points a branch is followed by continuity, which is safe only if no joint of it moves far between them.
 An interval where one does (a pass near a pole of the wrist or near axis 1), or where a branch begins or ends, is halved
 until the motion is small or the interval is 1e-10 of the duration.
 
-Where a joint is free (axes 4 and 6 aligned, wrist centre on axis 1) each branch keeps the value that it had before, and
-at the path's beginning the one that it has next: the value that makes the motion continuous.
+If a joint is free (axes 4 and 6 aligned, wrist centre on axis 1), each branch keeps its value from before, or at the
+start of the path the value that comes next, so that the motion is continuous.
 
-A line as an arm follows it: joint angles at any point of the way, and their derivatives through the Jacobian.
+The followed line: joint angles at any point of the path, and their derivatives through the Jacobian.
 
 References
 ----------
@@ -410,7 +410,7 @@ EQUAL = 6  # digits of rad to which travel and margin count
 
 @dataclass(frozen=True, eq=False)
 class _Sequence:
-    """One way through a stretch: angles (n, 6) in rad, slots (n,), jumps behind points (n - 1,), and its cost."""
+    """One way through a stretch: angles (n, 6) in rad, slots (n,), jumps after points (n - 1,), and its cost."""
 
     q: Reals
     slot: Integers
@@ -425,10 +425,10 @@ def follow(
 
     Parameters
     ----------
-    t : (N,), s, rising from 0 to the line's duration: where to solve at least; the result has more times where
-        branches come near to each other
+    t : (N,), s, rising from 0 to the line's duration: the times to solve; the result has more times where branches come
+        near to each other
     q_start : (6,), rad, joints at the start, whose tool pose is the line's first
-    start_slot : closed-form branch (0..7) to begin on; None for the best
+    start_slot : closed-form branch (0..7) at the start; None for the best one
 
     Raises
     ------

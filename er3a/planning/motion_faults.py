@@ -1,12 +1,12 @@
-"""What is wrong with a motion, and when: singular poses, joint limits, reach, speeds, accelerations, jerk.
+"""The faults of a motion, with their times: singular poses, joint limits, reach, speeds, accelerations, jerk.
 
 Of any motion: the determinant's factors (:func:`er3a.kinematics.singularity.determinant_factors`) are signed distances
 from the three singular sets. A change of sign is a crossing, refined by Brent's method [1]_ on the motion; a local
-minimum of the distance is the root of its slope, found the same way. Limits are left where a function that is sampled
-changes its sign, or peaks between samples.
+minimum of the distance is the root of its slope, found the same way. A limit is left where a sampled function changes
+its sign, or peaks between samples.
 
-Of motions that are polynomials in time the checks are exact, for arms with a spherical wrist and parallel axes 2 and 3:
-the wrist factor turns with joint 5 alone and the elbow factor with joint 3 alone: both are asin(sin(q + phase)), the
+For motions that are polynomials in time the checks are exact, for arms with a spherical wrist and parallel axes 2 and
+3: the wrist factor turns with joint 5 alone and the elbow factor with joint 3 alone: both are asin(sin(q + phase)), the
 signed distance of q + phase from the nearest multiple of pi. The shoulder factor is a constant and two sines: of q2,
 and of q2 and q3 together. Where joints are coupled, q is what the rows of the table move by. Phases and coefficients
 are read off the factors themselves.
@@ -481,7 +481,8 @@ def _where_positive(t: Reals, values: Reals, function: Callable[[float], float])
 def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) -> list[tuple[float, float, float]]:
     """Stretches of positive values about a peak between grid points that are not positive themselves.
 
-    A peak is looked for where the parabola through a highest point and its neighbours rises half way to zero at least.
+    A peak is searched for where the parabola through a highest point and its neighbours rises half way to zero at
+    least.
     """
     inner = values[1:-1]
     tops = 1 + np.flatnonzero((inner <= 0) & (inner > values[:-2]) & (inner >= values[2:]))

@@ -7,7 +7,7 @@ A rotation by exactly half a turn is equally short both ways. It is then taken c
 of the two opposite axes, the one that points up (+Z of the base), if level the one towards +Y, if that is 0 too
 towards +X. A path may choose the other one by naming an axis.
 
-``jtraj``, ``ctraj`` and ``rpy`` are what users of the Robotics Toolbox know by these names [2]_. Times are in seconds.
+``jtraj``, ``ctraj`` and ``rpy`` have the names of the Robotics Toolbox [2]_. Times are in seconds.
 
 References
 ----------
@@ -230,9 +230,9 @@ def line(
     Raises
     ------
     Er3aError
-        if the duration is no number, but times, which :func:`er3a.ctraj` takes
+        if the duration is an array of times, which :func:`er3a.ctraj` takes, instead of a number
     PoseError
-        if a pose is no rigid transform, or ``half_turn_axis`` can't choose
+        if a pose is not a rigid transform, or ``half_turn_axis`` does not decide between the two axes
     """
     if np.ndim(duration):
         raise Er3aError(f"duration has shape {np.shape(duration)}; expected s, such as 5.0. Poses at times: er3a.ctraj")

@@ -1,4 +1,4 @@
-"""The names of verdicts on a path and of strategies, apart from what finds them, for settings and results."""
+"""The names of path verdicts and of strategies, for settings and results."""
 
 from __future__ import annotations
 

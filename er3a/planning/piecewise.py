@@ -1,4 +1,4 @@
-"""Motions that are polynomials in time, piece by piece: their extremes, roots and bounds, whatever they are sampled at.
+"""Motions that are polynomials in time, piece by piece: exact extremes, roots and bounds, independent of samples.
 
 Each piece is held as Chebyshev series of angle, velocity and acceleration. Where a series rises or falls is decided by
 the roots of its derivative, the eigenvalues of its colleague matrix [1]_; between two of them it is monotone, so that

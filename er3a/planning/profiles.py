@@ -1,4 +1,4 @@
-"""Time laws: where along its way a motion is at a time. Seconds in, SI derivatives out.
+"""Time laws: the position along a path as a function of time. Seconds in, SI derivatives out.
 
 References
 ----------
@@ -40,7 +40,7 @@ class Times:
 
 
 def check_times(t: Reals, start: float, end: float) -> None:
-    """:class:`er3a.Er3aError` for times (...,) in s before the start or behind the end of a motion; NaN passes."""
+    """:class:`er3a.Er3aError` for times (...,) in s before the start or after the end of a motion; NaN passes."""
     slack = BEYOND * (end - start)
     if t.size and (t.min() < start - slack or t.max() > end + slack):
         raise Er3aError(f"t runs from {t.min():g} to {t.max():g} s; the motion lasts from {start:g} to {end:g} s")

@@ -1,10 +1,10 @@
-"""Lines and arcs one after another, their corners rounded or stopped at.
+"""Sequences of lines and arcs, with rounded corners or stops between them.
 
-The whole runs on one parameter: the arc length of each segment, where a turn counts as TURN_LENGTH per radian if that
-is more. Position and orientation are both rounded at a corner; the orientation as rotation vector about the corner's
-own, in which each side is straight. A corner that is not rounded is a halt, unless the sides run on into each other.
+The whole has one parameter: the arc length of each segment, or TURN_LENGTH per radian of rotation if that is more.
+Position and orientation are both rounded at a corner; the orientation as rotation vector about the corner's own, in
+which each side is straight. At a corner that is not rounded the tool stops, unless the two sides are tangent.
 
-Curves put together from pieces of fifth degree, and the pieces that round their corners.
+Curves of pieces of fifth degree, including the pieces that round corners.
 
 A corner is rounded by the quintic that leaves the one side and joins the other with their point, velocity and
 acceleration, so that the whole has two continuous derivatives there. Between two straight sides that turn by an angle

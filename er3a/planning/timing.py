@@ -1,9 +1,9 @@
-"""How fast an arm can run along a path in joint space: time laws under speed and acceleration limits of the joints.
+"""The fastest timing of a joint-space path: time laws under speed and acceleration limits of the joints.
 
 A path is a chain of joint vectors, parametrised by the smallest time in which its steps could be done at full joint
 speed. In that parameter no joint's slope exceeds its speed limit, however fast a joint has to turn per millimetre of
 the tool near a singularity. The time law is the fastest one under the limits, by TOPP-RA [1]_ (the toppra library); a
-programme may cap it, so that the path is run as programmed and slower only where the joints demand it.
+programmed speed may cap it, so that the path runs as programmed, and slower only where the joints require it.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""What an arm does between the points at which a path of the tool is solved: bounds instead of samples.
+"""Proven bounds of an arm's motion between the solved points of a tool path.
 
 With q(s) the joints along the share s of the way, J q' = v, where v is the tool's twist per unit of s (its linear part
 divided by a characteristic length). From one solved pose the motion is continued by bounds alone: as long as the joints
@@ -13,8 +13,8 @@ turns its lever: no derivative of a column is longer). Under a coupling u = c q,
 of the rows' columns, and the norm of c goes with sqrt(n). Where the bound on q'' that is put in comes out no greater,
 the motion exists over the whole interval, on one branch and without a singular pose [1]_; Taylor's formula then bounds
 angles, speeds, accelerations and distances from singular sets on it, and the bound on q'''' how far jerks are from the
-mean of the interval. An interval that settles less than is asked is halved. What is left when intervals are short
-beyond use is *undecided*.
+mean of the interval. An interval whose bounds decide too little is halved. What is still open at the shortest intervals
+is *undecided*.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""What users of the Robotics Toolbox know by these or other names; times are in seconds, angles in radians.
+"""Functions that users of the Robotics Toolbox know; times are in seconds, angles in radians.
 
 ``pose`` (``transl(...) * rpy2tr(...)``), ``rpy`` (``tr2rpy``), ``zyz`` (``tr2eul``), ``quaternion``, ``jtraj`` and
 ``ctraj``.
@@ -33,7 +33,8 @@ def pose(
     position : (3,), m
     rpy : (3,), rad, roll, pitch, yaw: ``R = Rz(yaw) @ Ry(pitch) @ Rx(roll)``
     zyz : (3,), rad, Euler angles instead: ``R = Rz(phi) @ Ry(theta) @ Rz(psi)``
-    quaternion : (4,), w, x, y, z instead, of any length but 0. Without any of the three the axes are the base's
+    quaternion : (4,), w, x, y, z instead, of any length but 0. Without any of the three the axes are parallel to the
+        base's
 
     Returns
     -------
@@ -68,7 +69,8 @@ def rpy(T: Reals) -> Reals:
 
     Returns
     -------
-    angles : (..., 3), rad; where the pitch is +-90 deg the roll is 0, as only their sum or difference counts there
+    angles : (..., 3), rad; if the pitch is +-90 deg the roll is 0, because only the sum or difference of roll and yaw
+        matters there
 
     Raises
     ------
@@ -87,8 +89,8 @@ def zyz(T: Reals) -> Reals:
 
     Returns
     -------
-    angles : (..., 3), rad; theta from 0 to pi, and psi 0 where theta is at an end, as only their sum or difference
-        counts there
+    angles : (..., 3), rad; theta is between 0 and pi. If theta is 0 or pi, psi is 0, because only the sum or difference
+        of phi and psi matters there
 
     Raises
     ------
@@ -117,11 +119,11 @@ def quaternion(T: Reals) -> Reals:
 def jtraj(
     q_start: Reals, q_end: Reals, t: Reals, velocities: tuple[Reals, Reals] | None = None
 ) -> tuple[Reals, Reals, Reals]:
-    """Joint values on a quintic from one arm to another [1]_.
+    """Joint values on a quintic from one joint vector to another [1]_.
 
     Parameters
     ----------
-    q_start, q_end : (n,), rad or m; values that can only be degrees are warned of
+    q_start, q_end : (n,), rad or m; values that can only be degrees give a warning
     t : (N,), s, rising: the move begins at the first and ends at the last
     velocities : (n,) each, rad/s or m/s, at start and end; None for rest
 
@@ -132,7 +134,7 @@ def jtraj(
     Raises
     ------
     Er3aError, ShapeError
-        naming the argument: a number of steps is refused, as it says nothing of time
+        naming the argument; a number of steps instead of times is refused
     """
     q_start, q_end, t = as_floats(q_start, "q_start"), as_floats(q_end, "q_end"), _times(t)
     if q_start.shape != q_end.shape or q_start.ndim != 1:
@@ -144,7 +146,7 @@ def jtraj(
 
 
 def ctraj(T_start: Reals, T_end: Reals, t: Reals) -> Reals:
-    """Poses on the straight line between two, from rest to rest; the turn is about one axis.
+    """Poses on the straight line between two poses, from rest to rest, with a rotation about one axis.
 
     The time law is the Toolbox's: a trapezoid of speed with ramps of a third of the time (``lspb``) [1]_.
 

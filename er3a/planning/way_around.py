@@ -1,10 +1,10 @@
-"""A way around: a joint motion between two joint vectors that is proven to keep clear, or that none was found.
+"""Planned motions around obstacles: a joint motion between two joint vectors that is proven clear, or none.
 
-RRT-Connect [1]_ of OMPL [2]_ joins the ends by straight moves in joint space. A move is tried by conservative
-advancement: from an arm that is d clear no body can be met before the joints' turns, each times the longest lever that
-it swings, add up to d. Random short cuts follow, then corners are rounded as far as they stay clear, and the rounded
-way is timed. What is handed out is proven as it is run: on the timed curve itself, along which the smallest clearance
-is found to within a depth (:mod:`er3a.collision.along`) and exceeds that depth, so that nothing touches at any time.
+RRT-Connect [1]_ of OMPL [2]_ connects the ends by straight moves in joint space. A move is tried by conservative
+advancement: if the arm has clearance d, no body can be touched before the joints' turns, each times the longest lever
+that it swings, add up to d. Random short cuts follow, then corners are rounded as far as they stay clear, and the
+rounded way is timed. The result is proven on the timed curve itself: its smallest clearance, found to within a depth
+(:mod:`er3a.collision.along`), exceeds that depth, so that nothing touches at any time.
 
 The search ends after a number of rounds, not of seconds, and draws from its own seed alone: equal tasks, equal motions.
 

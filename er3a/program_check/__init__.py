@@ -1,1 +1,1 @@
-"""Checks what a robot program makes an arm do, before it is loaded."""
+"""Checks of robot programs, motion by motion."""

@@ -1,4 +1,4 @@
-"""Checks what a program makes an arm do, motion by motion: :func:`check_program`."""
+"""The check of a robot program, motion by motion: :func:`check_program`."""
 
 from __future__ import annotations
 
@@ -46,22 +46,22 @@ MOST_ROUNDS = 20  # times as many motions as may differ are carried out
 
 @dataclass(frozen=True, eq=False)
 class CheckOptions(ByValue):
-    """What a program is checked with.
+    """Settings of a program check.
 
     Attributes
     ----------
-    start : (n,), rad, where the arm is before; None if that is not known
+    start : (n,), rad or m, joint values before the program; None if unknown
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
-    scene : what the arm may not touch
-    near : distances below which a pose of a line counts as near-singular
-    assumed_speed : (n,), rad/s or m/s, of joints whose speed no document gives
-    acceleration_time : s, in which each joint is taken to reach its full speed
+    scene : the obstacles; None for none
+    near : thresholds below which a pose of a line is near-singular
+    assumed_speed : (n,), rad/s or m/s, for joints of unknown speed
+    acceleration_time : s, assumed time in which each joint reaches its full speed
     penetration_tolerance : m; no overlap deeper than this goes unnoticed
-    assumed_margin : m, within which of the arm's shapes a motion is a caution where no document gives them
-    measures : whether to look for collisions
-    most_motions : that differ, and a multiple of them that are carried out; of those behind them only the targets are
-        checked, which is said
-    keep_on : asked whether to go on, while the program is followed and while its motions are checked
+    assumed_margin : m; if the arm's shapes are assumed, a motion nearer to them than this is a caution
+    measures : whether to check collisions
+    most_motions : number of different motions (and a multiple of it for all executed ones) that are checked in full; of
+        later ones only the targets are checked, with a note
+    keep_on : called while the program is followed and its motions are checked; if it returns False, the check ends
     """
 
     start: Reals | None = None
@@ -199,7 +199,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     Raises
     ------
     ShapeError, PoseError
-        for a start that lacks an angle for each joint, and a frame that is no rigid transform
+        for a start without one value for each joint, and a frame that is not a rigid transform
     """
     options = options or CheckOptions()
     execution = execute(program, robot, options.start, options.frames, options.limits, options.keep_on)
@@ -481,7 +481,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
     Returns
     -------
     parts : its stretches
-    rest : the program's lines that may move the arm otherwise: on other ways, behind the last, or not understood
+    rest : the program's lines that may move the arm otherwise: on other ways, after the last, or not understood
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""The way that a motion takes, and what is wrong with it, collisions apart.
+"""The path of a motion, and its faults except collisions.
 
-How long a motion takes and how it runs, as far as a program tells: from rest to rest at even acceleration.
+The duration and time law of a motion, from the program's speeds: from rest to rest at constant acceleration.
 
 A controller's own ramps and blends decide the true times; these are estimates.
 """

@@ -1,4 +1,4 @@
-"""What a check of a program can find, beside what :mod:`er3a.planning.motion_faults` finds on a motion."""
+"""Findings of a program check, in addition to those of :mod:`er3a.planning.motion_faults`."""
 
 from __future__ import annotations
 

@@ -215,7 +215,7 @@ MOST_REASONS = 1000  # targets out of reach whose reasons are looked for
 def target_findings(
     arms: Arms, motions: Mapping[int, instructions.ArmMotion], keys: Mapping[int, Hashable]
 ) -> tuple[int, dict[int, tuple[found_in.CheckFinding, ...]]]:
-    """How many targets were looked at, and what is wrong with them, by the number of the step.
+    """How many targets were examined, and what is wrong with them, by the number of the step.
 
     Parameters
     ----------

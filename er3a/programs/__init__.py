@@ -1,1 +1,1 @@
-"""Robot programs: one model, readers and writers for the languages of controllers, and what a program does when run."""
+"""Robot programs: one model, readers and writers for controller languages, and their execution."""

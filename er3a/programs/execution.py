@@ -1,4 +1,4 @@
-"""What running a program gives: its instructions in the order of their execution, and how each way through it ends."""
+"""The result of an execution: instructions in order, and the end of each path through the program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot program makes an arm do, one instruction after another, in SI units whatever the language.
+"""The instructions of a robot program, in SI units, independent of the language.
 
 A program that is run (:mod:`er3a.programs.machine`) is a sequence of these, and writers take such a sequence.
 

@@ -1,6 +1,6 @@
 """Programs read and written in the languages that are registered here: one record for each language.
 
-:func:`read_program` tells a file's language and reads it; :func:`write_program` writes a sequence;
+:func:`read_program` detects a file's language and reads it; :func:`write_program` writes a sequence;
 :func:`er3a.programs.machine.execute` runs what was read, by the language's dialect.
 """
 
@@ -44,7 +44,7 @@ def read_program(path: str | Path) -> Program:
     Raises
     ------
     InputError
-        for a file that is none of these, or whose blocks, texts or comments have no end
+        for a file that is none of these, or with unterminated blocks, strings or comments
     """
     path = Path(path)
     owner = next((each for each in LANGUAGES.values() if each.points and each.points == path.suffix.lower()), None)
@@ -94,15 +94,14 @@ def _moves(program: Program) -> bool:
 
 
 def write_program(listing: Listing, language: LanguageName, options: WriteOptions | None = None) -> WrittenProgram:
-    """A sequence as the files of a language; tables over time are written by
-    :func:`er3a.programs.csv_program.write_csv`.
+    """Write a listing as the files of a language. For tables over time use :func:`er3a.programs.csv_program.write_csv`.
 
     Raises
     ------
     ValueError
         for a language that has no writer
     InputError
-        for an arm that the language has no joint targets for
+        for an arm for which the language has no joint targets
     """
     writer = LANGUAGES[language].writer if language in LANGUAGES else None
     if writer is None:

@@ -1,15 +1,15 @@
-"""Runs a program: follows calls, loops and branches, and notes each instruction that is carried out.
+"""Executes a program: follows calls, loops and branches, and records each executed instruction.
 
-A loop is followed until its state (place, variables that decide motions, position of the arm) repeats. Where a
-condition depends on what only the cell knows, both sides are followed; a way that comes into a state in which another
-was ends there. Further rounds of a loop to an unknown end wait, when it had many, until all else was followed. Beyond
-the limit, the side that was taken less often is followed, and each such branch is named.
+A loop is followed until its state (place, variables that decide motions, position of the arm) repeats. If a condition
+depends on what only the cell knows, both sides are followed; a path that reaches a state that another path had ends
+there. Further rounds of a loop with an unknown end are postponed until all else was followed. Beyond the limit, the
+side that was taken less often is followed, and each such branch is named.
 
 Branches whose sides move nothing and meet again.
 
-A run that can't tell the condition of such a branch passes it: what a side may have changed is unclear from there on.
-So waits for signals with a timeout, and the code that a gripper brings along, do not multiply the ways to be followed.
-Where the sides meet is the branch's immediate postdominator [1]_.
+If the condition of such a branch is unknown, it is skipped: what a side may have changed is unknown from there on. So
+waits for signals with a timeout, and a gripper's code, do not multiply the paths to follow. Where the sides meet is the
+branch's immediate postdominator [1]_.
 
 References
 ----------
@@ -301,7 +301,7 @@ def _quiet_in(
 
 
 class _Graph:
-    """What follows what in a routine; the number behind the last operation stands for its end.
+    """What follows what in a routine; the number after the last operation stands for its end.
 
     Attributes
     ----------
@@ -833,21 +833,21 @@ def execute(
     limits: RunLimits | None = None,
     keep_on: KeepOn | None = None,
 ) -> Execution:
-    """The instructions of a program in the order of their execution, on every way through it.
+    """Execute a program symbolically: its instructions in order, on every path through it.
 
     Parameters
     ----------
-    robot : the arm, for what the text gives by where the arm stands: partial and relative targets
-    start : (n,), rad, joints where the program starts
+    robot : the arm, needed for partial and relative targets
+    start : (n,), rad or m, joint values at the start of the program
     frames : T_flange_tool of tools and T_robot_base of bases (4, 4) in m, by the program's names for them
-    keep_on : asked whether to go on; where it says no, each way ends as ``stopped``
+    keep_on : called from time to time; if it returns False, each path ends as ``stopped``
 
     Raises
     ------
     InputError
-        for an arm whose number of joints the program's language, or the table, does not have
+        for an arm with another number of joints than the program's language or table supports
     ShapeError, PoseError
-        for a start that lacks an angle for each joint, and a frame that is no rigid transform
+        for a start without one value for each joint, and a frame that is not a rigid transform
     """
     if robot is not None and (reason := _not_meant(program, robot)):
         raise InputError(program.file, None, reason, "Give the arm that the program is meant for")

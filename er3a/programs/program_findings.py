@@ -1,4 +1,4 @@
-"""What is to be said about a program's text, and about what was written of one."""
+"""Findings about a program's text, and about written programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a language of robot programs is: a record that says how its texts are known, read, meant and written."""
+"""The record of a program language: how its files are recognised, read, interpreted and written."""
 
 from __future__ import annotations
 

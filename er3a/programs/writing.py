@@ -344,11 +344,11 @@ class WriteOptions(ByValue):
 
     Attributes
     ----------
-    robot : the arm; without it poses have no joints, and joints no pose
-    start : (n,), rad, where the arm is before the first motion
-    notes : findings of those who made the sequence, to be said in the head
+    robot : the arm; without it poses can't be converted to joint values, nor joint values to poses
+    start : (n,), rad or m, joint values before the first motion
+    notes : findings to be stated in the head of the program
     head : further lines of the head
-    assumed_speed : (n,), rad/s or m/s, of joints whose greatest speed the robot's table does not give
+    assumed_speed : (n,), rad/s or m/s, for joints of unknown speed
     """
 
     robot: Robot | None = None

@@ -1,5 +1,5 @@
-"""Reference data: what documents and CAD models say about an arm, as scalars that a model can be held against.
+"""Reference data: values from documents and CAD models about an arm, as scalars to compare a model with.
 
-``rows`` is the registry of kinds; a row states ``quantities`` about ``subjects``, each a ``reference``, which
-``predict`` holds models against. ``seen``: what needs no instrument; ``circle_points``: what a tracker measures.
+``rows`` is the registry of kinds. A row states ``quantities`` about ``subjects``; each is a ``reference``, whose value
+for a model ``predict`` computes. ``seen``: observations by eye; ``circle_points``: axes as a tracker measures them.
 """

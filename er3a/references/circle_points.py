@@ -1,7 +1,7 @@
 """Circle point analysis: turn one joint at a time, and find its axis from the circle that a carried point runs on.
 
-This is how a real arm's axes are measured with a tracker [1]_; here the model runs through the same procedure, so that
-what is compared with the manufacturer's axis lines is what the model does and not what its table says.
+This is how a real arm's axes are measured with a tracker [1]_; here the model goes through the same procedure, so that
+its motion, not its table, is compared with the manufacturer's axis lines.
 
 References
 ----------

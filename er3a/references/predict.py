@@ -1,4 +1,4 @@
-"""What a model says about each reference.
+"""The value of each reference as a model predicts it.
 
 Largest and smallest values over the joint limits, by optimisation.
 

@@ -1,8 +1,8 @@
-"""What a reference can be about, and what a model says there.
+"""The quantities that a reference can state, and how a model predicts them.
 
-Every quantity is one number in the unit that people read (mm, deg, deg/s). ``value`` reads it off a :class:`ModelState`
-whose arrays may carry leading batch dimensions, so that many candidate tables are evaluated at once. Two quantities are
-equal if they are about the same thing; fields that only say how it is measured don't count.
+Every quantity is one number in mm, deg or deg/s. ``value`` reads it off a :class:`ModelState` whose arrays may carry
+leading batch dimensions, so that many candidate tables are evaluated at once. Two quantities are equal if they describe
+the same thing; fields that only say how it is measured don't count.
 
 The wrist centre is the point of axis 5 nearest to axis 4: where axes 4, 5 and 6 meet on an arm with a spherical wrist,
 and still defined on a table with a fault.

@@ -1,10 +1,10 @@
 """One checkable number from one source, and sets of them.
 
-Documents that references and tables rest on, and which of them are independent of each other.
+The documents of references and tables, and which of them are independent of each other.
 
-A document that was made from another says nothing that the other does not say. Two documents are independent if neither
-was made from the other, directly or by way of others, and no third stands behind both. Documents of one publisher are
-different documents; what they have in common is stated beside them.
+A document that was made from another adds nothing to it. Two documents are independent if neither was made from the
+other, directly or indirectly, and no third is the origin of both. Documents of one publisher count as different; that
+they share the publisher is stated.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Reference:
 
     Attributes
     ----------
-    subject : what it is about, as people name it
+    subject : what it is about, as it is named in practice
     group : a key of :data:`er3a.references.rows.GROUPS`
     quantity : what it is about, as a model has it
     expected : in the quantity's unit; None where the source says that it gives no value

@@ -1,4 +1,4 @@
-"""The kinds of reference tables and what their rows state: the one registry of both, and of groups.
+"""The registry of reference kinds: the rows of each table, the quantities that they state, and their groups.
 
 All coordinates are in the manufacturer's base frame; angles are the manufacturer's joint angles. A new kind is a row
 class here, listed in ``KINDS``, its columns in :mod:`er3a.files.reference_sets`, and, for a new group or subject, its

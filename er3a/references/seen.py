@@ -1,8 +1,7 @@
-"""Coarse observations, which need no instrument: one joint is jogged a little, and where to a point or the tool goes is
-seen.
+"""Observations by eye: one joint is jogged a little, and the direction in which a point or the tool moves is noted.
 
-Left and right, forward and back are the base's: forward is +x, left +y, up +z. A tilt is the motion of the direction in
-which the tool points. A turn is clockwise for who looks forward, up, and so on.
+Directions are those of the base: forward is +x, left +y, up +z. A tilt is the motion of the direction in which the tool
+points. A turn is clockwise as seen when looking forward, up, and so on.
 """
 
 from __future__ import annotations

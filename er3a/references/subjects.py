@@ -1,4 +1,4 @@
-"""What references and checks are about, as people would name it: codes with typed parameters."""
+"""The subjects of references and checks, as codes with typed parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Masses of links and loads, drives, and what the wrist may carry: what dynamics needs of a robot, in SI units."""
+"""Masses of links and loads, drives and wrist limits: the data that dynamics needs, in SI units."""
 
 from __future__ import annotations
 
@@ -57,7 +57,8 @@ class LinkMass:
 
 @dataclass(frozen=True)
 class Load(MassBody):
-    """What hangs on the flange (centre and inertia in the flange's frame), and what the surroundings do to the tool.
+    """The load on the flange (centre and inertia in the flange's frame), and the wrench of the surroundings on the
+    tool.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
-"""The frozen robot model that everything else takes, and the same arm under the other Denavit-Hartenberg convention.
+"""The robot model, a frozen dataclass, and its conversion to the other Denavit-Hartenberg convention.
 
-The two conventions cut the same product of elementary transforms at other places, so the rows shift by one and nothing
-is approximated: a standard row's ``Tx(a) Rx(alpha)`` is the next modified row's ``Rx(alpha) Tx(a)`` (they commute).
-What has no row left goes to the ends: behind the last joint to the flange, before joint 1 to the base.
+The two conventions split the same product of elementary transforms at different places, so the rows shift by one and
+nothing is approximated: a standard row's ``Tx(a) Rx(alpha)`` is the next modified row's ``Rx(alpha) Tx(a)`` (they
+commute). The remainders go to the ends: after the last joint to the flange, before joint 1 to the base.
 
 Reference: J. J. Craig, *Introduction to Robotics*, 3rd ed., section 3.4 and its notes on the two conventions.
 """
@@ -77,7 +77,7 @@ class CombinedLimit:
 class ConvexPiece:
     """A convex piece of a link: all points within ``margin`` (m) of the hull of ``points`` (m, frame as of Envelope).
 
-    The margin is by how far the mesh that the piece is part of may stand out of its pieces.
+    The margin is by how far the mesh that the piece is part of may stick out of its pieces.
     """
 
     link: int
@@ -131,45 +131,45 @@ class PairRule:
 class Robot(ByValue, Displayed):
     """A serial arm of 1 to 10 joints. SI units; angles are in rad, arrays are read-only.
 
-    With q what the teach pendant shows, joint i moves by ``u = coupling @ q`` (``u = q`` without a coupling). If it
-    turns, its D-H angle is ``theta_i = direction_i * u_i + offset_i``; if it slides, theta is ``offset_i`` and the
-    distance along its axis ``d_i + direction_i * u_i``.
+    With q the joint values that the teach pendant shows, joint i moves by ``u = coupling @ q`` (``u = q`` without a
+    coupling). The D-H angle of a revolute joint is ``theta_i = direction_i * u_i + offset_i``. For a prismatic joint,
+    theta is ``offset_i`` and the distance along its axis ``d_i + direction_i * u_i``.
 
-    n is the number of joints in q and m that of rows in the table; they differ only where a coupling moves more rows
-    than there are joints (linkages that keep a wrist level).
+    n is the number of joints in q, and m the number of rows in the table. They differ only if a coupling moves more
+    rows than there are joints (linkages that keep a wrist level).
 
     Attributes
     ----------
-    name, title : short name (file stem) and name for people
+    name, title : short name (file stem) and display name
     convention : "standard" (row i follows joint i) or "modified" (Craig: a and alpha of row i precede joint i)
     a, d : (m,), m
     alpha, offset : (m,), rad
-    beta : (m,), rad, Hayati's turn about y behind Rx(alpha), for axes that are parallel but for an error; usually 0
+    beta : (m,), rad, Hayati's rotation about y after Rx(alpha), for nearly parallel axes; usually 0
     direction : (m,), +1 or -1
     sliding : (m,) bool, rows of prismatic joints
     coupling : (m, n), or None for the identity
-    lower, upper : (n,), rad or m, limits of q; of a continuous joint the turn that is sampled
+    lower, upper : (n,), rad or m, limits of q; for a continuous joint, the turn that is sampled
     speed : (n,), rad/s or m/s, maximum joint speed, NaN where unknown
     continuous : (n,) bool, revolute joints without limits
-    combined : limits of sums of joints, beside those of each
+    combined : limits on sums of joints, in addition to those of each joint
     base : (4, 4), T_world_base; tool : (4, 4), T_flange_tool
-    flange : (4, 4), from the table's last frame to the flange: what tools, loads and cameras are mounted on, and what
-        references and joint values without a tool speak of. The identity for tables that end at it
-    zero_pose : what the arm looks like at q = 0, in words
-    references : names of the reference sets (folders of data/manual_refs) that it is checked against
-    envelopes, hulls : capsules around the links, and convex pieces of them; both empty where the file gives none
-    visuals : how the links look, where the file says so; robots that differ in them alone are equal
-    pair_rules : which pairs of links a person decided on
-    masses : of links and what drives and wrist can do, as far as known
+    flange : (4, 4), from the table's last frame to the flange, on which tools, loads and cameras are mounted.
+        References, and joint values without a tool, refer to it. The identity if the table ends at the flange
+    zero_pose : description of the arm at q = 0
+    references : names of the reference sets (folders of data/manual_refs) for its validation
+    envelopes, hulls : capsules around the links, and convex pieces; both empty if the file gives none
+    visuals : visual meshes of the links, if given; not used in comparisons of robots
+    pair_rules : pairs of links that the robot file allows, or requires to be checked
+    masses : of links, and the limits of drives and wrist, as far as known
     derived : what :func:`er3a.robots.robot.derived` keeps of this robot
-    sources : per group of values ("dh", "zero", "limits", "speeds", "base", "flange", "tool", "envelopes",
+    sources : for each group of values ("dh", "zero", "limits", "speeds", "base", "flange", "tool", "envelopes",
         "inertia", "drives", "wrist_load", "weight") its source and grade
-    origins : documents of single entries ("d4", "direction2", "lower6") that have another one than their group
+    origins : documents of single entries ("d4", "direction2", "lower6") that differ from their group's
 
     Raises
     ------
     ShapeError, PoseError
-        for arrays of another shape, or of something that is no number
+        for arrays of the wrong shape, or with values that are not numbers
     RobotError
         for a convention or a direction that does not exist
     """
@@ -418,7 +418,7 @@ def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Con
 
 
 def to_modified(robot: Robot) -> Robot:
-    """The arm with a modified (Craig) table; itself if it has one. Flange and tool are the same at all angles."""
+    """The robot with a modified (Craig) table; the robot itself if it has one. Flange and tool poses stay the same."""
     if robot.convention == "modified":
         return robot
     return robot.replace(
@@ -429,7 +429,7 @@ def to_modified(robot: Robot) -> Robot:
 
 
 def to_standard(robot: Robot) -> Robot:
-    """The arm with a standard table; itself if it has one. Flange and tool are the same at all angles."""
+    """The robot with a standard table; the robot itself if it has one. Flange and tool poses stay the same."""
     if robot.convention == "standard":
         return robot
     return robot.replace(

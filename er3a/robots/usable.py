@@ -1,7 +1,7 @@
-"""Whether a robot's numbers, and joint values that someone gives for it, can be computed with.
+"""Checks whether a robot's values, and joint values given for it, can be computed with.
 
-A :class:`Robot` may hold what a source prints even where that can't be right, so that validation can say what it is.
-Who computes with a robot asks here first; the answer is kept with the robot, so that asking again costs nothing.
+A :class:`Robot` may hold impossible values as a source prints them, so that validation can name them. Call these checks
+before computing with a robot; the result is stored with the robot, so repeated calls cost nothing.
 """
 
 from __future__ import annotations

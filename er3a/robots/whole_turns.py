@@ -1,10 +1,10 @@
-"""The lattice of what leaves an arm as it was: sums of whole turns of the rows of its table.
+"""The lattice of joint changes that leave the arm's pose unchanged: sums of whole turns of the rows of its table.
 
-With u = C q what the rows move by, a row that turns is where it was after a turn, a row that slides is not. So with
-joints q all of q + C^-1 k are the same arm, k having whole turns for rows that turn and 0 for those that slide: a whole
-turn of each joint where nothing is coupled (or by whole numbers, both ways), less than a turn behind a gear, a turn of
-one joint and a shift of another at a ball screw. Which of these keep limits, of joints and of sums of joints, is found
-by trying turns row by row, where limits leave room for what the rows left can still add [1]_.
+The rows move by u = C q. A revolute row is back at its pose after a whole turn, a prismatic row is not. So the arm has
+the same pose at all joint values q + C^-1 k, where k holds whole turns for revolute rows and 0 for prismatic ones: a
+whole turn of each joint if nothing is coupled (or by whole numbers, both ways), less than a turn after a gear, a turn
+of one joint and a shift of another at a ball screw. Which of these keep the limits on joints and sums is found by
+trying turns row by row, with the possible contribution of the remaining rows as a bound [1]_.
 
 References
 ----------
@@ -115,7 +115,7 @@ def shortest_move(robot: Robot, move: Reals) -> Reals:
 
 
 def rows_within(robot: Robot, q: Reals, q_ref: Reals, most: int) -> Reals:
-    """The same arm (k, n) as joints (n,) by all turns that keep all limits; at most ``most`` + 1 are looked for.
+    """The same arm (k, n) as joints (n,) by all turns that keep all limits; at most ``most`` + 1 are searched for.
 
     Of continuous joints those that lie as near to q_ref (n,) as half of what a turn of each row moves them by.
     """

@@ -1,3 +1,3 @@
-"""Millions of random joint vectors: drawn (``random_joints``), taken to their tool points (``point_chain``) and
-counted (``tally``) in cells (``grid``), block by block.
+"""Millions of random joint vectors: drawn (``random_joints``), mapped to tool points (``point_chain``) and counted
+(``tally``) in cells (``grid``), block by block.
 """

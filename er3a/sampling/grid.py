@@ -1,4 +1,4 @@
-"""The voxel grid: cubic cells over a box that the tool point can't leave, whatever the joint angles."""
+"""The voxel grid: cubic cells over a box that contains the tool point at all joint angles."""
 
 from __future__ import annotations
 

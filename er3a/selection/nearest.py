@@ -1,9 +1,9 @@
-"""Which of several joint solutions is nearest to where the arm comes from, and why it is taken, or why none is.
+"""Choice of the joint solution nearest to a reference, with the reason, or the reason why none is chosen.
 
-Of the admissible solutions the one is taken whose maximum joint move from the reference is smallest
-(:func:`er3a.geometry.vectors.max_joint_move`, the measure of *nearest* wherever solutions are ranked): where all joints
-start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the least root of the
-summed squares of all joint moves decides, then the lower branch number.
+The admissible solution with the smallest maximum joint move from the reference is chosen
+(:func:`er3a.geometry.vectors.max_joint_move`, the meaning of *nearest* in all rankings). If all joints start and stop
+together, that joint decides the duration of the move. Between equals (to 1e-9 rad) the least root of the summed squares
+of all joint moves decides, then the lower branch number.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The names of the rules that rank solutions, apart from what they measure, for settings and results."""
+"""The names of the rules that rank solutions, for settings and results."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Ranking the solutions of one pose, and choosing those of a sequence of poses that are best as a whole.
+"""Ranking of the solutions of one pose, and the best choice of solutions for a sequence of poses.
 
-Rules that rank joint solutions each give every solution a cost, the least of which is best. Rules can be mixed as
-weighted sums. Then each rule's costs are stretched so that its best solution within the limits costs 0 and its worst 1,
-since degrees, seconds and millimetres don't add.
+Each rule gives every solution a cost; the least is best. Rules can be mixed as weighted sums. Then the costs of each
+rule are scaled so that its best solution within the limits costs 0 and its worst 1, because degrees, seconds and
+millimetres can't be added.
 
 A sequence is chosen by Bellman's recursion over the solutions of each pose, turns included [1]_: the cost to reach a
 solution is the least, over those of the pose before, of its cost plus that of the move between the two.
@@ -226,13 +226,13 @@ def select(
     Parameters
     ----------
     rule : a name in ``RULES``, or weights of several, such as ``{"time": 1, "clearance": 2}``
-    q_ref : (6,), rad, the joint angles that the arm comes from
-    scene : obstacles; rows that touch them are refused, and, with or without, those in which the arm touches itself
+    q_ref : (n,), rad or m, the current joint values
+    scene : obstacles; rows that touch them are refused. Rows in which the arm touches itself are refused in any case
 
     Raises
     ------
     Er3aError
-        for an unknown rule, a bad weight, or a rule that lacks its data
+        for an unknown rule, an invalid weight, or a rule whose data are missing
     """
     weights = checked_weights(rule)
     q_ref = checked_reference(robot, q_ref)
@@ -320,14 +320,14 @@ def select_sequence(
     scene: Scene | None = None,
     acceleration: Reals | None = None,
 ) -> SequenceChoice:
-    """Choose one solution of each pose so that all moves together cost least.
+    """Choose one solution of each pose so that the total cost of the moves is least.
 
     Parameters
     ----------
-    poses : the solutions of each pose, in order; rows outside the limits or in collision are left out
-    q_ref : (6,), rad, where the arm starts
-    rule : how a move costs: "nearest" (largest joint move), "weighted" or "time"
-    acceleration : (n,), rad/s^2; moves by "time" then run from rest to rest, else at full speed throughout
+    poses : the solutions of each pose, in order; rows outside the limits or in collision are not used
+    q_ref : (n,), rad or m, joint values at the start
+    rule : the cost of a move: "nearest" (largest joint move), "weighted" or "time"
+    acceleration : (n,), rad/s^2; then "time" moves run from rest to rest, otherwise at full speed throughout
 
     Raises
     ------

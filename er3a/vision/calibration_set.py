@@ -31,21 +31,21 @@ class CalibrationSet(ByValue, Displayed):
     setup : ``eye_in_hand`` (camera on the flange, board fixed) or ``eye_to_hand`` (camera fixed, board on the flange)
     flange : (N, 4, 4), T_base_flange
     target : (N, 4, 4), T_camera_board
-    names : N, what a person calls the samples
-    camera_covariance : (N, 6, 6) of T_camera_board: position (m) and rotation vector (rad) by the camera's axes; None
-        where nobody states it, then it is estimated
-    shared : (N, 6, k), m and rad by the camera's axes: how one standard deviation of each of k independent errors that
-        all samples share (intrinsics estimated from their images) moves T_camera_board; None where there are none
-    flange_covariance : (6, 6) of T_base_flange, likewise by the base's axes
-    q : (N, n), rad, joint angles, where they were recorded
-    touched : (M, 2, 3), m: points in the camera (a fixed one) or on the board (a fixed one), and where the robot
-        touched them in its base; they take no part in the calibration
+    names : N, names of the samples
+    camera_covariance : (N, 6, 6) of T_camera_board: position (m) and rotation vector (rad) in the camera's axes; None
+        if it is unknown: then it is estimated
+    shared : (N, 6, k), m and rad in the camera's axes: the change of T_camera_board by one standard deviation of each
+        of k independent errors that all samples share (intrinsics estimated from their images); None if there are none
+    flange_covariance : (6, 6) of T_base_flange, in the base's axes
+    q : (N, n), rad, joint angles, if they were recorded
+    touched : (M, 2, 3), m: points in the frame of a fixed camera, or on a fixed board, and the same points in the
+        robot's base as the robot touched them; not used in the calibration
     touch_deviation : standard deviation of a touch, m, in each coordinate
 
     Raises
     ------
     ShapeError, PoseError
-        for arrays of other shapes, and matrices that are no rigid transforms
+        for arrays of the wrong shape, and matrices that are not rigid transforms
     """
 
     setup: Setup

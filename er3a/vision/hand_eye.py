@@ -1,4 +1,4 @@
-"""Hand-eye calibration: the likeliest poses of camera and board, how sure they are, and what speaks against them.
+"""Hand-eye calibration: the likeliest poses of camera and board, how sure they are, and what contradicts them.
 
 Outliers, samples that can't be right: found without any calibration, by angles (:func:`check_angles`), and with one,
 by residuals (:func:`worst_sample`).
@@ -467,20 +467,20 @@ class HandEye(ByValue, Displayed):
 
 
 def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
-    """Estimate where camera and board are, with 95 % intervals, and judge every sample.
+    """Estimate the poses of camera and board, with 95 % intervals, and check every sample.
 
     Parameters
     ----------
-    samples : three at least, whose motions turn about two directions
+    samples : at least three, whose motions rotate about two directions
 
     Returns
     -------
-    found : estimated by the likelihood of all samples but those that can't be right, which are named
+    found : the maximum-likelihood estimate from all samples except those that can't be right, which are named
 
     Raises
     ------
     HandEyeError
-        where the samples leave hand-eye or board pose open
+        if the samples do not determine the camera's or the board's pose
     """
     _check_determined(samples)
     angles = check_angles(samples)

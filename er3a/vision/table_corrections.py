@@ -139,7 +139,7 @@ def _seen(samples: CalibrationSet, F: Reals, covariance: Reals | None) -> likeli
 
 
 def _identified(J: Reals, every: list[Parameter], setup: str, robot: Robot) -> tuple[list[Parameter], tuple[Held, ...]]:
-    """Which entries the samples tell apart, and why the others keep their values; J is whitened, (N, 6, 12 + p)."""
+    """Which entries the samples distinguish, and why the others keep their values; J is whitened, (N, 6, 12 + p)."""
     J = SCALE * J.reshape(-1, J.shape[-1])
     poses = ("T_flange_camera", "T_base_board") if setup == "eye_in_hand" else ("T_base_camera", "T_flange_board")
     names = [*(poses[0],) * 6, *(poses[1],) * 6, *(each.name for each in every)]

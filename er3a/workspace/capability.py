@@ -1,12 +1,12 @@
-"""What a tool can do in each cell: its reachability, the number of solutions, and the manipulability there.
+"""Capability of the tool in each cell: reachability, number of solutions, and manipulability.
 
-Reachability is the index of Zacharias, Borst and Hirzinger [1]_: directions spread evenly over the sphere, a
-direction counts if some roll about it has an inverse solution within limits. Here all directions are asked of the
-cell's centre. Arms with fewer joints are asked for what they can do (:mod:`.orientations`).
+Reachability is the index of Zacharias, Borst and Hirzinger [1]_: directions spread evenly over the sphere, a direction
+counts if some roll about it has an inverse solution within limits. Here all directions are tested at the cell's centre.
+For arms with fewer joints, the orientations that they can set are tested (:mod:`.orientations`).
 
 Joint 1 only turns everything about its axis, or shifts it. So each cell of the section is solved once, at azimuth 0 and
-with joint 1 free; what another azimuth has follows by turning joint 1 on, exactly. With a limited joint 1 azimuths are
-told apart in sectors, by their middles, and so are places along a slide.
+with joint 1 free; the result at another azimuth follows exactly by turning joint 1. With a limited joint 1, azimuths
+are divided into sectors, judged at their middles; so are positions along a prismatic joint 1.
 
 References
 ----------
@@ -14,10 +14,10 @@ References
    IEEE/RSJ Int. Conf. on Intelligent Robots and Systems (IROS), 2007.
 .. [2] T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research 4(2), 1985.
 
-How many of the poses that a tool reaches in a cell can be held with nothing touched: tried at random, not proven.
+The share of reached poses in a cell that can be held without contact: estimated from random poses, not proven.
 
-A pose counts as reached if an arm within the limits is found, and as clear if one of its arms touches neither the
-surroundings nor itself. An arm that does is proof for its pose; a share of few tries is an estimate.
+A pose counts as reached if a solution within the limits is found, and as clear if one of its solutions touches neither
+the surroundings nor the arm itself. Such a solution proves its pose; the share is an estimate.
 """
 
 from __future__ import annotations

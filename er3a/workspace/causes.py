@@ -1,10 +1,10 @@
-"""What makes a void: each limit is widened by itself, and the void's cells are judged again. What is left of it if one
-entry of the table is another: what else than a limit may make it.
+"""The causes of a void. Each limit is widened alone, and the void's cells are decided again. Then single entries of the
+table are changed, to find causes other than a limit.
 
-An offset that is off by a right angle, a direction turned round, and a length with the other sign or of half or twice
-its value (a diameter for a radius) are the commonest slips of a table. Each moves the reach of the arm as a whole, so
-it is not the void's own cells that are looked at but all that the changed arm encloses. Which of the changes is right,
-a void can't tell: references do.
+The commonest mistakes in a table are an offset that is off by a right angle, a reversed direction, and a length with
+the other sign or with half or twice its value (a diameter for a radius). Each changes the whole reach of the arm, so
+all voids of the changed arm are examined, not only the void's own cells. A void does not show which change is right;
+references do.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The frame of cells: rings about axis 1, or bars along a first prismatic joint, in parts along it.
 
-Joint 1 alone carries the tool around (or along), so what a tool can do at one place of a ring or bar it can do at the
-others with joint 1 moved on, as far as its limits go.
+Joint 1 alone moves the tool around (or along), so the capability at one place of a ring or bar holds at the others with
+joint 1 moved, within its limits.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ class Core:
     ----------
     lower, upper : proven bounds
     estimate : the proven part, and the undecided rings whose middles no sampled direction refuses
-    cells, poses : how many rings and neighbourhoods of poses the proof looked at
+    cells, poses : how many rings and neighbourhoods of poses the proof examined
     """
 
     lower: float
@@ -141,7 +141,7 @@ def _sectors(ranges: Reals, branch: _Found) -> tuple[np.uint64, np.uint64]:
 def _judge(
     asked: _Asked, frame: _Frame, cells: Reals, tries: _Tries, numbers: _Numbers, most_poses: int, masks: _Masks
 ) -> int:
-    """Judge the open sectors of cells; returns how many neighbourhoods of poses were looked at.
+    """Judge the open sectors of cells; returns how many neighbourhoods of poses were examined.
 
     Of the masks ``open_sectors`` keeps those that stay undecided, ``good`` is set to those in the core, ``likely`` to
     the undecided ones whose middles no rotation tried refuses.

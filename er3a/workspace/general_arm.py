@@ -1,8 +1,8 @@
-"""Any serial arm as the general proof takes it: a chain of joints about and along z, and bounds of its levers.
+"""Any serial arm in the form of the general proof: a chain of joints about and along z, and bounds of its levers.
 
 The tool point is carried from the tip to axis 1: turned about the z axis of a joint's frame or shifted along it, then
-taken over a constant link. The distance of the point from a joint's axis, its *lever*, depends on the joints behind
-that one alone.
+taken over a constant link. The distance of the point from a joint's axis, its *lever*, depends only on the joints after
+that one.
 """
 
 from __future__ import annotations
@@ -270,7 +270,7 @@ def _along_slide(arm: GeneralArm, first: Reals) -> tuple[GeneralArm, Reals, Real
 
 
 def _box(arm: GeneralArm, link: Reals) -> tuple[Reals, Reals]:
-    """Lowest and highest corner (3,), m, of what the joints behind joint 1 reach, after the link (3, 4) behind it."""
+    """Lowest and highest corner (3,), m, of what the joints after joint 1 reach, with its link (3, 4)."""
     middles = link[:, 3] + np.outer(arm.heights[1], link[:, 2])
     across = np.hypot(link[:, 0], link[:, 1]) * arm.radii[1]
     return middles.min(axis=0) - across, middles.max(axis=0) + across

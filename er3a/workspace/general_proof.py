@@ -476,7 +476,7 @@ class Rings(NamedTuple):
 
 
 def outer_rings(arm: GeneralArm, across: int) -> Rings:
-    """What the joints behind joint 1 may reach, about axis 2; of an arm of one joint its tip.
+    """What the joints after joint 1 may reach, about axis 2; of an arm of one joint its tip.
 
     Parameters
     ----------
@@ -549,7 +549,7 @@ def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, 
 
 @inner_kernel
 def _range_of(spread: Spread, rings: Rings) -> tuple[int, int, int, int]:
-    """First and last ring in radius and height; none if the first is behind the last."""
+    """First and last ring in radius and height; none if the first is after the last."""
     n_rho, n_z = rings.counts.shape
     i_0, i_1 = int(spread[0] / rings.size[0] - 1e-9), int(spread[1] / rings.size[0] + 1e-9)
     j_0 = int(np.floor((spread[2] - rings.low) / rings.size[1] - 1e-9))
@@ -662,7 +662,7 @@ def exclude(
 
     Parameters
     ----------
-    L : (4, 4), the link behind the joint
+    L : (4, 4), the link after the joint
     ends : the joint's range, rad, and the length of bars, m (0 for rings)
     behind : what the joints behind it reach at most
     arcs, count : the arcs that are empty so far; changed
@@ -794,7 +794,7 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
     Parameters
     ----------
     target : wanted width of the bracket
-    most_cells : how many cells may be looked at; the first grid is always finished
+    most_cells : how many cells may be examined; the first grid is always finished
 
     Returns
     -------

@@ -3,7 +3,7 @@
 A neighbourhood is a pose whose tool point may move by ``rho`` and whose orientation may turn by ``delta`` (about any
 axis). The wrist centre then stays in a ball, from which the ranges of joints 1 to 3 follow one after the other, as in
 the inverse itself; axis 4 turns by no more than joints 1 to 3 turn it, which gives the range of the angle between axes
-4 and 6 and so of joint 5. Joints 4 and 6 turn by no more than a vector seen along the other axis does. All ranges are
+4 and 6 and so of joint 5. Joints 4 and 6 turn by no more than a vector seen along the other axis turns. All ranges are
 outer ones (interval arithmetic [1]_ with the geometry's own monotone functions), so both answers are proofs.
 
 References

@@ -1,9 +1,9 @@
-"""Which orientations of its tool are asked of an arm, by what its joints can do.
+"""The tool orientations that are tested for an arm, depending on what its joints can set.
 
-Arms with six joints and more are asked for *directions* of the tool's z axis all over the sphere, and so are those with
-five that leave the turn about it. Where joints 2 to 4 turn about one direction and no other joint tilts the tool, it
-points within a plane that joint 1 carries around: such an arm is asked for *tilts* in that plane. A SCARA is asked for
-*turns* about its axes, an arm of three joints for *points* alone.
+For arms with six joints and more, *directions* of the tool's z axis all over the sphere are tested; also for arms with
+five that can't set the rotation about it. If joints 2 to 4 have parallel axes and no other joint tilts the tool, it
+points within a plane that joint 1 carries around: *tilts* in that plane are tested. For a SCARA *turns* about its axes
+are tested, for an arm of three joints only *points*.
 """
 
 from __future__ import annotations

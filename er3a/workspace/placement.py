@@ -1,12 +1,12 @@
 """Where a box can stand so that the tool reaches every point of it along every required direction, and the proof.
 
-A lattice of points is asked for all directions of a cone, branch by branch. A box fits where all lattice points in it
-are good, which sliding minima find for all places at once. The lattice only proposes.
+At each point of a lattice, all directions of a cone are tested, branch by branch. A box fits where all lattice points
+in it are good, which sliding minima find for all places at once. The lattice only proposes places.
 
 Criterion: places where one branch serves the whole box come first, of these proven ones. Then the least manipulability
 over the box and the cone, which keeps away from singularities, and the smallest distance from the joint limits are
-weighed: each as a share of the best of all places, and the smaller share counts. That distance is a demand of its own
-too: the task narrows the limits.
+weighed: each as a share of the best of all places, and the smaller share counts. A minimum of that distance is also
+required: the task narrows the limits.
 
 A box that stands on something has its underside on a :class:`Support`, over which all of it lies.
 
@@ -488,7 +488,7 @@ class Chosen:
     ----------
     row : their rows of the places; slot : the branch that serves each, or MIXED
     proven : whether each is proven, or else rests on samples; branch_proven : whether that one branch serves it all is
-    refuted : how many better-ranked places the proof refused; poses : how many neighbourhoods it looked at
+    refuted : how many better-ranked places the proof refused; poses : how many neighbourhoods it examined
     """
 
     row: list[int]
@@ -638,7 +638,7 @@ def prove_place(
     Returns
     -------
     answer : refuted: no branch reaches some point and direction, with any of the rolls
-    used : how many neighbourhoods were looked at
+    used : how many neighbourhoods were examined
 
     Raises
     ------

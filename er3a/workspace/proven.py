@@ -1,16 +1,16 @@
-"""What the proof says of a robot: its cells, a joint vector that reaches into each, and an estimate of the volume.
+"""Results of the proof for a robot: its cells, a joint vector that reaches each, and an estimate of the volume.
 
-The reached volume as an estimate: what is proven, and uniform points in what the proof leaves open, searched for.
+The estimate of the reached volume: the proven volume, plus the reached share of uniform points in undecided cells.
 
 References
 ----------
 .. [1] E. B. Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22, 1927.
 
-Voids of a proof: what the arm can't reach, joined over cells and azimuths.
+Voids of a proof: unreachable regions, connected over cells and azimuths.
 
 The arcs that are not proven filled are nodes; two of them touch if their cells share a border and their azimuths
 overlap, or across azimuth 0. Proven filled cells are the only walls: a component of nodes that does not reach the outer
-border is enclosed for certain. Its volume lies between what of it is proven empty and all of it.
+border is enclosed for certain. Its volume lies between its proven empty part and all of it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The adaptive proof: rings of the section, split where they are neither filled nor empty.
+"""The adaptive proof: rings of the section, split if they are neither filled nor empty.
 
 **Filled**, a second proof: the tool's sphere is swept across the cell. For a point x of the cell at the angle phi, the
 sphere of radius d about W must pass through x with the direction in the zone. Move joints 1 to 3 along a short straight
@@ -252,7 +252,7 @@ def is_empty(
     Returns
     -------
     empty : bool; False means only that there is no proof
-    boxes : how many were looked at
+    boxes : how many were examined
     """
     rho, z, h_rho, h_z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3]), cell[1] - cell[0], cell[3] - cell[2]
     size = rho + abs(z - arm.centre[2]) + arm.upper_length + arm.forearm_length + arm.d
@@ -531,7 +531,7 @@ def judge_cells(
 
     Returns
     -------
-    boxes : how many the emptiness proofs looked at
+    boxes : how many the emptiness proofs examined
     """
     stack, splits, known = np.empty((STACK, 6)), np.empty((_SPLITS, 2)), np.empty((MOST_ARCS, 2))
     best = np.empty(2 * _SECTORS), np.empty(2 * _SECTORS, dtype=np.int64)
@@ -732,7 +732,7 @@ class Proof:
         that are proven empty; unused rows are NaN
     level : (n,), how often the cell was split off
     witness : (n, 4): theta_2, tau, phi of a configuration that reaches the cell's centre, and 1; or zeros
-    boxes : how many boxes the emptiness proofs looked at
+    boxes : how many boxes the emptiness proofs examined
     bar : m, length of the cells where they are bars along a first prismatic joint; 0 for rings. Then rho is the place
         across the bars beside z, and azimuths are places along them, their length being a turn
     """
@@ -813,7 +813,7 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, thr
     Parameters
     ----------
     target : wanted width of the bracket, (upper - lower) / upper
-    most_cells : how many cells may be looked at; the first grid is always finished
+    most_cells : how many cells may be examined; the first grid is always finished
     across : cells along the height of the first grid
     threads : how many to use; the result does not depend on it
     """

@@ -1,6 +1,6 @@
-"""All solutions of tool poses for maps of what a tool can do, of any arm whose inverse is known by its class.
+"""All solutions of tool poses for capability maps, for any arm with an inverse by class.
 
-Arms with more than six joints are tried at even values of what a pose leaves open.
+Arms with more than six joints are tested at evenly spaced values of their redundancy parameters.
 """
 
 from __future__ import annotations

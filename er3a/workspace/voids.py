@@ -1,16 +1,15 @@
-"""Voids inside the hull: what the proof finds empty, and what only samples suggest.
+"""Voids inside the hull: those that the proof finds empty, and those that only samples suggest.
 
-Voids that samples leave are untouched cells inside the hull, sorted into enclosed ones and open pockets. How far to
-trust a void rests on its rim, the touched cells that border it:
+Voids that samples leave are untouched cells inside the hull, sorted into enclosed ones and open pockets. How reliable a
+void is depends on its rim, the touched cells that border it:
 
 * Would chance explain it? With the rim's low density (the 5 % quantile of samples per cell) the void's cells would
   hold ``expected_samples``; the chance of seeing none is exp of minus that number.
-* How much of it is merely not seen yet? From the numbers f1, f2 of rim cells seen exactly once and twice, Chao's
+* How much of it is merely not sampled yet? From the numbers f1, f2 of rim cells seen exactly once and twice, Chao's
   estimator [1]_ gives ``unseen_cells = f1 (f1 - 1) / (2 (f2 + 1))``, the cells that more samples would still touch.
 
 A void counts as *sampled* if at least 10 samples were expected and no more than a tenth of its cells is unseen, and as
-*undersampled* otherwise; neither is a proof. A void that is small, or wholly explained by what is not seen yet, is left
-out.
+*undersampled* otherwise; neither is a proof. A void that is small, or fully explained by unsampled cells, is left out.
 
 References
 ----------
@@ -539,7 +538,7 @@ def _outline(proven: Proven, cavity: Cavity) -> tuple[Blocks, Flags]:
 
 
 def pocket_block(proven: Proven) -> float:
-    """Edge (m) of the blocks that open pockets are looked for on."""
+    """Edge (m) of the blocks that open pockets are searched for on."""
     cells = proven.proof.cells
     low, high = cells[:, [0, 2]].min(axis=0), cells[:, [1, 3]].max(axis=0)
     size = float((cells[:, 1] - cells[:, 0]).max())

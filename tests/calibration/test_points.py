@@ -272,7 +272,7 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert model.distances_mm(rows).max() == found["held_back"]["worst_mm"]
     with pytest.raises(InputError, match="start, a: the calibration did not start from mine's a"):
         er3a.load_calibration(record, mine)
-    with pytest.raises(InputError, match="is no file with a calibration"):
+    with pytest.raises(InputError, match="is not a calibration file"):
         er3a.load_calibration(tmp_path / "mine.yaml", robot)
 
 
@@ -293,7 +293,7 @@ def bare_record(robot: er3a.Robot) -> dict:
         (lambda found: found["ratios"][0].update(kind="coupling", by=7, coefficients=[1.0]), "terms"),
         (lambda found: found["ratios"][0].update(kind="play"), "terms"),
         (lambda found: found["ratios"][0].update(coefficients=[1.0]), "terms"),
-        (lambda found: found.pop("start"), "is no file with a calibration"),
+        (lambda found: found.pop("start"), "is not a calibration file"),
     ],
 )
 def test_a_calibration_that_says_what_no_arm_has_is_refused(tmp_path, change, field):

@@ -161,9 +161,9 @@ def test_pieces_that_were_edited_are_refused(tmp_path):
     content = json.loads((tmp_path / "cube.json").read_text(encoding="utf-8"))
     content["pieces_mm"][0][0][0] += 1.0
     (tmp_path / "cube.json").write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(InputError, match="not as they were written"):
+    with pytest.raises(InputError, match="were changed after er3a wrote them"):
         load_pieces(tmp_path / "cube.json")
-    with pytest.raises(InputError, match="no file of convex pieces"):
+    with pytest.raises(InputError, match="not a file of convex pieces"):
         load_pieces(tmp_path / "cube.stl")
 
 

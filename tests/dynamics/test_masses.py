@@ -166,7 +166,7 @@ DRIVES = {"source": "made up", "grade": "claim"}
         (lambda c: c["inertia"]["links"].append({"link": 3, "mass_kg": 1}), "inertia.links", "named twice"),
         (lambda c: c["inertia"]["links"].append({"link": 9, "mass_kg": 1}), "inertia", "link"),
         (lambda c: c["inertia"]["origins"].pop(), "inertia.origins", "not one for each joint"),
-        (lambda c: c["inertia"].update(frame="dh"), "inertia.origins", "belong to frame urdf"),
+        (lambda c: c["inertia"].update(frame="dh"), "inertia.origins", "only frame urdf"),
         (
             lambda c: c.update(drives=DRIVES | {"rows": [{"joint": 1, "peak_n_m": 0}]}),
             "drives.rows[0].peak_n_m",
@@ -298,7 +298,7 @@ def test_a_load_from_a_mesh_and_a_density(tmp_path):
     assert load_of([]) is None
     box.faces = box.faces[:-1]
     box.export(tmp_path / "box.stl")
-    with pytest.raises(InputError, match="no closed mesh"):
+    with pytest.raises(InputError, match="not a closed mesh"):
         load_of([load_fields(mesh=mesh)])
     with pytest.raises(InputError, match="can't be read"):
         load_of([load_fields(mesh=mesh | {"file": str(tmp_path / "absent.stl")})])

@@ -136,7 +136,7 @@ def test_sources_may_differ_but_not_contradict_themselves(tmp_path):
 def test_no_table_beside_the_others_is_left_unread(tmp_path):
     written(tmp_path, "limits.csv", LIMITS + "1,-170,170,0.5,table,official\n")
     written(tmp_path, "Speeds.CSV", SPEEDS + "1,4,0.5,m,official\n")
-    with pytest.raises(InputError, match=r"Speeds.CSV.*no kind of reference table"):
+    with pytest.raises(InputError, match=r"Speeds.CSV.*not a kind of reference table"):
         load_references(tmp_path)
 
 

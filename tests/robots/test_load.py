@@ -275,7 +275,7 @@ def test_calibrated_tables_may_hold_short_lengths(write):
         (set_in("dh", "rows", 0, to=5), "dh.rows[0]", "5 is refused. Write `key: value` lines"),
         (set_in("title", to=600), "title", "600 is refused. Write a text"),
         (set_in("title", to=""), "title", "at least 1 character"),
-        (set_in("zero", "rows", 0, "direction", to=0), "zero.rows[0].direction", "0 is no direction. Write 1 or -1"),
+        (set_in("zero", "rows", 0, "direction", to=0), "zero.rows[0].direction", "0 is not a direction. Write 1 or -1"),
         (set_in("zero", "rows", 0, "direction", to=-0.5), "zero.rows[0].direction", "refused"),
         (set_in("zero", "rows", 0, "direction", to=True), "zero.rows[0].direction", "True is refused"),
         (set_in("speeds", "rows", 0, "speed_deg_s", to=0), "speeds.rows[0].speed_deg_s", "greater than 0"),

@@ -48,7 +48,7 @@ class SphericalConstants(NamedTuple):
 
 
 def spherical_constants(axes: Reals, frame: Reals) -> tuple[SphericalConstants, Reals]:
-    """Constants for axes (3, 3) with the joints at 0, and the frame G (3, 3) behind them.
+    """Constants for axes (3, 3) with the joints at 0, and the frame G (3, 3) after them.
 
     ``frame`` (3, 3) has the directions of the frame before them as rows, the last one axis 1. A turn R of what the
     joints carry is ``frame R G`` in the form above; columns of G are directions in the same coordinates as the axes.
@@ -145,7 +145,7 @@ class ArmAngleConstants(NamedTuple):
 
     ``elbow`` has as rows the direction from axis 4 to S, the one across it, and axis 4. ``base`` and ``forearm`` bring
     the base's and the elbow's coordinates into the frames before axis 1 and axis 5. ``axis_3``, ``beside_3`` are
-    directions behind joint 3 in the elbow's coordinates, ``axis_7_in_tool`` and ``beside_7_in_tool`` behind joint 7.
+    directions after joint 3 in the elbow's coordinates, ``axis_7_in_tool`` and ``beside_7_in_tool`` after joint 7.
     """
 
     shoulder: Vector

@@ -1,9 +1,9 @@
 """The solver of any chain, chosen from its geometry, with one interface for all classes.
 
-Chains are constant links and joints that turn about or slide along z (:mod:`chain`); base, tool, offsets and
-coupling are the caller's. Chains with more than six joints hold one joint after another at a given value until a class
-is met that needs none (six joints) or has its own parameter (arm angle); chains with fewer are completed by joints that
-they lack, and what those turn about is stated.
+Chains are constant links, with revolute and prismatic joints about and along z (:mod:`chain`); base, tool, offsets and
+coupling are the caller's. In chains with more than six joints, one joint after another is held at a given value until a
+class applies that needs none (six joints) or has its own parameter (arm angle). Chains with fewer joints are completed
+by added joints; their axes are stated.
 """
 
 from __future__ import annotations
@@ -282,7 +282,7 @@ def _completions(links: Reals, n: int) -> list[tuple[class_solvers.ArmClassCode,
 
 
 def _with_any_joints(links: Reals, n: int) -> Reals:
-    """Links (7, 4, 4) with joints behind the tool about axes without special places."""
+    """Links (7, 4, 4) with joints after the tool about axes without special places."""
     size, more = size_of(links), []
     for k in range(6 - n):
         step = np.eye(4)

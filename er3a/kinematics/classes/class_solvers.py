@@ -1,7 +1,7 @@
 """The solvers of the classes of arms, with one interface.
 
-Chains are constant links and joints that turn about or slide along z (:mod:`chain`); base, tool, offsets and coupling
-are the caller's.
+Chains are constant links, with revolute and prismatic joints about and along z (:mod:`chain`); base, tool, offsets and
+coupling are the caller's.
 """
 
 from __future__ import annotations

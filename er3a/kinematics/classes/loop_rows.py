@@ -1,7 +1,7 @@
 """From a zero of the hidden joint's determinant to all six joints, and the memory that one pose needs.
 
 The null vector of the nine equations holds squares and products of half-angle cosines and sines of joints 4 and 5;
-where two solutions share the hidden joint's angle, the two null vectors are told apart by a pencil. Joint 1 follows
+where two solutions share the hidden joint's angle, the two null vectors are distinguished by a pencil. Joint 1 follows
 from the reflected rows, joint 2 from the angle between both sides, joint 6 closes the loop.
 """
 

@@ -77,7 +77,7 @@ class RowsFound:
 
     Attributes
     ----------
-    q : (N, 16, 6), rad, in (-pi, pi], in order of the first joint; NaN behind the last
+    q : (N, 16, 6), rad, in (-pi, pi], in order of the first joint; NaN after the last
     count : (N,)
     certainty : (N,), CERTAIN, UNCERTAIN (no reading of the loop was free of doubt) or CONTINUUM (in every reading
         the determinant vanishes: the arm moves with its tool at rest, rows are members)

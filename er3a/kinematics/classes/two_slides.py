@@ -126,7 +126,7 @@ def _arrangements(links: Reals, sliding: Flags) -> list[tuple[Integers, float, R
 
 
 def solve_two_slides(arm: TwoSlides, T: Reals) -> RowsFound:
-    """All solutions for poses T (N, 4, 4), m; q (N, 16, 6) in rad and m, NaN behind the last."""
+    """All solutions for poses T (N, 4, 4), m; q (N, 16, 6) in rad and m, NaN after the last."""
     return all_rows(arm, _by_readings, T)
 
 
@@ -201,7 +201,7 @@ def _zeros(terms: Reals, degree: int) -> Reals:
 
 @inner_kernel
 def _loop_of(reading: SlideReading, pose_link: Reals, links: Reals, A: Reals) -> None:
-    """Fill ``links`` (6, 4, 4) of the loop and the rotations ``A`` (4, 3, 3) behind each revolute joint."""
+    """Fill ``links`` (6, 4, 4) of the loop and the rotations ``A`` (4, 3, 3) after each revolute joint."""
     for i in range(6):
         links[i] = reading.links[i]
     K = links[reading.place]

@@ -1,1 +1,1 @@
-"""The page on the article that the project began with: what it says, what er3a computes, and whether they agree."""
+"""The page on the teaching article: its statements, er3a's results, and whether they agree."""

@@ -1,6 +1,6 @@
-"""What er3a computes for each sentence of the article: from a study's results, and by the library where no stage does.
+"""er3a's results for each statement of the article: from a study's results, or computed here if no stage has them.
 
-The article's own inputs stand here as constants, with the section that they are taken from. All else is computed.
+The article's own inputs are constants here, with the section that they come from. All else is computed.
 """
 
 from __future__ import annotations

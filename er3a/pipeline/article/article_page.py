@@ -1,4 +1,4 @@
-"""The page on the article: its steps in its order, and three tables compared, in each language of the pages."""
+"""Writes the page on the article, with its steps in order and three tables compared, in each language."""
 
 from __future__ import annotations
 

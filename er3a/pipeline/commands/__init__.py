@@ -1,1 +1,1 @@
-"""The commands, by whom they serve."""
+"""The commands, one module for each group of ``er3a --help``."""

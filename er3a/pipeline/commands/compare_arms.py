@@ -1,4 +1,4 @@
-"""``er3a compare``: is this table that arm?"""
+"""``er3a compare``: do two descriptions describe the same arm?"""
 
 from __future__ import annotations
 
@@ -21,24 +21,28 @@ _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
 @app.command(rich_help_panel=ROBOT_FILES)
 def compare(
-    a: Annotated[str, typer.Argument(metavar="A", help=f"the table in question: {_ARM}")],
-    b: Annotated[str, typer.Argument(metavar="B", help="what it is compared with: as A, or a folder of such files")],
+    a: Annotated[str, typer.Argument(metavar="A", help=f"the arm to test: {_ARM}")],
+    b: Annotated[str, typer.Argument(metavar="B", help="the arm to compare with: as A, or a folder of such files")],
     *,
-    convention: Annotated[Convention, typer.Option(help="of D-H tables")] = "standard",
+    convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
     length_unit: Annotated[
-        LengthUnit | None, typer.Option(help="of D-H tables; mm unless the lengths can't be")
+        LengthUnit | None,
+        typer.Option(help="unit of lengths in D-H tables (default: mm, unless the values can't be mm)"),
     ] = None,
-    angle_unit: Annotated[AngleUnit | None, typer.Option(help="of D-H tables; deg unless the twists can't be")] = None,
-    base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
-    tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
+    angle_unit: Annotated[
+        AngleUnit | None,
+        typer.Option(help="unit of angles in D-H tables (default: deg, unless the twists can't be deg)"),
+    ] = None,
+    base: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm begins")] = None,
+    tip: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm ends")] = None,
     xacro: Xacro = None,
-    tolerance_mm: Annotated[float, typer.Option(help="lengths that differ by no more agree")] = 0.5,
-    tolerance_deg: Annotated[float, typer.Option(help="angles that differ by no more agree")] = 0.1,
-    output: Annotated[Path | None, typer.Option(help="write A with what differs corrected, .yaml")] = None,
+    tolerance_mm: Annotated[float, typer.Option(help="lengths that differ by at most this are equal")] = 0.5,
+    tolerance_deg: Annotated[float, typer.Option(help="angles that differ by at most this are equal")] = 0.1,
+    output: Annotated[Path | None, typer.Option(help="write A, corrected to equal B, to this file (.yaml)")] = None,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     as_json: AsJson = False,
 ):
-    """Is this table that arm? Geometry, zero, directions, base, flange; which entries differ. Exit code 1 if any do."""
+    """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm, read_arms
     from er3a.robots.robot import to_modified, to_standard
@@ -92,7 +96,7 @@ def compare(
 
 
 def _print(ranked: list[tuple[str, Comparison]], folder: bool) -> None:
-    """The best comparison layer by layer; of a folder the best five before it."""
+    """Print the best comparison, layer by layer; for a folder, first the five best matches."""
     from er3a.pipeline.messages.comparison import headline, layer_rows
 
     if folder:
@@ -105,7 +109,7 @@ def _print(ranked: list[tuple[str, Comparison]], folder: bool) -> None:
 
 
 def _record(ranked: list[tuple[str, Comparison]], folder: bool) -> dict[str, Any]:
-    """A comparison as JSON; of a folder the best one's with a ranking of all."""
+    """A comparison as JSON; for a folder, the best match with a ranking of all."""
     name, found = ranked[0]
     record = {
         key: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

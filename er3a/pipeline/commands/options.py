@@ -22,21 +22,21 @@ DEFAULT_STUDY = Path("config/config.yaml")
 DEFAULT_RESULTS = Path("results")
 DEFAULT_REPORTS = Path("reports")
 
-FIRST = "A study, from start to end"
+FIRST = "Studies"
 ROBOT_FILES = "Robot files"
 PROGRAMS = "Robot programs"
-JOBS = "Single jobs, as the workflow calls them"
+JOBS = "Single jobs, called by the workflow"
 
 _START = """\
 er3a: can this kinematic model of a serial robot be trusted, and what can the robot do?
 
-  er3a new cell --urdf arm.urdf   a study of your arm in the folder cell (or --dh table.csv, or --robot er3_600)
-  er3a check FILE ...             what is wrong with a robot, study, target, path, scene or reference file
-  er3a run                        carry out the study of this folder; then open reports/index.html
-  er3a verdicts                   what came out, in the terminal
-  er3a view                       the recordings, to move and to play
+  er3a new cell --urdf arm.urdf   write a study of your arm into the folder cell (or --dh table.csv, or --robot er3_600)
+  er3a check FILE ...             find errors in robot, study, target, path, scene or reference files
+  er3a run                        run the study in this folder; then open reports/index.html
+  er3a verdicts                   print the verdicts
+  er3a view                       play the 3-D recordings
 
-All commands: er3a --help. What one takes: er3a run --help."""
+All commands: er3a --help. Options of one command: er3a run --help."""
 
 app = typer.Typer(
     name="er3a",
@@ -46,7 +46,7 @@ app = typer.Typer(
 
 
 class FailOn(StrEnum):
-    """From which verdict on a command ends with exit code 1."""
+    """The mildest verdict for which a command ends with exit code 1."""
 
     caution = "caution"
     fail = "fail"
@@ -55,7 +55,7 @@ class FailOn(StrEnum):
 @app.callback(invoke_without_command=True)
 def start(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and end.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
     """Can this kinematic model of a serial robot be trusted, and what can the robot do?"""
     if version:
@@ -87,21 +87,21 @@ def given_files(files: Any) -> Any:
 StageName = Annotated[str, typer.Argument(metavar="STAGE", help=" | ".join(STAGES), autocompletion=_stages)]
 RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study", autocompletion=_robots)]
 SomeRobot = Annotated[
-    str | None, typer.Argument(metavar="[ROBOT]", help="one robot; all if absent", autocompletion=_robots)
+    str | None, typer.Argument(metavar="[ROBOT]", help="a robot of the study (default: all)", autocompletion=_robots)
 ]
 AnyRobot = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file")]
 StudyFile = Annotated[Path, typer.Option("--study", envvar="ER3A_STUDY", help="the study file")]
 Results = Annotated[Path, typer.Option(help="folder of the results")]
 Reports = Annotated[Path, typer.Option(help="folder of the reports")]
-Split = Annotated[bool, typer.Option(help="split a URDF's collision meshes into convex pieces; else their hulls")]
-Xacro = Annotated[
-    list[str] | None, typer.Option(metavar="NAME:=VALUE", help="an argument of a URDF that is xacro; can be repeated")
+Split = Annotated[
+    bool, typer.Option(help="split the URDF's collision meshes into convex pieces (default: convex hulls)")
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="print JSON, for another program")]
+Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a xacro argument; can be repeated")]
+AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
 
 
 def print_json(content: Any) -> None:
-    """What another program reads: on standard output, with nothing else."""
+    """Print JSON on standard output."""
     print(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
 
 
@@ -119,12 +119,12 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
 
 
 def print_note(text: str) -> None:
-    """What is worth knowing besides the result."""
+    """Print a note on standard error."""
     print(f"note: {text}", file=sys.stderr)
 
 
 def print_warning(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
-    """What may be a slip in a file; other warnings as Python shows them."""
+    """Print an :class:`er3a.InputWarning` as one line; other warnings as Python shows them."""
     if issubclass(category, InputWarning):
         print(f"warning: {message}", file=sys.stderr)
     else:
@@ -135,5 +135,5 @@ _show_warning = warnings.showwarning
 
 
 def print_error(error: Er3aError | str) -> None:
-    """What a person has to correct."""
+    """Print an error that the user can correct."""
     print(f"error: {error}", file=sys.stderr)

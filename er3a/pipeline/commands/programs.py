@@ -1,4 +1,4 @@
-"""Robot programs: checked like code, and written from paths."""
+"""Commands for robot programs: check-program, program write."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SHARE_OF_FOLLOWING = 0.5  # of the time; the rest is for checking what was follo
 
 
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
-SceneFile = Annotated[Path | None, typer.Option(callback=given_files, help="a scene file: what the arm may not touch")]
+SceneFile = Annotated[Path | None, typer.Option(callback=given_files, help="a scene file: the obstacles")]
 
 
 @app.command(rich_help_panel=PROGRAMS)
@@ -35,33 +35,31 @@ def check_program(
         list[Path],
         typer.Argument(
             callback=given_files,
-            help="robot programs, their language known by what they hold, or tables of joints over time (.csv)",
+            help="robot programs (the language is detected), or tables of joint values over time (.csv)",
         ),
     ],
     *,
     robot: RobotOption,
-    start: Annotated[str | None, typer.Option(help="joint values before it, deg or mm: 0,-10,...")] = None,
+    start: Annotated[str | None, typer.Option(help="joint values before the program, deg or mm: 0,-10,...")] = None,
     frames: Annotated[
         Path | None,
-        typer.Option(
-            callback=given_files, help="a file of kind programs, whose frames TOOL_DATA[3] and the like stand for"
-        ),
+        typer.Option(callback=given_files, help="a file of kind programs: the frames of TOOL_DATA[3] and other names"),
     ] = None,
     scene: SceneFile = None,
     verdicts: Annotated[
-        bool, typer.Option("--verdicts", help="a line for each motion, also for those that pass")
+        bool, typer.Option("--verdicts", help="print a line for each motion, also for those that pass")
     ] = False,
-    sarif: Annotated[Path | None, typer.Option(help="write SARIF 2.1.0 to this file")] = None,
+    sarif: Annotated[Path | None, typer.Option(help="write the findings as SARIF 2.1.0 to this file")] = None,
     most_motions: Annotated[
-        int, typer.Option(help="how many motions are checked; of the rest the targets", min=1)
+        int, typer.Option(help="how many motions are checked in full; of later ones only the targets", min=1)
     ] = 1_000,
     seconds: Annotated[
-        float, typer.Option(help="time for all files, compiling aside; what is not examined then is named", min=1)
+        float, typer.Option(help="time limit for all files, without compiling; what was not examined is listed", min=1)
     ] = 30.0,
-    fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings from this level on")] = FailOn.fail,
+    fail_on: Annotated[FailOn, typer.Option(help="exit code 1 for findings of this level or worse")] = FailOn.fail,
     as_json: AsJson = False,
 ):
-    """Check what programs make an arm do, motion by motion: file:line: level: message [code]."""
+    """Check each motion of robot programs. Findings are lines: file:line: level: message \\[code]."""
     from er3a.collision.distances import search_boxes
     from er3a.files.program_file import load_programs
     from er3a.files.robot_library import load_robot
@@ -111,7 +109,7 @@ def check_program(
         raise typer.Exit(1)
 
 
-program_app = typer.Typer(help="Robot programs, written from paths.", no_args_is_help=True)
+program_app = typer.Typer(help="Write robot programs from paths.", no_args_is_help=True)
 app.add_typer(program_app, name="program", rich_help_panel=PROGRAMS)
 
 
@@ -120,16 +118,16 @@ def write(
     paths: Annotated[Path, typer.Argument(callback=given_files, help="a path file")],
     *,
     robot: RobotOption,
-    language: Annotated[LanguageName, typer.Option(help="the controller's language, or a table over time")],
-    output: Annotated[Path, typer.Option(help="the folder that the programs are written to")] = Path("programs"),
-    only: Annotated[list[str] | None, typer.Option(help="name of a path; all if absent")] = None,
+    language: Annotated[LanguageName, typer.Option(help="the program language, or csv for a table over time")],
+    output: Annotated[Path, typer.Option(help="folder for the programs")] = Path("programs"),
+    only: Annotated[list[str] | None, typer.Option(help="name of a path; can be repeated (default: all)")] = None,
     scene: SceneFile = None,
     unsafe: Annotated[
-        bool, typer.Option("--unsafe", help="write paths that are not safe too, and say so in the file")
+        bool, typer.Option("--unsafe", help="also write paths that are not safe, with a warning in the file")
     ] = False,
 ):
-    """Write the paths of a file as programs; exit code 1 where one is refused as not safe, or loses a motion or the
-    speeds that its file gives."""
+    """Write the paths of a file as programs. Exit code 1 if a path is not safe (refused), or if a motion or a
+    given speed is lost."""
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
     from er3a.pipeline.messages.expectations import outcome_word
@@ -140,7 +138,7 @@ def write(
 
     arm, around = load_robot(robot), load_scene(scene) if scene else None
     refused = 0
-    with shown_work(f"{paths}: each path is judged"):
+    with shown_work(f"{paths}: checking each path"):
         programs = list(programs_of(paths, arm, language, around, only, unsafe))
     for made in programs:
         if made.files is None:

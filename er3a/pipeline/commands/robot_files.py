@@ -1,4 +1,4 @@
-"""Robot files and what belongs to them: in from URDF and out to it, corrected by measurements, schemas."""
+"""Commands for robot files: URDF import and export, calibration, hand-eye, meshes, schemas."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class FixedPlacement(StrEnum):
-    """What a calibration takes from the robot's file."""
+    """What a calibration keeps as the robot file has it."""
 
     BASE = "base"
     TOOL = "tool"
@@ -37,28 +37,28 @@ class FixedPlacement(StrEnum):
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
 def import_urdf(
-    file: Annotated[Path, typer.Argument(help="a URDF of a serial arm, or xacro")],
+    file: Annotated[Path, typer.Argument(help="a URDF or xacro of a serial arm")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
     *,
-    base: Annotated[str | None, typer.Option(help="the link at which the arm begins; the root by default")] = None,
-    tip: Annotated[str | None, typer.Option(help="the link at which it ends, if the file leaves a choice")] = None,
+    base: Annotated[str | None, typer.Option(help="the link at which the arm begins (default: the root)")] = None,
+    tip: Annotated[str | None, typer.Option(help="the link at which the arm ends, if there are several ends")] = None,
     references: Annotated[
-        Path | None, typer.Option(help="also write what the URDF says as a reference set: a new folder")
+        Path | None, typer.Option(help="also write the URDF's data as a reference set into this new folder")
     ] = None,
-    snap: Annotated[bool, typer.Option(help="take angles within 1e-4 rad of a right angle for it, and say so")] = False,
+    snap: Annotated[bool, typer.Option(help="round angles within 1e-4 rad of a right angle, with a note")] = False,
     split: options.Split = False,
     xacro: options.Xacro = None,
     as_json: options.AsJson = False,
 ):
-    """Derive a robot file (D-H table, directions, offsets, limits) from a URDF's axes."""
+    """Write a robot file (D-H table, directions, offsets, limits) from a URDF."""
     from er3a.files.arm_file import write_urdf_references
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
     from er3a.formats.urdf_tree import plain_urdf
     from er3a.robots.robot import robot_name
 
-    with shown_work(f"{file}: the arm is read") as at, plain_urdf(file, xacro or ()) as plain:
-        shown = split and (lambda mesh: at(f"{mesh}: split into convex pieces"))
+    with shown_work(f"{file}: reading the arm") as at, plain_urdf(file, xacro or ()) as plain:
+        shown = split and (lambda mesh: at(f"{mesh}: splitting into convex pieces"))
         imported = read_urdf(plain, base=base, tip=tip, snap=snap, split=shown)
         if references:
             write_urdf_references(plain, references, base=base, tip=tip)
@@ -76,7 +76,7 @@ def import_urdf(
     print(f"{output}: written; differs from the URDF by at most {imported.misfit_m * 1000:.2g} mm on random poses")
     if references:
         print(
-            f"{references}: references written; `references: [{references.name}]` in a robot file holds it against them"
+            f"{references}: references written; `references: [{references.name}]` in a robot file compares it with them"
         )
 
 
@@ -84,7 +84,9 @@ def import_urdf(
 def export_urdf(
     robot: options.AnyRobot,
     output: Annotated[Path, typer.Option(help="the URDF to write")],
-    srdf: Annotated[Path | None, typer.Option(help="also write what MoveIt needs: pairs of links not to check")] = None,
+    srdf: Annotated[
+        Path | None, typer.Option(help="also write an SRDF for MoveIt: the pairs of links not to check")
+    ] = None,
 ):
     """Write a robot as URDF."""
     from er3a.files.kept_files import write_atomically
@@ -105,11 +107,13 @@ def export_urdf(
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
 def import_calibration(
-    file: Annotated[Path, typer.Argument(help="a Universal Robots calibration.conf, or extract_calibration's YAML")],
+    file: Annotated[
+        Path, typer.Argument(help="calibration.conf of a Universal Robots arm, or the YAML of extract_calibration")
+    ],
     robot: Annotated[str, typer.Option(help="the arm's nominal table: a robot's name or file")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
 ):
-    """Make a robot file of a factory's own calibration; d of many metres that cancel become Hayati's rows."""
+    """Write a robot file from a factory calibration; huge d values that cancel become Hayati parameters."""
     from er3a.files.factory_calibration import load_factory_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
@@ -122,18 +126,18 @@ def import_calibration(
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
 def mesh(
     file: Annotated[Path, typer.Argument(help="a closed mesh: STL, OBJ, DAE or GLB")],
-    unit: Annotated[Unit, typer.Option(help="of the mesh's lengths: m or mm")],
+    unit: Annotated[Unit, typer.Option(help="unit of the mesh's lengths: m or mm")],
     output: Annotated[Path, typer.Option(help="the file of convex pieces to write, .json")],
-    threshold: Annotated[float, typer.Option(min=0.01, max=1, help="concavity that may be left in a piece")] = 0.05,
-    seed: Annotated[int, typer.Option(min=0, help="of the search for cuts")] = 0,
+    threshold: Annotated[float, typer.Option(min=0.01, max=1, help="greatest concavity left in a piece")] = 0.05,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the search for cuts")] = 0,
     as_json: options.AsJson = False,
 ):
-    """Split a mesh of a link, a tool or an obstacle into convex pieces, for robot and scene files."""
+    """Split a mesh into convex pieces, for robot and scene files."""
     from er3a.files.mesh_import import import_mesh
 
     if output.suffix != ".json":
         raise Er3aError(f"{output}: files of convex pieces end in .json; write --output {output.stem}.json")
-    with shown_work(f"{file}: split into convex pieces"):
+    with shown_work(f"{file}: splitting into convex pieces"):
         found = import_mesh(file, output, unit, threshold, seed)
     if as_json:
         options.print_json(
@@ -141,8 +145,8 @@ def mesh(
         )
         return
     print(f"{output}: written; convex pieces: {len(found.pieces_mm)}, of {found.triangles} triangles")
-    print(f"the mesh stands out of them by at most {found.uncovered_mm:.3g} mm, which is added to them as a margin")
-    print(f"they stand out of the mesh by {found.excess_mm:.3g} mm, as measured")
+    print(f"the mesh sticks out of the pieces by at most {found.uncovered_mm:.3g} mm, added to the pieces as a margin")
+    print(f"the pieces stick out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
 def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequence[FixedName], as_json: bool) -> None:
@@ -158,19 +162,21 @@ def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
     *,
-    output: Annotated[Path | None, typer.Option(help="the robot file to write; none by default")] = None,
-    fixed: Annotated[list[FixedPlacement] | None, typer.Option(help="what the robot's file has right")] = None,
-    held_back: Annotated[Path | None, typer.Option(help="a CSV of positions that the fit is not to see")] = None,
-    plan: Annotated[int, typer.Option(min=0, max=100, help="only say what is settled, and N poses to add")] = 0,
+    output: Annotated[Path | None, typer.Option(help="the robot file to write (default: none)")] = None,
+    fixed: Annotated[
+        list[FixedPlacement] | None, typer.Option(help="values of the robot file to keep; can be repeated")
+    ] = None,
+    held_back: Annotated[Path | None, typer.Option(help="a CSV of positions to test the result, not to fit")] = None,
+    plan: Annotated[int, typer.Option(min=0, max=100, help="only list what is settled and propose N poses")] = 0,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     rrd: Annotated[Path | None, typer.Option(help="also write a recording for the Rerun viewer")] = None,
-    words: Annotated[str, typer.Option("--language", help=f"of the page: {' | '.join(LANGUAGES)}")] = "en",
+    words: Annotated[str, typer.Option("--language", help=f"language of the page: {' | '.join(LANGUAGES)}")] = "en",
     as_json: options.AsJson = False,
 ):
     """Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot file.
 
-    Errors of joints beyond the table (ratio, once and twice a turn, sag) are fitted where poses left out are met
-    better with them; the file has the table that is best without them, and such ratios as its coupling.
+    Joint errors beyond D-H (ratio, once and twice a turn, sag) are fitted if they improve poses left out of the fit.
+    The robot file holds the best table without them, and the ratios as its coupling.
     """
     from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
@@ -199,7 +205,7 @@ def calibrate(
         return
     others = load_measurements(held_back, arm) if held_back else ()
     try:
-        with shown_work(f"{robot}: corrections are estimated"):
+        with shown_work(f"{robot}: estimating corrections"):
             source = file or load_references(measurements, arm)
             found = calibrate_robot(arm, source, [each.value for each in fixed or ()])
     except CalibrationError as error:
@@ -236,12 +242,14 @@ def hand_eye(
     file: Annotated[
         Path, typer.Argument(callback=options.given_files, help="a calibration set (YAML, kind: hand_eye)")
     ],
-    robot: Annotated[str | None, typer.Option(help="whose table turns joint angles into poses: a name or file")] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="the robot that was used, if the samples hold joint angles: a name or file")
+    ] = None,
     as_json: options.AsJson = False,
 ):
-    """Estimate where a camera is, with 95 % intervals, and name the samples and conventions that can't be right.
+    """Estimate the pose of a camera, with 95 % intervals; name samples and conventions that can't be right.
 
-    Ends with code 1 if the calibration can't be used.
+    Exit code 1 if the calibration can't be used.
     """
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
@@ -254,15 +262,15 @@ def hand_eye(
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
     arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
-    with shown_work(f"{file}: the samples are read") as at:
+    with shown_work(f"{file}: reading the samples") as at:
         samples, offset, images = read_calibration(file, arm)
         open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
-        at(f"{file}: the camera's pose is estimated")
+        at(f"{file}: estimating the camera's pose")
         try:
             found = calibrate_hand_eye(samples)
         except HandEyeError as error:
             raise Er3aError(f"{file}: {say(error.finding)}") from None
-        at(f"{file}: the table's corrections are estimated")
+        at(f"{file}: estimating corrections of the table")
         table = correct_table(found, arm, asked) if arm and asked else None
     boardless = images.boardless if images else ()
     if as_json:
@@ -280,10 +288,10 @@ def hand_eye(
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
 def schema(
-    folder: Annotated[Path, typer.Option(help="where the schemas of input files go")] = Path("config"),
-    docs: Annotated[Path, typer.Option(help="where the documents about results go")] = Path("docs/results"),
+    folder: Annotated[Path, typer.Option(help="folder for the schemas of input files")] = Path("config"),
+    docs: Annotated[Path, typer.Option(help="folder for the documents about results")] = Path("docs/results"),
 ):
-    """Write the JSON schemas of input files and of results, and the dictionary of all tables."""
+    """Write the JSON schemas of input files and results, and the data dictionary."""
     from er3a.pipeline.check import SCHEMAS
     from er3a.pipeline.dictionary import data_dictionary, summary_schema
 

@@ -1,4 +1,4 @@
-"""One job each: what the rules of the workflow call, and a person may call by hand."""
+"""Commands for single jobs, called by the rules of the workflow; they can be called by hand too."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from er3a.pipeline.study import Study, load_study
 @options.app.command(rich_help_panel=options.JOBS)
 def sample(
     robot: options.RobotName,
-    part: Annotated[str, typer.Option(help="which part of the blocks, e.g. 2-of-4")],
-    output: Annotated[Path, typer.Option(help="the part's file")],
+    part: Annotated[str, typer.Option(help="the part of the blocks, e.g. 2-of-4")],
+    output: Annotated[Path, typer.Option(help="the file to write")],
     study: options.StudyFile = options.DEFAULT_STUDY,
 ):
-    """Draw one part of the workspace's seeded sample blocks."""
+    """Draw one part of the workspace stage's random samples."""
     number, _, count = part.partition("-of-")
     if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
         raise Er3aError(f"--part is '{part}'; expected for example 2-of-4")
@@ -37,12 +37,12 @@ def compute(
     stage: options.StageName,
     robot: options.RobotName,
     parts: Annotated[
-        list[Path] | None, typer.Argument(help="workspace only: sampled parts; drawn here if absent")
+        list[Path] | None, typer.Argument(help="workspace only: files of sampled parts (default: drawn now)")
     ] = None,
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
 ):
-    """Compute a stage's numbers: tables and summary.json."""
+    """Compute a stage: tables and summary.json."""
     from er3a.pipeline.stages import run
 
     loaded, folder = _folder(study, results, robot, stage)
@@ -60,9 +60,9 @@ def record(
     results: options.Results = options.DEFAULT_RESULTS,
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
-    """Write a stage's Rerun recording from its results, in English: the viewer has no other letters.
+    """Write a stage's Rerun recording from its results (always in English).
 
-    The viewer draws it as a picture for the stage's page; of the many variants of a sweep the picture stays empty.
+    The viewer also draws it as a picture for the stage's page. For variants of a sweep the picture stays empty.
     """
     from er3a.pipeline.results import write_checksum
     from er3a.pipeline.stages import run
@@ -103,15 +103,19 @@ def report(
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
 def teach(
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study, or a table or URDF")],
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="a robot of the study, or a robot file, D-H table or URDF")
+    ],
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
     reports: options.Reports = options.DEFAULT_REPORTS,
-    output: Annotated[Path | None, typer.Option(help="the page, for a file; else NAME.html")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="the page to write, if ROBOT is a file (default: NAME.html)")
+    ] = None,
 ):
-    """Write a robot's teach panel: sliders, the arm in 3-D, its pose and all IK solutions of it, in one page.
+    """Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.
 
-    A file (.csv with a D-H table, .yaml, .urdf) needs no study: its page is written into this folder.
+    A file (.csv with a D-H table, .yaml, .urdf) needs no study: its page is written into the current folder.
     """
     from er3a.files.arm_file import READ
     from er3a.pipeline.results import write_checksum
@@ -121,14 +125,16 @@ def teach(
         _teach_file(robot, output or Path(f"{Path(robot).stem}.html"))
         return
     if output is not None:
-        raise Er3aError("--output is for a file; the panel of a robot of the study is one of its pages")
+        raise Er3aError(
+            "--output needs a file as ROBOT; the panel of a robot of the study is written to the reports folder"
+        )
     page = reports / robot / "teach.html"
     write_teach_page(_study_to_show(study), robot, results, page)
     write_checksum(page)
 
 
 def _teach_file(source: str, page: Path) -> None:
-    """Write the panel of an arm that stands in a file."""
+    """Write the panel of an arm that is given as a file."""
     from er3a.files.arm_file import read_arm
     from er3a.files.kept_files import sha256
     from er3a.pipeline.code_digest import code_digest
@@ -150,7 +156,7 @@ def index(
     results: options.Results = options.DEFAULT_RESULTS,
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
-    """Write the pages over all robots and stages: the index and the comparison of two robots."""
+    """Write the index and the page that compares two robots."""
     from er3a.pipeline.results import OVERALL, write_checksum
     from er3a.pipeline.viewing.figures import house_style
     from er3a.pipeline.viewing.index import write_index
@@ -170,7 +176,7 @@ def article(
     results: options.Results = options.DEFAULT_RESULTS,
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
-    """Write the page on the article from results; `er3a run --study config/article.yaml` computes these too."""
+    """Write the page on the article from results; `er3a run --study config/article.yaml` also computes them."""
     from er3a.pipeline.article.article_page import write_article
     from er3a.pipeline.results import write_checksum
 
@@ -183,7 +189,7 @@ def article(
 
 
 def _study_to_show(file: Path) -> Study:
-    """A study whose language is the one that pages are written in from here on."""
+    """Load a study and set the language of pages to the study's."""
     study = load_study(file)
     language.use(study.report.language, study.own_titles())
     return study

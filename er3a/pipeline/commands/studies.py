@@ -1,4 +1,4 @@
-"""A study from start to end: made, checked, run, looked at, compared, packed."""
+"""Commands for a study: new, check, run, verdicts, view, diff, archive."""
 
 from __future__ import annotations
 
@@ -26,31 +26,35 @@ if TYPE_CHECKING:
 
 @options.app.command(rich_help_panel=options.FIRST)
 def new(
-    folder: Annotated[Path, typer.Argument(help="where the study is written; no file that is there is touched")],
+    folder: Annotated[Path, typer.Argument(help="folder to write the study into; existing files are kept")],
     *,
     urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF or xacro")] = None,
     xacro: options.Xacro = None,
-    base: Annotated[str | None, typer.Option(help="the URDF's link at which the arm begins")] = None,
-    tip: Annotated[str | None, typer.Option(help="the URDF's link at which the arm ends")] = None,
+    base: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm begins")] = None,
+    tip: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm ends")] = None,
     split: options.Split = False,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
-    robot: Annotated[str | None, typer.Option(help="the arm, by the name or the file of a robot of er3a")] = None,
-    name: Annotated[str | None, typer.Option(help="the robot's name in the study; by default that of its file")] = None,
-    convention: Annotated[Convention | None, typer.Option(help="of the table of --dh; standard if none")] = None,
-    length_unit: Annotated[LengthUnit | None, typer.Option(help="of that table, where its columns don't say")] = None,
+    robot: Annotated[str | None, typer.Option(help="the arm, as the name or file of an er3a robot")] = None,
+    name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: the file's name)")] = None,
+    convention: Annotated[
+        Convention | None, typer.Option(help="D-H convention of the table (default: standard)")
+    ] = None,
+    length_unit: Annotated[
+        LengthUnit | None, typer.Option(help="unit of the table's lengths, if its columns don't say")
+    ] = None,
     angle_unit: Annotated[
-        AngleUnit | None, typer.Option(help="of that table, where its columns don't say; deg if not given")
+        AngleUnit | None, typer.Option(help="unit of the table's angles, if its columns don't say (default: deg)")
     ] = None,
 ):
-    """Write a study to start from: robot file, targets and paths that the arm can do, a scene, a README."""
+    """Write a study for an arm: robot file, scene, targets and paths that the arm can do, README."""
     from er3a.pipeline.new_study.write import arm_of, write_study
 
     ends, arguments = (base, tip), tuple(xacro or ())
-    with shown_work(f"{folder}: the arm is read") as at:
-        shown = split and (lambda mesh: at(f"{mesh}: split into convex pieces"))
+    with shown_work(f"{folder}: reading the arm") as at:
+        shown = split and (lambda mesh: at(f"{mesh}: splitting into convex pieces"))
         form: Any = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
         arm = arm_of(urdf, dh, robot, name=name, ends=ends, xacro=arguments, split=shown, **form)
-        at(f"{folder}: targets and paths that the arm can do are looked for")
+        at(f"{folder}: searching for targets and paths that the arm can do")
         written = write_study(arm, folder)
     for note in (*arm.notes, *written.missing):
         options.print_note(note)
@@ -69,7 +73,7 @@ def check(
     ],
     as_json: options.AsJson = False,
 ):
-    """Check input files and say of each what it is, or what is wrong with it."""
+    """Check input files: print the kind of each file, or its error."""
     from er3a.files.robot_library import load_robot
     from er3a.pipeline.check import check_file, stage_forms
 
@@ -97,12 +101,13 @@ def check(
 @options.app.command(rich_help_panel=options.FIRST, context_settings={"ignore_unknown_options": True})
 def run(
     words: Annotated[
-        list[str] | None, typer.Argument(metavar="[SNAKEMAKE]...", help="files to make, and options of Snakemake")
+        list[str] | None,
+        typer.Argument(metavar="[SNAKEMAKE]...", help="stages or files to make, and options of Snakemake"),
     ] = None,
     study: options.StudyFile = options.DEFAULT_STUDY,
-    fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for verdicts from this one on")] = None,
+    fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for this verdict or a worse one")] = None,
 ):
-    """Carry out the study of this folder; what is done already is not done again."""
+    """Run the study in this folder; finished parts are not run again."""
     from er3a.pipeline.run_study import run_study
     from er3a.pipeline.verdicts import read_verdicts
 
@@ -116,10 +121,10 @@ def run(
 def verdicts(
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
-    fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for verdicts from this one on")] = None,
+    fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for this verdict or a worse one")] = None,
     as_json: options.AsJson = False,
 ):
-    """Say what a finished study came to: the verdict of each stage of each robot."""
+    """Print the verdict of each stage of each robot."""
     from er3a.pipeline.verdicts import read_verdicts
 
     found = read_verdicts(load_study(study), results)
@@ -136,14 +141,14 @@ def verdicts(
 
 
 def _end_with_findings(found: Sequence[StageVerdict], level: options.FailOn) -> None:
-    """Name the findings at a level, and end with 1 if there are any."""
+    """Print the verdicts at a level or worse, and end with exit code 1 if there are any."""
     counted = [verdict for verdict in found if verdict.counts(level.value)]
     skipped = Counter(verdict.status.replace("_", " ") for verdict in found if verdict.is_skipped)
     if skipped:
         named = ", ".join(f"{count} {status}" for status, count in skipped.items())
         options.print_note(f"neither passed nor failed: {named}, of {len(found)} stages")
     if shown := [f"{verdict.robot}, {verdict.stage}" for verdict in found if verdict.is_demonstration]:
-        options.print_note(f"as expected, and counted apart: {'; '.join(shown)}")
+        options.print_note(f"demonstrations, which fail as expected and do not count: {'; '.join(shown)}")
     for verdict in counted:
         status = verdict.status.replace("_", " ")
         expected = f"; expected: {verdict.expected}" if verdict.is_otherwise else ""
@@ -157,7 +162,7 @@ def view(
     robot: options.SomeRobot = None,
     reports: options.Reports = options.DEFAULT_REPORTS,
 ):
-    """Open the recordings in the Rerun viewer; where there is no desktop, serve them to a browser."""
+    """Open the recordings in the Rerun viewer, or, without a desktop, serve them to a browser."""
     from er3a.pipeline.results import check_checksum
     from er3a.pipeline.viewing.viewer import has_display, serve, viewer_command, without_statistics
 
@@ -177,12 +182,12 @@ def view(
 @options.app.command(rich_help_panel=options.FIRST)
 def diff(
     old: Annotated[Path, typer.Argument(help="a results folder")],
-    new: Annotated[Path, typer.Argument(help="another results folder")],
-    output: Annotated[Path | None, typer.Option(help="also write them as a page")] = None,
+    new: Annotated[Path, typer.Argument(help="the results folder to compare with it")],
+    output: Annotated[Path | None, typer.Option(help="also write the differences as a page")] = None,
     words: Annotated[str, typer.Option("--language", help=" | ".join(language.LANGUAGES))] = "en",
     as_json: options.AsJson = False,
 ):
-    """Compare two results folders: verdicts, key figures and tables that moved. Exit code 1 if anything differs."""
+    """List the differences of two results folders: verdicts, key figures, tables. Exit code 1 if there are any."""
     from er3a.pipeline.viewing.diff import COLUMNS, changes, write_diff
 
     if words not in language.LANGUAGES:

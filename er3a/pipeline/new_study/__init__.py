@@ -1,1 +1,1 @@
-"""A study to start from, written for an arm that a person brings."""
+"""``er3a new``: a study for a user's arm."""

@@ -1,8 +1,8 @@
-"""A study's files: found out, then written where none of them stands yet.
+"""Finds targets and paths for a new study, and writes its files; existing files are kept.
 
-Targets that an arm reaches and paths that it can do are found by the judgement of the inverse and trajectory stages.
-Poses are looked for above the scene's table with the tool straight down first, then at joint values drawn within the
-limits that are away from singular poses and clear of collisions. What is written is what was tried: millimetres and
+Targets that the arm reaches and paths that it can do are found with the checks of the inverse and trajectory stages.
+Poses are searched above the scene's table with the tool straight down, then at random joint values within the limits,
+away from singular poses and clear of collisions. The written values are those that were tested: millimetres and
 degrees, rounded before they are solved, with the joint values as reference that make the inverse stage choose them.
 """
 

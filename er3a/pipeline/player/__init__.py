@@ -1,1 +1,1 @@
-"""The player: motions of an arm that a page plays, offline, with the teach panel's drawing code."""
+"""The player: plays motions of an arm on a page, offline, with the teach panel's drawing code."""

@@ -1,4 +1,4 @@
-"""Motions of an arm as a page's player and a recording show them: joint values over time, what happens meanwhile."""
+"""Motions for the player and the recording: joint values over time, and events."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page's player is given: an arm, what stands around it, and its motions as joint values."""
+"""The data for a page's player: an arm, its scene, and its motions as joint values."""
 
 from __future__ import annotations
 

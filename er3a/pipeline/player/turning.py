@@ -1,6 +1,6 @@
-"""A figure in space that turns: clouds, lines and surfaces in layers, drawn by the page itself.
+"""3-D figures that can be rotated: clouds, lines and surfaces in layers, drawn by the page itself.
 
-It is painted as the player paints an arm, on a plain canvas, so that a page carries no library for it.
+They are drawn like the player's arm, on a plain canvas, so that a page carries no 3-D library.
 """
 
 from __future__ import annotations

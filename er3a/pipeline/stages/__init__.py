@@ -1,1 +1,1 @@
-"""One folder a stage: compute (numbers), record (Rerun), report (HTML). A stage never imports another."""
+"""One folder per stage: compute (numbers), record (Rerun), report (HTML). A stage never imports another."""

@@ -1,4 +1,4 @@
-"""What targets, paths, programs and objects are said to come to, against what they came to: findings of stages."""
+"""Expected against actual outcomes of targets, paths, programs and objects: findings of stages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stages did not examine: what settings, inputs and limits leave out of their verdicts."""
+"""What stages did not examine because of settings, inputs and limits."""
 
 from __future__ import annotations
 

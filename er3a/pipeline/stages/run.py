@@ -1,4 +1,4 @@
-"""The verbs of a stage, as the command line calls them."""
+"""Runs the verbs of a stage for the command line: compute, record, report."""
 
 from __future__ import annotations
 

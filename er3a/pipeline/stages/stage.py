@@ -1,4 +1,4 @@
-"""What the pipeline needs to know of a stage; its folder holds the rest."""
+"""The description of a stage for the pipeline; its folder holds the rest."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The teach panel: one page in which a person moves the arm; its kinematics run in the browser."""
+"""The teach panel: one page to move the arm; its kinematics run in the browser."""

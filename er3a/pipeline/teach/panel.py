@@ -1,4 +1,4 @@
-"""The teach panel's page: a robot's table, the words and the scripts, put into one file that works offline."""
+"""Writes the teach panel's page: robot, texts and scripts in one file that works offline."""
 
 from __future__ import annotations
 

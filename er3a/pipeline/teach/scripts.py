@@ -1,4 +1,4 @@
-"""Scripts of a page as addresses of their own: a page opened from a disk may not import other files."""
+"""Scripts of a page as data addresses, because a page opened from a disk may not import other files."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What recordings and reports share. Nothing here computes a result."""
+"""Shared by recordings and reports. Nothing here computes a result."""

@@ -1,7 +1,7 @@
-"""An arm and what stands around it, drawn for recordings: solid links, joints as drums on their axes, the tool frame.
+"""Draws an arm and its scene in recordings: solid links, joints as drums on their axes, the tool frame.
 
 Entities below ``entity`` (``arm`` by default): ``base``, ``link_1`` .. ``link_6`` (each turns with its joint) and
-``tool``. Bodies that collisions are measured with and solids of scenes are shapes of their own.
+``tool``. Collision bodies and scene solids are separate shapes.
 """
 
 from __future__ import annotations

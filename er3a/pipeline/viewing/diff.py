@@ -1,4 +1,4 @@
-"""What moved between two results folders: verdicts, key figures, the table's entries, borders, and files."""
+"""Differences of two results folders: verdicts, key figures, the table's entries, borders, and files."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Matplotlib figures as SVG images for the pages.
 
-What the pointer reads in a figure of a page: where its axes stand, their scales, and which curves have which name.
+Data for the pointer in a figure: the place and scale of its axes, and the names of its curves.
 
-Points of curves aren't repeated here: the script reads them from the drawing itself, by the names given to its parts.
+Points of curves are not repeated: the script reads them from the drawing itself, by the names of its parts.
 """
 
 from __future__ import annotations

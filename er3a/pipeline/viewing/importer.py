@@ -1,8 +1,8 @@
-"""``rerun-importer-er3a``: what Rerun's viewer calls, so that ``rerun arm.yaml`` shows the arm.
+"""``rerun-importer-er3a``: called by Rerun's viewer, so that ``rerun arm.yaml`` shows the arm.
 
-The viewer tries every program on the path whose name begins so on the files that it is asked to open [1]_. It
-hands over the file and the ids of the recording, reads a recording from standard output, and takes the exit code 66 for
-"this is no file of mine".
+When it opens a file, the viewer calls every program on the path whose name begins with ``rerun-importer-`` [1]_. It
+passes the file and the ids of the recording, and reads a recording from standard output. Exit code 66 means "not my
+file type".
 
 References
 ----------

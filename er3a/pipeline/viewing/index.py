@@ -1,9 +1,9 @@
 """The pages over all robots: the index (robots x stages, verdicts and key figures) and the comparison of two.
 
-Variants of a sweep stand in the section of their sweep only.
+Variants of a sweep are listed only in the section of their sweep.
 
-A study's verdicts as a JUnit report, which any continuous integration shows: a suite for each robot, a case for each
-stage. Its elements and attributes are those that Jenkins' schema ``junit-10.xsd`` knows.
+A study's verdicts as a JUnit report for continuous integration: a suite for each robot, a case for each stage. Elements
+and attributes follow Jenkins' schema ``junit-10.xsd``.
 """
 
 from __future__ import annotations

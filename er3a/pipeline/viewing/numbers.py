@@ -1,4 +1,4 @@
-"""Numbers as people read them."""
+"""Formatting of numbers on pages."""
 
 from __future__ import annotations
 

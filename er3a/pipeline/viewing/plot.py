@@ -1,4 +1,4 @@
-"""An arm drawn with Matplotlib, in a window or a notebook: one pose, or a motion with the tool's trail."""
+"""Draws an arm with Matplotlib, in a window or a notebook: one pose, or a motion with the tool's trail."""
 
 from __future__ import annotations
 
@@ -28,21 +28,20 @@ def plot(robot: Robot, q: Reals, seconds: float = 5.0, window: Sequence[float] |
 
     Parameters
     ----------
-    q : (n,), rad or m: a figure; (N, n): an animation with the tool's trail, which a notebook plays
-    seconds : how long the animation lasts
-    window : (6,), m, what the axes show: smallest and largest x, y, z, as ``workspace`` of the Robotics Toolbox; None
-        for all of the motion
+    q : (n,), rad or m, for a figure; (N, n) for an animation with the tool's trail
+    seconds : duration of the animation
+    window : (6,), m, range of the axes: smallest and largest x, y, z, as ``workspace`` of the Robotics Toolbox; None
+        for the range of the motion
 
     Returns
     -------
-    drawn : a figure or an animation of Matplotlib: a notebook shows it, in a script ``plt.show()`` of
-        ``matplotlib.pyplot`` opens it (an animation has to be kept in a name until then); ``.savefig`` or ``.save``
-        writes it
+    drawn : a Matplotlib figure or animation. A notebook shows it; in a script call ``matplotlib.pyplot.show()`` (keep
+        the animation in a variable until then). ``.savefig`` or ``.save`` writes it to a file
 
     Raises
     ------
     ShapeError
-        if q is neither, or the window does not have six numbers
+        if q has another shape, or the window does not have six numbers
     """
     edges = None if window is None else as_floats(np.asarray(window), "window")
     if edges is not None and edges.shape != (6,):

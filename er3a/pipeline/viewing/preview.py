@@ -1,4 +1,4 @@
-"""A picture of a recording as it opens, drawn by the real viewer where there is no display either."""
+"""A picture of a recording as it opens, drawn by the real viewer, also without a display."""
 
 from __future__ import annotations
 

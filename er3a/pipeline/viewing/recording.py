@@ -1,6 +1,6 @@
-"""Rerun recordings: an arm and what stands around it, what it does one run after the other, with curves and events.
+"""Rerun recordings: an arm and its scene, its runs one after another, with curves and events.
 
-A stage hands over data; this module lays out the views, times the runs, and writes the file whole or not at all.
+A stage passes data; this module lays out the views, times the runs, and writes the file atomically.
 """
 
 from __future__ import annotations
@@ -322,7 +322,7 @@ def _log_run(stream: rr.RecordingStream, shown: Recorded, run: Run, start: float
 
 
 def _send_curves(stream: rr.RecordingStream, entity: str, times: Reals, values: Reals) -> None:
-    """Curves, with a gap behind the last point, so that the next run's don't join them."""
+    """Curves, with a gap after the last point, so that the next run's don't join them."""
     known: Flags = np.asarray(np.isfinite(values).all(axis=1))
     stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=values[known]))
     gaps = times[~known & np.append(True, known[:-1])]

@@ -1,10 +1,10 @@
-"""Starting the Rerun viewer so that nobody else can reach it and it reports its use to nobody.
+"""Starts the Rerun viewer on the loopback address only and without usage statistics.
 
-Recordings shown in a browser on this machine, for where there is no desktop.
+Shows recordings in a browser on this machine if there is no desktop.
 
-Rerun's own web server would let the viewer in the browser report its use, ask for updates and fetch fonts, and hands
-recordings over without their blueprints. So the viewer's files are taken from it once, and served from here together
-with the recordings, under a policy with which a browser connects to no other address.
+With Rerun's own web server the viewer in the browser would send usage statistics, ask for updates and fetch fonts, and
+recordings would lose their blueprints. So the viewer's files are taken from it once and served from here, together with
+the recordings, under a policy that lets the browser connect to no other address.
 """
 
 from __future__ import annotations

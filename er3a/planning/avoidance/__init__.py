@@ -1,3 +1,3 @@
-"""Singularity avoidance: ``avoidance`` finds the segment of a path that is singular, ``strategies`` has each strategy,
-a function from such a segment to a motion or to why there is none, and compares them.
+"""Singularity avoidance: ``avoidance`` finds the singular segment of a path; ``strategies`` has the strategies and
+compares them. Each is a function from such a segment to a motion, or to the reason why there is none.
 """

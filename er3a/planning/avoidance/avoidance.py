@@ -1,5 +1,5 @@
-"""Where a followed path is singular, nearly so or out of reach, and what a strategy that avoids it yields: a motion, or
-why it can't be carried out or used.
+"""The singular segment of a path (singular, near-singular or out of reach), and the result of an avoidance strategy: a
+motion, or the reason why it is not possible or not usable.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ class SingularSegment:
 
     @cached_property
     def regions(self) -> list[tuple[int, int]]:
-        """Stretches that are not good: index ranges (first, behind the last)."""
+        """Stretches that are not good: index ranges (first, after the last)."""
         return runs(~self.good)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""All strategies of singularity avoidance side by side: what each costs, and which one to take.
+"""All strategies of singularity avoidance: the cost of each, and the recommended one.
 
 Damped least squares: joint speeds stay bounded near a singularity, at the price of leaving the path.
 
@@ -13,12 +13,12 @@ References
 .. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 3.5.2; the damping's course:
    S. Chiaverini et al., IEEE Trans. Control Systems Technology 2(2), 1994, equation 13.
 
-Bend the path past the singular region through a via point, by as little as keeps the distance.
+Bend the path past the singular region through a via point, by the least amount that keeps the distance.
 
-Near a singularity the poses differ from it in a vector of one or two components: how far the tool's axis 6 points
-beside axis 4 (wrist), the wrist centre's distance across axis 1 (shoulder), the elbow's angle. The path runs past the
-origin of that plane; to first order the smallest shift, or the smallest tilt, that moves it away is across its
-direction there. That fixes where to bend; how far is then found on the bent path itself.
+Near a singularity, a pose differs from it by a vector of one or two components: the deviation of axis 6 from axis 4
+(wrist), the wrist centre's distance across axis 1 (shoulder), the elbow's angle. The path runs past the origin of that
+plane; to first order the smallest shift, or the smallest tilt, that moves it away is across its direction there. That
+gives the direction of the bend; its size is found on the bent path itself.
 """
 
 from __future__ import annotations

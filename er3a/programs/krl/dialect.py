@@ -1,4 +1,4 @@
-"""What KRL's motions, frames and functions mean."""
+"""The meaning of KRL's motions, frames and functions."""
 
 from __future__ import annotations
 
@@ -479,7 +479,7 @@ class KrlDialect(Dialect):
         return name in ("$TOOL", "$BASE")
 
     def assigned(self, old: syntax.Value, new: syntax.Value) -> syntax.Value:
-        """A position that leaves out what the variable had: no source tells whether the controller keeps that."""
+        """A position that leaves out what the variable had: no source says whether the controller keeps that."""
         if (
             not isinstance(old, syntax.Record)
             or not isinstance(new, syntax.Record)

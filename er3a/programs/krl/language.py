@@ -1,4 +1,4 @@
-"""KRL among the languages of robot programs."""
+"""KRL's record in the registry of languages."""
 
 from __future__ import annotations
 

@@ -185,8 +185,8 @@ def read_rpl(source: ProgramText) -> syntax.Program:
 
 
 def alike(routines: Iterable[syntax.Routine], data: Iterable[syntax.Assign]) -> Iterator[NotUnderstood]:
-    """Variables that one routine sees, and whose names differ by capital letters alone: no source tells whether they
-    are one."""
+    """Variables that one routine sees, and whose names differ by capital letters alone: no source says whether they are
+    one."""
     shared: dict[str, str] = {}
     parts = [(tuple(data), ()), *((routine.code, routine.parameters) for routine in routines)]
     for code, parameters in parts:

@@ -58,7 +58,7 @@ class UrWords(Words):
         super().__init__(UR, text)
 
     def special(self) -> syntax.Expression | None:
-        """Lists and poses, with an index behind them."""
+        """Lists and poses, with an index after them."""
         found = self._list()
         return None if found is None else self.parts_of(found)
 

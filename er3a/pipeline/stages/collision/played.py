@@ -1,4 +1,4 @@
-"""The paths as page and recording play them: the line between the nearest points, and what overlaps when."""
+"""The paths for player and recording: the line between the nearest points, and overlaps with their times."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What the motors feel, and whether drives and wrist bear it."""
+"""Torques of the motors, and whether drives and wrist can supply and bear them."""

@@ -1,4 +1,4 @@
-"""Compute what the motors of a robot feel along its paths and at rest, and whether drives and wrist bear it."""
+"""Compute the torques of a robot's motors along its paths and at rest, and compare them with drives and wrist."""
 
 from __future__ import annotations
 
@@ -169,11 +169,11 @@ def _no_limits(
 
 @dataclass(frozen=True)
 class LoadedArm:
-    """An arm with what hangs on it.
+    """An arm with its loads.
 
     Attributes
     ----------
-    unit_payload : 1 kg of the payload whose largest mass is asked for
+    unit_payload : 1 kg of the payload whose greatest mass is computed
     links_grade, load_grade : of the masses
     limits : joint speeds and accelerations, partly assumed
     """

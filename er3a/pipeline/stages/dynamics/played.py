@@ -1,4 +1,4 @@
-"""The paths as page and recording play them, with the moment at which each joint feels most."""
+"""The paths for player and recording, with the moment of each joint's greatest torque."""
 
 from __future__ import annotations
 

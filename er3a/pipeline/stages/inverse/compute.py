@@ -73,7 +73,7 @@ def solve_target(
     """Solve, choose, explain; solutions that collide with the scene or with themselves are not chosen.
 
     One of ``many``: only the turn nearest to the reference is kept of each arm. With ``advise`` what would help a pose
-    without solution is looked for: poses where the arm keeps a ``clearance`` (m) and ``LITTLE_MARGIN_DEG``.
+    without solution is searched for: poses where the arm keeps a ``clearance`` (m) and ``LITTLE_MARGIN_DEG``.
     """
     solutions = inverse(robot, target.T, target.q_ref, self_motion_rows=True)
     if many:

@@ -1,4 +1,4 @@
-"""The stage in the registry, and what a study may set of it."""
+"""The stage's entry in the registry, and its settings in a study."""
 
 from __future__ import annotations
 

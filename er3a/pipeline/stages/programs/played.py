@@ -1,4 +1,4 @@
-"""The programs as page and recording play them, line by line."""
+"""The programs for player and recording, line by line."""
 
 from __future__ import annotations
 

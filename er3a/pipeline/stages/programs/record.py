@@ -1,4 +1,4 @@
-"""The recording of programs: the arm carries out each program in turn, with the line that it is at as text."""
+"""The recording of programs: the arm runs each program in turn, with the current line as text."""
 
 from __future__ import annotations
 

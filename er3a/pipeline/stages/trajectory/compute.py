@@ -89,7 +89,7 @@ class AvoidanceTask:
 
         A strategy on whose motion the arm meets its surroundings or itself is not usable. Where the path keeps the
         joints' limits of rates, strategies are timed to need no more of them than the path does, so that none is worse
-        than what it mends. Where it collides or can't be run at all, a motion is planned between its ends.
+        than what it corrects. Where it collides or can't be run at all, a motion is planned between its ends.
         """
         results: list[StrategyResult] = []
         if motion.followed is None:

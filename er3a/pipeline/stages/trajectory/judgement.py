@@ -1,4 +1,4 @@
-"""What is wrong with a motion, where, and the verdict on it."""
+"""The faults of a motion, their places, and the verdict."""
 
 from __future__ import annotations
 
@@ -239,7 +239,7 @@ def clear_until(
 ) -> model.ClearUntil | None:
     """The last point of a motion up to which it keeps a margin (m); None if it meets nothing, or keeps it nowhere.
 
-    The point is looked for on a grid up to the first contact, or to where the motion leaves limits or reach, and
+    The point is searched for on a grid up to the first contact, or to where the motion leaves limits or reach, and
     proven: where the clearance along the motion up to it is less, it is moved back. Of links that touch by design at
     their joint, which have no margin to keep there, those that overlap elsewhere keep half of their first distance.
     """

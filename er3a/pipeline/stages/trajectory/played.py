@@ -1,4 +1,4 @@
-"""The paths as page and recording play them: singular poses, faults, and what touches what."""
+"""The paths for player and recording: singular poses, faults and contacts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Programs of a path, for controllers: written where the path is safe, else refused with the reason."""
+"""Robot programs of a path: written if the path is safe, otherwise refused with the reason."""
 
 from __future__ import annotations
 

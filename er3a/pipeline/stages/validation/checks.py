@@ -1,4 +1,4 @@
-"""A model held against reference sets, number by number, and the verdict that a reader wants of it."""
+"""Comparison of a model with reference sets, number by number, and the verdict."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hold a model against its reference sets, and against itself."""
+"""Compare a model with its reference sets, and check it for consistency."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The part of the page that shows the table with what is known of each of its entries."""
+"""The part of the page that shows the table with the evidence for each entry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the stage's results hold, and which model of a robot they are of."""
+"""The stage's results, and the model of the robot that they describe."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ class PartFound(Finding):
     ----------
     status : the gravest of its entries'
     entries, settled : how many it has that mean something alone, and how many of these are settled outright
-    up_to_signs : how many more are settled but for a sign or half turn, which hangs on what is open elsewhere
+    up_to_signs : how many more are settled but for a sign or half turn, which depends on what is open elsewhere
     contradicted, open : names of such entries
     off : how far the tool could be off for what is weak or open; what only its own document speaks of has no bound
     """

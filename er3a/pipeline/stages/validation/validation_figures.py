@@ -1,4 +1,4 @@
-"""Figures of the validation page; of diagnosis and calibration their sentences, rows and captions besides."""
+"""Figures of the validation page; sentences, rows and captions of diagnosis and calibration."""
 
 from __future__ import annotations
 

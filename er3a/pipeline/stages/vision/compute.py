@@ -456,7 +456,7 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
 def _doubt(
     found: model.CalibrationResult,
 ) -> model.CalibrationDoubtful | model.DirectionContradicted | model.TouchContradicts | None:
-    """Why no grasp may rest on a calibration; None if nothing speaks against it."""
+    """Why no grasp may rest on a calibration; None if nothing contradicts it."""
     if doubts := grave_warnings(found.warnings):
         return model.CalibrationDoubtful(doubts)
     given = found.directions[0]

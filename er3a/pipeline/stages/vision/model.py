@@ -1,4 +1,4 @@
-"""What the stage's results hold."""
+"""The stage's results: summary and tables."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Where the tool point can be: a Monte Carlo cloud, its hull, the cells it touches and the voids it leaves."""
+"""The reach of the tool point: a Monte Carlo cloud, its hull, touched cells and voids."""

@@ -1,4 +1,4 @@
-"""Workspace: gather the samples' tally and work out hull, volumes and voids."""
+"""Workspace: gather the samples' counts and compute hull, volumes and voids."""
 
 from __future__ import annotations
 

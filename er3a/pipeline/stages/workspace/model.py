@@ -1,4 +1,4 @@
-"""What the workspace stage writes: its summary, its tables, and what fills these from what the library found."""
+"""The results of the workspace stage: summary and tables, filled from the library's results."""
 
 from __future__ import annotations
 

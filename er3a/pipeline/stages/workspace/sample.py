@@ -1,4 +1,4 @@
-"""Sampling in parts: each writes the tally of its blocks, and the results don't depend on how many parts there are."""
+"""Sampling in parts: each writes the counts of its blocks; results don't depend on the number of parts."""
 
 from __future__ import annotations
 

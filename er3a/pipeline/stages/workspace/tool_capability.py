@@ -1,9 +1,9 @@
-"""What the tool can do: capability of the cells, dexterous core and places for the box, as the stage writes them.
+"""Capability of the tool: cells, dexterous core and places for the box.
 
-How finely an arm is asked what its tool can do, so that it takes no longer than a time that is stated here.
+The resolution of the capability map, chosen so that it takes no longer than the time stated here.
 
-Arms in closed form are asked as the study says. Where a pose takes tenths of a millisecond and more, rolls and
-directions are fewer and cells are coarser.
+Arms in closed form use the study's resolution. If a pose takes tenths of a millisecond or more, there are fewer rolls
+and directions, and cells are coarser.
 """
 
 from __future__ import annotations
