@@ -330,11 +330,11 @@ def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-ar
 
 
 def first_faults(path: PathSummary) -> list[tuple[float, str]]:
-    """When (s) a path is wrong first, and how; then the gravest fault, if that is a later one. What is undecided counts
-    only where it comes before all that is not."""
+    """When (s) a path is wrong first, and how; then where it leaves reach or limits or collides, or else its gravest
+    fault. What is undecided counts only where it comes before all that is not."""
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
-    kinds: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions, *fast]
-    firsts = [min(each, key=lambda part: part.t0_s) for each in kinds if each]
+    grave: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
+    firsts = [min(each, key=lambda part: part.t0_s) for each in (*grave, *fast) if each]
     found = [(part.t0_s, _until_when(part) if part in path.too_fast else say_first(part.cause)) for part in firsts]
     edge = min((part.t0_s for part in path.unreachable), default=math.inf) - AT_EDGE
     events = [] if path.in_joint_space else [each for each in path.singularities if each.crossing and each.t_s < edge]
@@ -343,7 +343,7 @@ def first_faults(path: PathSummary) -> list[tuple[float, str]]:
     open_ = min(path.undecided, key=lambda part: part.t0_s, default=None)
     if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
         found.append((open_.t0_s, cause_text(path, open_)))
-    return sorted({min(found), found[0]}) if found else []
+    return sorted({*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]})
 
 
 def _until_when(part: Stretch[RateCause]) -> str:

@@ -76,7 +76,7 @@ WORDS: dict[str, Any] = {
     "angle": N_("{degrees} degrees"),
     "way": N_("{degrees} millimetres"),
     "endless_joint": N_("turns without end"),
-    "room": N_("{room} from its limit"),
+    "room": N_("{room} to limit"),
     "at_limit": N_("at its limit"),
     "outside": N_("{joint} stays between {lower} and {upper}."),
     "no_number": N_("{joint} needs a number, in degrees."),
