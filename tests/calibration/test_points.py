@@ -612,10 +612,22 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
 
 
+@pytest.mark.parametrize(("name", "term", "poses"), [("seven", 0, 70), ("six", 1, 70)])
+def test_few_poses_find_a_term_without_trying_all(name, term, poses, random):
+    """Couplings are many: without them measurements are enough for the others, or for ratios."""
+    own, coefficients = TERMS[term]
+    bench = Bench(name, random, {own: coefficients})
+    found = er3a.calibrate(bench.robot, bench.measured(poses, 0.05))
+    terms = found.beyond.terms if found.beyond else found.ratios
+    assert [(each.kind, each.joint) for each in terms] == [(own.kind, own.joint)]
+    assert "coupling" not in {each.kind for each in found.tried}
+    assert bench.error(found) < 0.06
+
+
 @pytest.mark.parametrize("poses", [130, 80])
 def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(poses, random, tmp_path):
-    """J4 turns a little with J2; the arm's coupling holds it, beside that which it has. From few poses only what the
-    file can hold is tried."""
+    """J4 turns a little with J2; the arm's coupling holds it, beside that which it has. From few poses other terms are
+    tried without couplings, and are left where they would stand for one."""
     bench = Bench("six", random, {JointTerm("coupling", 4, by=2): [1e-3]})
     found = er3a.calibrate(bench.robot, bench.measured(poses, 0.02))
     for terms in (found.ratios, found.beyond.terms if poses > 100 else found.ratios):
