@@ -129,19 +129,29 @@ def left_of_touched(robot: Robot, observations: Observations) -> float:
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
-    """The longest length of the table that moves the points, which is taken as it is; None where coordinates or lengths
-    were measured, or joints have slid while a place or plane was touched."""
+    """The longest length of the table that moves the points as nothing else does, which is taken as it is; None where
+    coordinates or lengths were measured, or joints have slid while a place or plane was touched."""
     if observations.has_scale:
         return None
     lengths = parameters_of(robot, "lengths")
     effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
     moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
-    longest = max(moving, key=lambda entry: abs(entry.nominal(robot)), default=None)
+    alone = [entry for entry in moving if not _replaceable(robot, entry, observations)] or moving
+    longest = max(alone, key=lambda entry: abs(entry.nominal(robot)), default=None)
     if longest is None:
         return None
     slid, off = observations.slid(robot), observations.predict(robot, (), np.zeros((1, 0)))[0]
     least = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
     return longest if np.linalg.norm(slid) < least else None
+
+
+def _replaceable(robot: Robot, entry: Parameter, observations: PointObservations) -> bool:
+    """Whether others move the points as a length does: it can be as it is then, and all shrink to a point."""
+    every = (*placements_of(observations.free), *parameters_of(robot, "all_entries"))
+    J = jacobian(robot, [entry, *(each for each in every if each != entry)], observations.as_coordinates())
+    own, others = J[:, 0], J[:, 1:] / np.maximum(np.linalg.norm(J[:, 1:], axis=0), 1e-300)
+    rest = own - others @ np.linalg.lstsq(others, own, rcond=DEPENDENT**2)[0]
+    return bool(np.linalg.norm(rest) <= DEPENDENT * np.linalg.norm(own))
 
 
 def without_scale(parameters: Sequence[Parameter], scale: Parameter | None) -> tuple[Parameter, ...]:
