@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from er3a.calibration.observations import Observations, PointObservations, directions, socket
 from er3a.calibration.outcomes import (
@@ -27,6 +28,7 @@ from er3a.calibration.outcomes import (
     SetsScale,
 )
 from er3a.calibration.parameters import (
+    BASE_COLUMNS,
     DEPENDENT,
     MM,
     Parameter,
@@ -51,6 +53,7 @@ LEAST_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
 slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
+LEAST_ALIGNED = 3
 SMALL_SHARE = 0.01  # of a variance: what adds less does not widen its interval
 LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Parameter("offset", 1)
@@ -73,10 +76,13 @@ class Subspace:
     singular_values: Reals
 
 
-def jacobian(robot: Robot, parameters: Sequence[Parameter], observations: Observations) -> Reals:
-    """Derivative (n, p) of observed values (mm) by parameters (m, rad), by central differences; exact to about 1e-8."""
+def jacobian(
+    robot: Robot, parameters: Sequence[Parameter], observations: Observations, amounts: Reals | float = 0.0
+) -> Reals:
+    """Derivative (n, p) of observed values (mm) by parameters (m, rad), where amounts (p,) are added to the robot's, by
+    central differences; exact to about 1e-8."""
     count = len(parameters)
-    steps = STEP * np.concatenate([np.eye(count), -np.eye(count)])
+    steps = amounts + STEP * np.concatenate([np.eye(count), -np.eye(count)])
     values = observations.predict(robot, parameters, steps)
     slopes: Reals = (values[:count] - values[count:]).T / (2 * STEP)
     return slopes
@@ -300,6 +306,24 @@ def bar_lengths(
     return tuple(found)
 
 
+def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations) -> Reals:
+    """Amounts (k,) to start from: the base where it brings the table's points nearest to measured ones, which may be in
+    a frame that stands anywhere."""
+    amounts = np.zeros(len(kept))
+    where = [kept.index(each) for each in placements_of(("base",)) if each in kept]
+    if len(where) == len(BASE_COLUMNS) and isinstance(observations, PointObservations):
+        whole = observations.seen.all(axis=1) & (observations.touched < 0)
+        measured = observations.take(whole).values_mm.reshape(-1, 3) / MM
+        base = np.linalg.inv(robot.base)
+        points = observations.take(whole).positions(robot) @ base[:3, :3].T + base[:3, 3]
+        measured = measured @ base[:3, :3].T + base[:3, 3]
+        if len(points) >= LEAST_ALIGNED:
+            centre, at = measured.mean(axis=0), points.mean(axis=0)
+            turn = Rotation.align_vectors(measured - centre, points - at)[0]
+            amounts[where] = *(centre - turn.apply(at)), *turn.as_euler("ZYX")[::-1]
+    return amounts
+
+
 def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:
     """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
 
@@ -322,20 +346,21 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
         values = with_errors(coefficients).predict(here, kept, nothing)[0]
         return np.concatenate([(values - observations.values_mm) / deviation, prior * coefficients])
 
-    def slopes(here: Robot, coefficients: Reals) -> Reals:
+    def slopes(here: Robot, amounts: Reals, coefficients: Reals) -> Reals:
         seen = with_errors(coefficients)
-        J = jacobian(here, kept, seen) / deviation[:, None]
+        J = jacobian(robot, kept, seen, amounts) / deviation[:, None]
         if not (terms and isinstance(observations, PointObservations) and isinstance(seen, PointObservations)):
             return J
         by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]
         return np.block([[J, by_terms], [np.zeros((len(prior), len(kept))), np.diag(prior)]])
 
     n, k = len(observations), len(kept)
-    unknowns, here = np.zeros(k + len(prior)), robot
+    unknowns = np.r_[_base_at(robot, kept, observations), np.zeros(len(prior))]
+    before = weighted(robot, unknowns[k:])[:n]
+    here = corrected(robot, kept, unknowns[:k])
     rest = weighted(here, unknowns[k:])
-    before = rest[:n]
     for number in range(MOST_STEPS):
-        J = slopes(here, unknowns[k:])
+        J = slopes(here, unknowns[:k], unknowns[k:])
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
         for _ in range(HALVINGS):

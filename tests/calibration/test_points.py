@@ -137,6 +137,15 @@ def test_base_tool_table_and_deviation_are_found_and_no_term_that_is_not_there(n
     assert found.residuals.is_noise
 
 
+def test_a_tracker_s_frame_may_stand_and_be_turned_anywhere(random):
+    bench = Bench("six", random)
+    bench.truth = bench.truth.replace(base=translation(3, -1.5, 0.9) @ rot_x(2.0) @ rot_y(1.1) @ bench.truth.base)
+    found = er3a.calibrate(bench.robot, bench.measured(36, 0.1))
+    assert found.level == "all_entries"
+    assert found.deviation_mm == pytest.approx(0.1, rel=0.2)
+    assert bench.error(found) < 0.15
+
+
 TERMS = [
     (JointTerm("ratio", 2), [2e-3]),
     (JointTerm("once", 4), [1e-3, 1e-3]),
@@ -267,11 +276,15 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert f"held back: 20 positions, {found['held_back']['mean_mm']:.4g} mm off on average" in text
     assert f"at worst (row {found['held_back']['worst_row']})" in text
     assert "tried: J3 coupled to J1" in text
+    assert text.startswith(f"the whole model errs at poses left out by {found['beyond']['left_out']['mean_mm']:.4g} mm")
     alone = found["held_back"]["table_mean_mm"]
     assert alone > found["held_back"]["mean_mm"]
     assert f"as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
     table, model = found["left_out"]["mean_mm"], found["beyond"]["left_out"]["mean_mm"]
     assert f"it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm." in text
+    assert text.index("mine_model.json: written; the whole model: er3a.load_calibration") < text.index("mine.yaml: wri")
+    written = json.loads((tmp_path / "mine_model.json").read_text(encoding="utf-8"))
+    assert written | {"output": None} == found
     mine, rows = load_robot(tmp_path / "mine.yaml"), load_measurements(held, robot)
     model, q = er3a.load_calibration(record, robot), np.radians([row.pose for row in rows])
     for name, T in (("xyz_mm", model.forward(q)), ("table_xyz_mm", er3a.forward(mine, q))):

@@ -99,9 +99,14 @@ Xacro = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, for another program")]
 
 
+def as_json_text(content: Any) -> str:
+    """The same as text."""
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+
+
 def print_json(content: Any) -> None:
     """What another program reads: on standard output, with nothing else."""
-    print(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
+    print(as_json_text(content))
 
 
 def print_note(text: str) -> None:
