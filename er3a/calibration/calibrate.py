@@ -562,7 +562,11 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         for_file = choose_terms(robot, here, table.kept, observations, FOR_ROBOT_FILE)
         table = fit(robot, level.kept, observations, for_file.terms) if for_file.terms else table
     whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
-    if for_file.terms and not all_tried and _error_left_out(observations, whole) >= _error_left_out(observations, table):
+    if (
+        for_file.terms
+        and not all_tried
+        and _error_left_out(observations, whole) >= _error_left_out(observations, table)
+    ):
         choice, whole = ChosenTerms((), ()), table  # they stand for a coupling, which was not tried beside them
     return _Model(observations, level, table, choice, for_file, whole)
 

@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er3a.calibration.observations import Observations, PointObservations, directions, socket
 from er3a.calibration.outcomes import (
@@ -38,6 +37,7 @@ from er3a.calibration.parameters import (
     placements_of,
 )
 from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
+from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
@@ -53,7 +53,7 @@ LEAST_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
 slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
-LEAST_ALIGNED = 3
+LEAST_ALIGNED, FAR = 3, 10.0
 SMALL_SHARE = 0.01  # of a variance: what adds less does not widen its interval
 LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Parameter("offset", 1)
@@ -307,20 +307,23 @@ def bar_lengths(
 
 
 def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations) -> Reals:
-    """Amounts (k,) to start from: the base where it brings the table's points nearest to measured ones, which may be in
-    a frame that stands anywhere."""
+    """Amounts (k,) to start from: where points were measured in a frame far from the base, its place and turn that bring
+    the table's points nearest to them [Kabsch, Acta Cryst. A 32 (1976)]."""
     amounts = np.zeros(len(kept))
     where = [kept.index(each) for each in placements_of(("base",)) if each in kept]
-    if len(where) == len(BASE_COLUMNS) and isinstance(observations, PointObservations):
-        whole = observations.seen.all(axis=1) & (observations.touched < 0)
-        measured = observations.take(whole).values_mm.reshape(-1, 3) / MM
-        base = np.linalg.inv(robot.base)
-        points = observations.take(whole).positions(robot) @ base[:3, :3].T + base[:3, 3]
-        measured = measured @ base[:3, :3].T + base[:3, 3]
-        if len(points) >= LEAST_ALIGNED:
-            centre, at = measured.mean(axis=0), points.mean(axis=0)
-            turn = Rotation.align_vectors(measured - centre, points - at)[0]
-            amounts[where] = *(centre - turn.apply(at)), *turn.as_euler("ZYX")[::-1]
+    if len(where) < len(BASE_COLUMNS) or not isinstance(observations, PointObservations):
+        return amounts
+    whole = observations.take(observations.seen.all(axis=1) & (observations.touched < 0))
+    base, (points, measured) = np.linalg.inv(robot.base), (whole.positions(robot), whole.values_mm.reshape(-1, 3) / MM)
+    points, measured = (xyz @ base[:3, :3].T + base[:3, 3] for xyz in (points, measured))
+    if len(points) < LEAST_ALIGNED:
+        return amounts
+    S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
+    U, _, V = np.linalg.svd((measured - centre).T @ (points - at))
+    S[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
+    S[:3, 3] = centre - S[:3, :3] @ at
+    if FAR * np.linalg.norm(points @ S[:3, :3].T + S[:3, 3] - measured) < np.linalg.norm(points - measured):
+        amounts[where] = [*S[:3, 3], *rpy_of(S)]
     return amounts
 
 

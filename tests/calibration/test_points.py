@@ -70,6 +70,8 @@ def gantry() -> er3a.Robot:
 
 
 ARMS = {"six": lambda: load_robot("er3_600"), "seven": lambda: load_robot("lbr_iiwa_14"), "slide": sliding_arm}
+
+
 def four() -> er3a.Robot:
     """Its longest length lies along the tool's z, which moves all points alike."""
     limits = np.array([2.8, 2.5, 2.5, 2.8])
@@ -393,10 +395,13 @@ TOUCHED = {
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("kind", "arm"), [*zip(["place", "plane"] * 2, ["six", "six", "slide", "gantry"]), ("place", "four")])
+@pytest.mark.parametrize(
+    ("kind", "arm"), [*zip(["place", "plane"] * 2, ["six", "six", "slide", "gantry"]), ("place", "four")]
+)
 def test_what_is_touched_at_unknown_places_corrects_a_table(kind, arm, random, tmp_path):
-    """A joint that slides meanwhile sets the scale, else a length that nothing stands for; a touch that missed is set aside, and no other. Planes stay planes
-    by whatever angles a gantry's slides are at, and come to one where these are not held."""
+    """A joint that slides meanwhile sets the scale, else a length that nothing stands for; a touch that missed is set
+    aside, and no other. Planes stay planes by whatever angles a gantry's slides are at, and come to one where these are
+    not held."""
     bench = Bench(arm, random)
     columns = [f"q{k}_{'mm' if slides else 'deg'}" for k, slides in enumerate(bench.robot.slides, 1)]
     lines = [",".join([*columns, "point,x_mm,y_mm,z_mm,place,plane"])]

@@ -158,7 +158,9 @@ def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
     *,
-    output: Annotated[Path | None, typer.Option(help="the robot file to write, and NAME_model.json with all terms")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="the robot file to write, and NAME_model.json with all terms")
+    ] = None,
     fixed: Annotated[list[FixedPlacement] | None, typer.Option(help="what the robot's file has right")] = None,
     held_back: Annotated[Path | None, typer.Option(help="a CSV of positions that the fit is not to see")] = None,
     plan: Annotated[int, typer.Option(min=0, max=100, help="only say what is settled, and N poses to add")] = 0,

@@ -113,7 +113,9 @@ def kept_lines(found: Calibration, robot: str, output: Path | None, model: Path 
     lines = [f"{model}: written; the whole model: {python} in Python"]
     lines.append(f"{output}: written" + (f"; {text}" if (text := file_text(found)) else ""))
     if found.ratios:
-        lines.append(f"{output}: its coupling counts; for a program that reads a table alone, calibrate with --fixed ratios")
+        lines.append(
+            f"{output}: its coupling counts; for a program that reads a table alone, calibrate with --fixed ratios"
+        )
     return lines
 
 
