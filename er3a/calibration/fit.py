@@ -307,8 +307,8 @@ def bar_lengths(
 
 
 def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations) -> Reals:
-    """Amounts (k,) to start from: where points were measured in a frame far from the base, its place and turn that bring
-    the table's points nearest to them [Kabsch, Acta Cryst. A 32 (1976)]."""
+    """Amounts (k,) to start from: of points measured in a frame far from the base, its place and turn that bring the
+    table's points nearest to them [Kabsch, Acta Cryst. A 32 (1976)]."""
     amounts = np.zeros(len(kept))
     where = [kept.index(each) for each in placements_of(("base",)) if each in kept]
     if len(where) < len(BASE_COLUMNS) or not isinstance(observations, PointObservations):
