@@ -62,7 +62,7 @@ from er3a.calibration.parameters import (
 )
 from er3a.calibration.plan import d_optimal, touches
 from er3a.calibration.residuals import ResidualStructure, structure_of
-from er3a.calibration.terms import IN_ROBOT_FILE, CorrectedModel, JointErrors, TermKind, effects, places_of
+from er3a.calibration.terms import FOR_ROBOT_FILE, CorrectedModel, JointErrors, TermKind, effects, places_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Pose
 from er3a.references.reference import INTERVAL_95, ReferenceSet
@@ -306,8 +306,9 @@ class Calibration(ByValue, Displayed):
     left_out : at poses left out, by what the robot's file holds; None of reference sets and of too few poses
     residuals : what remains: noise, or structure; None as for ``left_out``
     tried : terms beyond the table, in the order in which they were taken, then those that were not; of too few
-        measurements for all kinds those that a robot file can hold
-    tried_for_file : those that a robot file can hold, beside no others, where others were taken
+        measurements for all kinds no couplings, or those that a robot file can hold
+    tried_for_file : those that a robot file can hold, beside no others, where others were tried and taken, or
+        couplings were not among them
     beyond : the model with those that were taken; None if there are none
     """
 
@@ -555,13 +556,24 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
         table = fit(robot, level.kept, observations)
     here = corrected(robot, table.kept, table.amounts)
-    choice = choose_terms(robot, here, table.kept, observations)
-    for_file = ChosenTerms((), ())
-    if free_ratios and (choice.terms or not choice.tried):  # else all kinds were tried, and none taken
-        for_file = choose_terms(robot, here, table.kept, observations, IN_ROBOT_FILE)
+    choice, for_file = choose_terms(robot, here, table.kept, observations), ChosenTerms((), ())
+    all_tried = any(each.kind == "coupling" for each in choice.tried)
+    if free_ratios and (choice.terms or not all_tried):  # else none helps
+        for_file = choose_terms(robot, here, table.kept, observations, FOR_ROBOT_FILE)
         table = fit(robot, level.kept, observations, for_file.terms) if for_file.terms else table
     whole = fit(robot, level.kept, observations, choice.terms) if choice.terms else table
+    if (
+        for_file.terms
+        and not all_tried
+        and _error_left_out(observations, whole) >= _error_left_out(observations, table)
+    ):
+        choice, whole = ChosenTerms((), ()), table  # they stand for a coupling, which was not tried beside them
     return _Model(observations, level, table, choice, for_file, whole)
+
+
+def _error_left_out(observations: PointObservations, found: Fit) -> float:
+    errors = left_out(observations, found)
+    return errors.mean_mm + errors.far_mean_mm
 
 
 def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> Calibration:

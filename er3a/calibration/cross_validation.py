@@ -25,7 +25,7 @@ from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import TermVerdict
 from er3a.calibration.parameters import DEPENDENT, Parameter
 from er3a.calibration.terms import (
-    KINDS,
+    FOR_ALL_JOINTS,
     RIPPLES,
     TYPICAL,
     JointTerm,
@@ -168,7 +168,7 @@ def choose_terms(
     here: Robot,
     kept: Sequence[Parameter],
     observations: PointObservations,
-    kinds: Sequence[TermKind] = KINDS,
+    ways: Sequence[Sequence[TermKind]] = FOR_ALL_JOINTS,
 ) -> ChosenTerms:
     """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it; one that
     stood for others is dropped when these are there.
@@ -176,14 +176,17 @@ def choose_terms(
     Parameters
     ----------
     robot : the table to start from; here : corrected without terms
-    kinds : that are tried
+    ways : kinds that are tried, by the first for which there are coordinates enough; none if there is no such
     """
-    fixed_terms, count = candidates(robot, kinds), len(kept)
-    ripples = "ripple" in kinds and not (observations.touched >= 0).any()
-    numbers = count + sum(term.count for term in fixed_terms) + ripples * 2 * int((~robot.sliding).sum())
     rows, last = observations.independent(here)
     pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm
-    if not can_leave_out(pose_of, 0) or len(last) < LEAST_SPARE * numbers:
+    measured, turning, count = not (observations.touched >= 0).any(), int((~robot.sliding).sum()), len(kept)
+    for kinds in ways if can_leave_out(pose_of, 0) else ():
+        fixed_terms, ripples = candidates(robot, kinds), "ripple" in kinds and measured
+        numbers = count + sum(term.count for term in fixed_terms) + ripples * 2 * turning
+        if len(last) >= LEAST_SPARE * numbers:
+            break
+    else:
         return ChosenTerms((), ())
     J = rows @ jacobian(here, kept, observations)
     rest = rows @ (observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0])

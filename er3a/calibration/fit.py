@@ -27,6 +27,7 @@ from er3a.calibration.outcomes import (
     SetsScale,
 )
 from er3a.calibration.parameters import (
+    BASE_COLUMNS,
     DEPENDENT,
     MM,
     Parameter,
@@ -36,6 +37,7 @@ from er3a.calibration.parameters import (
     placements_of,
 )
 from er3a.calibration.terms import TYPICAL, JointErrors, JointTerm, term_jacobian
+from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
@@ -51,6 +53,7 @@ LEAST_OWN = 1e-9
 CLEAR = 10.0
 """Times what the table leaves of touched points that has to set a length, root mean square: the ways of joints that
 slide, how far a bar's points are off a common cone. Taken for part of it, what is left errs by the square, 1 %."""
+LEAST_ALIGNED, FAR = 3, 10.0
 SMALL_SHARE = 0.01  # of a variance: what adds less does not widen its interval
 LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Parameter("offset", 1)
@@ -73,10 +76,13 @@ class Subspace:
     singular_values: Reals
 
 
-def jacobian(robot: Robot, parameters: Sequence[Parameter], observations: Observations) -> Reals:
-    """Derivative (n, p) of observed values (mm) by parameters (m, rad), by central differences; exact to about 1e-8."""
+def jacobian(
+    robot: Robot, parameters: Sequence[Parameter], observations: Observations, amounts: Reals | float = 0.0
+) -> Reals:
+    """Derivative (n, p) of observed values (mm) by parameters (m, rad), where amounts (p,) are added to the robot's, by
+    central differences; exact to about 1e-8."""
     count = len(parameters)
-    steps = STEP * np.concatenate([np.eye(count), -np.eye(count)])
+    steps = amounts + STEP * np.concatenate([np.eye(count), -np.eye(count)])
     values = observations.predict(robot, parameters, steps)
     slopes: Reals = (values[:count] - values[count:]).T / (2 * STEP)
     return slopes
@@ -129,19 +135,29 @@ def left_of_touched(robot: Robot, observations: Observations) -> float:
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
-    """The longest length of the table that moves the points, which is taken as it is; None where coordinates or lengths
-    were measured, or joints have slid while a place or plane was touched."""
+    """The longest length of the table that moves the points as nothing else does, which is taken as it is; None where
+    coordinates or lengths were measured, or joints have slid while a place or plane was touched."""
     if observations.has_scale:
         return None
     lengths = parameters_of(robot, "lengths")
     effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
     moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
-    longest = max(moving, key=lambda entry: abs(entry.nominal(robot)), default=None)
+    alone = [entry for entry in moving if not _replaceable(robot, entry, observations)] or moving
+    longest = max(alone, key=lambda entry: abs(entry.nominal(robot)), default=None)
     if longest is None:
         return None
     slid, off = observations.slid(robot), observations.predict(robot, (), np.zeros((1, 0)))[0]
     least = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.nominal(robot)) * len(off) ** 0.5)
     return longest if np.linalg.norm(slid) < least else None
+
+
+def _replaceable(robot: Robot, entry: Parameter, observations: PointObservations) -> bool:
+    """Whether others move the points as a length does: it can be as it is then, and all shrink to a point."""
+    every = (*placements_of(observations.free), *parameters_of(robot, "all_entries"))
+    J = jacobian(robot, [entry, *(each for each in every if each != entry)], observations.as_coordinates())
+    own, others = J[:, 0], J[:, 1:] / np.maximum(np.linalg.norm(J[:, 1:], axis=0), 1e-300)
+    rest = own - others @ np.linalg.lstsq(others, own, rcond=DEPENDENT**2)[0]
+    return bool(np.linalg.norm(rest) <= DEPENDENT * np.linalg.norm(own))
 
 
 def without_scale(parameters: Sequence[Parameter], scale: Parameter | None) -> tuple[Parameter, ...]:
@@ -290,6 +306,27 @@ def bar_lengths(
     return tuple(found)
 
 
+def _base_at(robot: Robot, kept: Sequence[Parameter], observations: Observations) -> Reals:
+    """Amounts (k,) to start from: of points measured in a frame far from the base, its place and turn that bring the
+    table's points nearest to them [Kabsch, Acta Cryst. A 32 (1976)]."""
+    amounts = np.zeros(len(kept))
+    where = [kept.index(each) for each in placements_of(("base",)) if each in kept]
+    if len(where) < len(BASE_COLUMNS) or not isinstance(observations, PointObservations):
+        return amounts
+    whole = observations.take(observations.seen.all(axis=1) & (observations.touched < 0))
+    base, (points, measured) = np.linalg.inv(robot.base), (whole.positions(robot), whole.values_mm.reshape(-1, 3) / MM)
+    points, measured = (xyz @ base[:3, :3].T + base[:3, 3] for xyz in (points, measured))
+    if len(points) < LEAST_ALIGNED:
+        return amounts
+    S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
+    U, _, V = np.linalg.svd((measured - centre).T @ (points - at))
+    S[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
+    S[:3, 3] = centre - S[:3, :3] @ at
+    if FAR * np.linalg.norm(points @ S[:3, :3].T + S[:3, 3] - measured) < np.linalg.norm(points - measured):
+        amounts[where] = [*S[:3, 3], *rpy_of(S)]
+    return amounts
+
+
 def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, terms: Sequence[JointTerm] = ()) -> Fit:
     """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
 
@@ -312,20 +349,21 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
         values = with_errors(coefficients).predict(here, kept, nothing)[0]
         return np.concatenate([(values - observations.values_mm) / deviation, prior * coefficients])
 
-    def slopes(here: Robot, coefficients: Reals) -> Reals:
+    def slopes(here: Robot, amounts: Reals, coefficients: Reals) -> Reals:
         seen = with_errors(coefficients)
-        J = jacobian(here, kept, seen) / deviation[:, None]
+        J = jacobian(robot, kept, seen, amounts) / deviation[:, None]
         if not (terms and isinstance(observations, PointObservations) and isinstance(seen, PointObservations)):
             return J
         by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]
         return np.block([[J, by_terms], [np.zeros((len(prior), len(kept))), np.diag(prior)]])
 
     n, k = len(observations), len(kept)
-    unknowns, here = np.zeros(k + len(prior)), robot
+    unknowns = np.r_[_base_at(robot, kept, observations), np.zeros(len(prior))]
+    before = weighted(robot, unknowns[k:])[:n]
+    here = corrected(robot, kept, unknowns[:k])
     rest = weighted(here, unknowns[k:])
-    before = rest[:n]
     for number in range(MOST_STEPS):
-        J = slopes(here, unknowns[k:])
+        J = slopes(here, unknowns[:k], unknowns[k:])
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
         for _ in range(HALVINGS):

@@ -31,7 +31,10 @@ from er3a.robots.robot import Robot
 
 TermKind = Literal["ratio", "once", "twice", "sag", "weight", "ripple", "coupling"]
 KINDS: tuple[TermKind, ...] = get_args(TermKind)
+FOR_ALL_JOINTS = KINDS, KINDS[:-1], KINDS[:-2]
+"""What is tried of as many measurements as it takes, or of fewer: couplings and ripples ask for most."""
 IN_ROBOT_FILE: tuple[TermKind, ...] = ("ratio", "coupling")
+FOR_ROBOT_FILE = IN_ROBOT_FILE, IN_ROBOT_FILE[:1]
 RIPPLES = range(3, 257)
 """How many times a turn an error is looked for; strain wave gears have some 200 a turn."""
 TYPICAL = 2e-3  # rad, m; each per rad, m of what it is multiplied by: how large coefficients are taken to be, one sigma

@@ -66,7 +66,7 @@ def read_csv(path: str | Path, columns: Mapping[str, CsvColumn]) -> list[dict[st
     if not lines:
         raise InputError(path, None, "the file is empty", f"Write a header: {','.join(columns)}")
     header = [name.strip() for name in lines[0][1]]
-    _check_header(path, header, columns)
+    _check_header(path, lines[0][0], header, columns)
     rows = []
     for number, line in lines[1:]:
         if len(line) != len(header):
@@ -100,11 +100,21 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Correct this line") from None
 
 
-def _check_header(path: Path, header: list[str], columns: Mapping[str, CsvColumn]) -> None:
+def _check_header(path: Path, number: int, header: list[str], columns: Mapping[str, CsvColumn]) -> None:
     for name in filter(None, header):
         if header.count(name) > 1:
             raise InputError(path, f"column {name}", "is in the header twice", "Keep one of the two")
     missing = [name for name, column in columns.items() if column.always and name not in header]
+    needed = f"The header must hold: {', '.join(name for name, column in columns.items() if column.always)}"
+    if other := [name for name, column in columns.items() if not column.always]:
+        needed += f"; it may hold: {', '.join(other)}"
+    if any(mark in header[0] for mark in ";\t") and len(header) == 1:
+        mark = "semicolons" if ";" in header[0] else "tabs"
+        remedy = "Put commas between the fields, and points, not commas, into numbers"
+        raise InputError(path, f"row {number}", f"{mark} stand between the fields", remedy)
+    stems = {name.rsplit("_", 1)[0] for name in columns}
+    if len(missing) > 1 and not any(name in columns or name.rpartition("_")[0] in stems for name in header):
+        raise InputError(path, f"row {number}", "no header of this table: no column has a known name", needed)
     for name in header:
         if name in columns:
             continue
@@ -119,7 +129,7 @@ def _check_header(path: Path, header: list[str], columns: Mapping[str, CsvColumn
         remedy = f"Did you mean '{close[0]}'?" if close else f"Known columns: {', '.join(columns)}"
         raise InputError(path, f"column {name}", "unknown column", remedy)
     if missing:
-        raise InputError(path, f"column {missing[0]}", "missing", f"The header must hold: {', '.join(columns)}")
+        raise InputError(path, f"column {missing[0]}", "missing", needed)
 
 
 def _value(path: Path, row: int, name: str, text: str, column: CsvColumn) -> Any:

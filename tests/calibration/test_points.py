@@ -70,7 +70,17 @@ def gantry() -> er3a.Robot:
 
 
 ARMS = {"six": lambda: load_robot("er3_600"), "seven": lambda: load_robot("lbr_iiwa_14"), "slide": sliding_arm}
-TOUCHING = ARMS | {"gantry": gantry}
+
+
+def four() -> er3a.Robot:
+    """Its longest length lies along the tool's z, which moves all points alike."""
+    limits = np.array([2.8, 2.5, 2.5, 2.8])
+    return er3a.Robot.from_dh(
+        [0.05, 0.3, 0.05, 0], np.radians([-90, 0, -90, 0]), [0.3, 0.02, 0, 0.4], lower=-limits, upper=limits
+    )
+
+
+TOUCHING = ARMS | {"gantry": gantry, "four": four}
 
 
 class Bench:
@@ -127,6 +137,15 @@ def test_base_tool_table_and_deviation_are_found_and_no_term_that_is_not_there(n
     assert bench.error(found) < 0.6 * noise
     assert found.left_out.mean_mm == pytest.approx(2 * np.sqrt(2 / np.pi) * noise, rel=0.25)
     assert found.residuals.is_noise
+
+
+def test_a_tracker_s_frame_may_stand_and_be_turned_anywhere(random):
+    bench = Bench("six", random)
+    bench.truth = bench.truth.replace(base=translation(3, -1.5, 0.9) @ rot_x(2.0) @ rot_y(1.1) @ bench.truth.base)
+    found = er3a.calibrate(bench.robot, bench.measured(36, 0.1))
+    assert found.level == "all_entries"
+    assert found.deviation_mm == pytest.approx(0.1, rel=0.2)
+    assert bench.error(found) < 0.15
 
 
 TERMS = [
@@ -259,11 +278,15 @@ def test_the_command_tells_positions_held_back(tmp_path):
     assert f"held back: 20 positions, {found['held_back']['mean_mm']:.4g} mm off on average" in text
     assert f"at worst (row {found['held_back']['worst_row']})" in text
     assert "tried: J3 coupled to J1" in text
+    assert text.startswith(f"the whole model errs at poses left out by {found['beyond']['left_out']['mean_mm']:.4g} mm")
     alone = found["held_back"]["table_mean_mm"]
     assert alone > found["held_back"]["mean_mm"]
     assert f"as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
     table, model = found["left_out"]["mean_mm"], found["beyond"]["left_out"]["mean_mm"]
     assert f"it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm." in text
+    assert text.index("mine_model.json: written; the whole model: er3a.load_calibration") < text.index("mine.yaml: wri")
+    written = json.loads((tmp_path / "mine_model.json").read_text(encoding="utf-8"))
+    assert written | {"output": None} == found
     mine, rows = load_robot(tmp_path / "mine.yaml"), load_measurements(held, robot)
     model, q = er3a.load_calibration(record, robot), np.radians([row.pose for row in rows])
     for name, T in (("xyz_mm", model.forward(q)), ("table_xyz_mm", er3a.forward(mine, q))):
@@ -357,6 +380,7 @@ def reached(bench: Bench, target: np.ndarray, normal: np.ndarray | None, count: 
             if np.linalg.norm(off) < 1e-12:
                 break
             q = q + np.linalg.pinv(er3a.jacobian(bench.truth, q)[:3]) @ off * min(1.0, 0.1 / np.linalg.norm(off))
+            q = np.clip(q, bench.truth.lower, bench.truth.upper)
         else:
             continue
         if (q > bench.truth.lower).all() and (q < bench.truth.upper).all():
@@ -371,10 +395,13 @@ TOUCHED = {
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("kind", "arm"), list(zip(["place", "plane"] * 2, ["six", "six", "slide", "gantry"])))
+@pytest.mark.parametrize(
+    ("kind", "arm"), [*zip(["place", "plane"] * 2, ["six", "six", "slide", "gantry"]), ("place", "four")]
+)
 def test_what_is_touched_at_unknown_places_corrects_a_table(kind, arm, random, tmp_path):
-    """A joint that slides meanwhile sets the scale; a touch that missed is set aside, and no other. Planes stay planes
-    by whatever angles a gantry's slides are at, and come to one where these are not held."""
+    """A joint that slides meanwhile sets the scale, else a length that nothing stands for; a touch that missed is set
+    aside, and no other. Planes stay planes by whatever angles a gantry's slides are at, and come to one where these are
+    not held."""
     bench = Bench(arm, random)
     columns = [f"q{k}_{'mm' if slides else 'deg'}" for k, slides in enumerate(bench.robot.slides, 1)]
     lines = [",".join([*columns, "point,x_mm,y_mm,z_mm,place,plane"])]
@@ -389,7 +416,7 @@ def test_what_is_touched_at_unknown_places_corrects_a_table(kind, arm, random, t
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     found = er3a.calibrate(bench.robot, path)
     held = {each.code for each in found.held}
-    assert ("sets_scale" in held) == (arm == "six")
+    assert ("sets_scale" in held) == (arm in ("six", "four"))
     assert [each.row for each in found.outliers] == ([9] if kind == "place" else [])
     assert not any(each.name.startswith("base") for each in found.estimates)
     spread = []
@@ -612,10 +639,22 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
 
 
+@pytest.mark.parametrize(("name", "term", "poses"), [("seven", 0, 70), ("six", 1, 70)])
+def test_few_poses_find_a_term_without_trying_all(name, term, poses, random):
+    """Couplings are many: without them measurements are enough for the others, or for ratios."""
+    own, coefficients = TERMS[term]
+    bench = Bench(name, random, {own: coefficients})
+    found = er3a.calibrate(bench.robot, bench.measured(poses, 0.05))
+    terms = found.beyond.terms if found.beyond else found.ratios
+    assert [(each.kind, each.joint) for each in terms] == [(own.kind, own.joint)]
+    assert "coupling" not in {each.kind for each in found.tried}
+    assert bench.error(found) < 0.06
+
+
 @pytest.mark.parametrize("poses", [130, 80])
 def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(poses, random, tmp_path):
-    """J4 turns a little with J2; the arm's coupling holds it, beside that which it has. From few poses only what the
-    file can hold is tried."""
+    """J4 turns a little with J2; the arm's coupling holds it, beside that which it has. From few poses other terms are
+    tried without couplings, and are left where they would stand for one."""
     bench = Bench("six", random, {JointTerm("coupling", 4, by=2): [1e-3]})
     found = er3a.calibrate(bench.robot, bench.measured(poses, 0.02))
     for terms in (found.ratios, found.beyond.terms if poses > 100 else found.ratios):

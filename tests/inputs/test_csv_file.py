@@ -58,6 +58,8 @@ def test_a_header_alone_gives_no_rows(write):
         (HEADER.replace("grade", "graed") + GOOD, "column graed", "unknown column. Did you mean 'grade'?"),
         (HEADER.replace("grade", "weather") + GOOD, "column weather", "unknown column. Known columns: name"),
         (HEADER.replace(",x_mm", "") + GOOD, "column x_mm", "missing. The header must hold: name"),
+        (HEADER.replace(",", ";") + GOOD.replace(",", ";"), "row 1", "semicolons stand between the fields. Put commas"),
+        ("A title\n" + HEADER + GOOD, "row 1", "no header of this table"),
         (HEADER.replace("name", "x_mm") + GOOD, "column x_mm", "is in the header twice"),
         (HEADER.strip() + ",\n" + GOOD, "column 6", "has no name. Name it, or remove a comma"),
         (HEADER + "reach,official,1,592.8\n", "row 2", "4 fields where the header has 5"),

@@ -100,9 +100,14 @@ Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a 
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
 
 
+def as_json_text(content: Any) -> str:
+    """The same as text."""
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+
+
 def print_json(content: Any) -> None:
     """Print JSON on standard output."""
-    print(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
+    print(as_json_text(content))
 
 
 def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

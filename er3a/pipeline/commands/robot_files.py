@@ -162,7 +162,9 @@ def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
     measurements: Annotated[str, typer.Argument(help="a CSV of measured positions, or a reference set's name")],
     *,
-    output: Annotated[Path | None, typer.Option(help="the robot file to write (default: none)")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="the robot file to write, and NAME_model.json with all terms (default: none)")
+    ] = None,
     fixed: Annotated[
         list[FixedPlacement] | None, typer.Option(help="values of the robot file to keep; can be repeated")
     ] = None,
@@ -176,21 +178,23 @@ def calibrate(
     """Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot file.
 
     Joint errors beyond D-H (ratio, once and twice a turn, sag) are fitted if they improve poses left out of the fit.
-    The robot file holds the best table without them, and the ratios as its coupling.
+    The whole model goes to NAME_model.json, for er3a.load_calibration in Python. The robot file has the table that is
+    best without such errors, and ratios and couplings as its coupling.
     """
     from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.by_name import load_measurements
+    from er3a.files.kept_files import write_atomically
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
     from er3a.files.robot_writer import write_robot
-    from er3a.pipeline.messages.calibration import calibration_record, file_text, held_back_lines, lines_of
+    from er3a.pipeline.messages.calibration import calibration_record, held_back_lines, kept_lines, lines_of
     from er3a.pipeline.messages.say import say
 
     if words not in LANGUAGES:
         raise Er3aError(f"--language is '{words}'; known: {', '.join(LANGUAGES)}")
-    file = Path(measurements) if measurements.endswith(".csv") else None
+    file = Path(measurements) if measurements.lower().endswith(".csv") else None
     if file is None and (html or rrd):
         raise Er3aError(
             f"--{'html' if html else 'rrd'} shows measured positions; give a CSV of them, not a reference set"
@@ -213,8 +217,11 @@ def calibrate(
     name = output.stem if output else f"{arm.name}_calibrated"
     alone = " (without terms beyond a robot file)" if found.beyond else ""
     corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated{alone}")
-    if output:
+    record = {"output": str(output) if output else None, **calibration_record(found, arm, others)}
+    model = output.with_name(f"{output.stem}_model.json") if output else None
+    if output and model:
         write_robot(corrected, output)
+        write_atomically(model, partial(Path.write_text, data=options.as_json_text(record) + "\n", encoding="utf-8"))
     if html or rrd:
         from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
     if html:
@@ -225,16 +232,15 @@ def calibrate(
     if rrd:
         record_calibration(found, measured_errors(arm, rows, found), rrd)
     if as_json:
-        options.print_json({"output": str(output) if output else None, **calibration_record(found, arm, others)})
+        options.print_json(record)
         return
     print(lines_of(found))
     if others:
         print("\n".join(held_back_lines(found, rows, others)))
-    for written in (output, html, rrd):
+    for written in (html, rrd):
         if written:
             print(f"{written}: written")
-    if output and (without := file_text(found)):
-        print(f"{output}: {without}")
+    print("\n".join(kept_lines(found, robot, output, model)))
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
@@ -43,6 +44,7 @@ def lines_of(found: Calibration) -> str:
         else f"standard deviation estimated: {found.deviation_mm:.3g} mm a coordinate"
     )
     lines = [
+        *_summary(found),
         f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
         f"these measurements settle {len(found.estimates) - len(found.open)} of "
         f"{len(found.estimates) + len(found.held)} numbers",
@@ -84,6 +86,37 @@ def lines_of(found: Calibration) -> str:
     if found.more:
         lines.append(f"to estimate more: {say(found.more)}")
     return "\n".join(lines)
+
+
+def _summary(found: Calibration) -> list[str]:
+    """How well the corrected arm does at poses that its fit has not seen."""
+    forms = {"the corrected robot file": found.left_out}
+    if found.beyond:
+        forms = {"the whole model": found.beyond.left_out, "the robot file alone": found.left_out}
+    return [
+        f"{name} errs at poses left out by {each.mean_mm:.4g} mm on average, {each.worst_mm:.4g} mm at worst"
+        for name, each in forms.items()
+        if each
+    ]
+
+
+def kept_lines(found: Calibration, robot: str, output: Path | None, model: Path | None) -> list[str]:
+    """How to go on with the corrected arm: the whole model first.
+
+    Parameters
+    ----------
+    robot : as the command was given it; output, model : the files that were written, if any
+    """
+    python = f"er3a.load_calibration('{model or 'FILE_model.json'}', er3a.load_robot('{robot}')).forward(q)"
+    if output is None or model is None:
+        return [f"keep it: --output FILE.yaml writes the robot file, and FILE_model.json for {python} in Python"]
+    lines = [f"{model}: written; the whole model: {python} in Python"]
+    lines.append(f"{output}: written" + (f"; {text}" if (text := file_text(found)) else ""))
+    if found.ratios:
+        lines.append(
+            f"{output}: its coupling counts; for a program that reads a table alone, calibrate with --fixed ratios"
+        )
+    return lines
 
 
 def plan_lines(found: Plan, robot: Robot) -> str:
@@ -274,10 +307,6 @@ def _beyond_lines(found: Beyond) -> list[str]:
         lines.append(f"with terms, {_left_out_line(found.left_out)}")
     if found.residuals:
         lines.append(f"with terms, {_residual_line(found.residuals)}")
-    lines.append(
-        "all terms are in --json, of which er3a.load_calibration(FILE, robot) in Python makes the model again; a robot "
-        "file holds ratios and couplings alone"
-    )
     return lines
 
 
