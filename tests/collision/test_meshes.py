@@ -57,7 +57,9 @@ def test_a_mesh_whose_triangles_are_turned_is_read_without_what_only_developers_
     mesh.export(tmp_path / "iron.stl")
     locked = Path("requirements/run.txt").read_text(encoding="utf-8")
     ours = {"er3a", *re.findall(r"^([\w.-]+)==", locked, re.MULTILINE)}
-    owners = {name: {owner.lower().replace("_", "-") for owner in own} for name, own in packages_distributions().items()}
+    owners = {
+        name: {owner.lower().replace("_", "-") for owner in own} for name, own in packages_distributions().items()
+    }
     absent = [name for name, own in owners.items() if not own & ours]
     code = f"import sys; sys.modules |= dict.fromkeys({absent!r}); from er3a.formats.mesh_file import read_mesh"
     code += "; print(len(read_mesh(sys.argv[1], 'mm').faces))"
