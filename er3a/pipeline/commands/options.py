@@ -110,14 +110,17 @@ def print_note(text: str) -> None:
 
 
 def print_warning(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
-    """What may be a slip in a file; other warnings as Python shows them."""
+    """What may be a slip in a file, once; other warnings as Python shows them."""
     if issubclass(category, InputWarning):
-        print(f"warning: {message}", file=sys.stderr)
+        if str(message) not in _told:
+            print(f"warning: {message}", file=sys.stderr)
+        _told.add(str(message))
     else:
         _show_warning(message, category, *rest, **named)
 
 
 _show_warning = warnings.showwarning
+_told: set[str] = set()
 
 
 def print_error(error: Er3aError | str) -> None:
