@@ -43,7 +43,7 @@ _UNITS = {"mm": "mm", "毫米": "mm", "m": "m", "米": "m", "in": "in", "inch": 
 _UNITS |= {"°": "deg", "deg": "deg", "degree": "deg", "degrees": "deg", "度": "deg", "grad": "deg", "rad": "rad"}
 _BEFORE = re.compile(r"i-1|ᵢ₋₁|j-1")
 _PLAIN = str.maketrans({"−": "-", "–": "-", "ϑ": "θ", "⍺": "α", "∗": "*", "＊": "*", "（": "(", "）": ")"})
-_PLAIN |= str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
+_PLAIN |= str.maketrans(dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789")))
 _VARIABLE = re.compile(r"([+-]?)(?:(?:q|θ|theta|d)_?\d*\*?|\*|var(?:iable|\.)?|变量)(?:\(t\))?(?=[-+(]|$)")
 _PI = re.compile(r"([+-]?)(\d+(?:\.\d*)?)?\*?(?:π|pi)(?:/(\d+(?:\.\d*)?))?")
 
