@@ -29,7 +29,11 @@ rule all:
 
 
 onerror:
-    print("\nWhat failed, in short:", *told("error: "), sep="\n")
+    print(
+        "\nWhat failed, in short:",
+        *(told("error: ") or ["no job said why, as one that is stopped can't; see the logs named above"]),
+        sep="\n",
+    )
 
 
 onsuccess:

@@ -41,6 +41,39 @@ def test_the_studies_lead_to_sound_files(study, monkeypatch):
 
 
 @pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("name,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\np,590,0,295,180,0,0\n", "targets"),
+        ("t_s,q1_deg,q2_deg\n0,0,0\n1,10,20\n", "a path"),
+        ("i,α(i-1),a(i-1),d(i),θ(i)\n1,0,0,300,θ1\n", "a D-H table"),
+    ],
+)
+def test_a_table_is_known_by_its_header_wherever_it_stands(tmp_path, text, kind):
+    (tmp_path / "mine.csv").write_text(text, encoding="utf-8")
+    assert check_file(tmp_path / "mine.csv") == kind
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "told"),
+    [
+        ("paths", "end_deg: [", "end_deg: [1, ", r"paths\.yaml: paths\[0\]\.end_deg: 7 joint values"),
+        ("targets", "q_ref_deg: [", "q_ref_deg: [1, ", "targets.yaml: target .*7 joint values"),
+    ],
+)
+def test_a_study_s_joint_values_are_held_against_its_robot(tmp_path, monkeypatch, file, old, new, told):
+    monkeypatch.chdir(ROOT)
+    study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
+    entry = study["robots"] = {"er3a_c60": dict(study["robots"]["er3a_c60"])}
+    entry["er3a_c60"][file] = str(tmp_path / f"{file}.yaml")
+    text = Path(f"data/{file}/er3a_c60.yaml").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / f"{file}.yaml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
+    with pytest.raises(InputError, match=told):
+        check_study(tmp_path / "study.yaml")
+
+
+@pytest.mark.parametrize(
     ("name", "text", "told"),
     [
         ("a.yaml", "name: x\n", "kind: missing"),
@@ -48,6 +81,9 @@ def test_the_studies_lead_to_sound_files(study, monkeypatch):
         ("a.txt", "kind: robot\n", "'.txt' files are none"),
         ("other.csv", "a,b\n1,2\n", "other.csv"),
         ("a.yaml", "kind: targets\ntargets: []\n", "targets"),
+        ("a.yaml", "kind: paths\npaths:\n- {name: a, kind: linear}\n", "paths[0].kind: 'linear' is not known"),
+        ("a.yaml", "kind: paths\npaths:\n- {name: a}\n", "paths[0].kind: missing"),
+        ("arm", "kind: robot\n", "files without an ending are none"),
     ],
 )
 def test_a_file_that_is_none_of_ours_is_one_clear_error(tmp_path, name, text, told):

@@ -233,5 +233,4 @@ def test_table_without_rows_is_refused(table):
         read_targets(table(TABLE.splitlines()[0] + "\n"))
     with pytest.raises(InputError, match=r"some\.csv: header: the file is empty"):
         read_targets(table(""))
-    with pytest.raises(InputError, match=r"some\.csv: header: its columns are separated by semicolons"):
-        read_targets(table(TABLE.replace(",", ";")))
+    assert read_targets(table(TABLE.replace(",", ";"))) == read_targets(table(TABLE))

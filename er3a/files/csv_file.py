@@ -6,6 +6,7 @@ import csv
 import difflib
 import io
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,9 @@ from er3a.formats.mesh_file import read_text
 LARGEST_DIGITS = 9
 
 MOST_BYTES = 50_000_000
+
+Lines = list[tuple[int, list[str]]]
+"""Fields of a file's lines, with the lines' numbers."""
 
 
 class Written(float):
@@ -53,8 +57,10 @@ class CsvColumn:
     quantity: str = "length or angle"
 
 
-def read_csv(path: str | Path, columns: Mapping[str, CsvColumn]) -> list[dict[str, Any]]:
+def read_csv(path: str | Path, columns: Mapping[str, CsvColumn], lines: Lines | None = None) -> list[dict[str, Any]]:
     """Read a CSV file with exactly these columns (any order); rows as dicts with a ``row`` key (file line).
+
+    ``lines``: what :func:`read_lines` found, if it has been read.
 
     Raises
     ------
@@ -62,16 +68,14 @@ def read_csv(path: str | Path, columns: Mapping[str, CsvColumn]) -> list[dict[st
         for a missing or unknown column, a wrong unit in a column name, an empty or non-finite number, a ragged row
     """
     path = Path(path)
-    lines = _lines(path)
+    lines = read_lines(path) if lines is None else lines
     if not lines:
         raise InputError(path, None, "the file is empty", f"Write a header: {','.join(columns)}")
     header = [name.strip() for name in lines[0][1]]
     _check_header(path, lines[0][0], header, columns)
+    check_widths(path, lines)
     rows = []
     for number, line in lines[1:]:
-        if len(line) != len(header):
-            problem = f"{len(line)} fields where the header has {len(header)}"
-            raise InputError(path, f"row {number}", problem, "Correct the commas; quote texts that hold one")
         row = {name: _value(path, number, name, text.strip(), columns[name]) for name, text in zip(header, line)}
         absent = dict.fromkeys(name for name in columns if name not in row)
         rows.append({"row": number, **row, **absent})
@@ -80,24 +84,56 @@ def read_csv(path: str | Path, columns: Mapping[str, CsvColumn]) -> list[dict[st
 
 def read_header(path: str | Path) -> list[str]:
     """The column names of a CSV file, [] if it is empty; :class:`InputError` if it is not CSV."""
-    lines = _lines(Path(path))
+    lines = read_lines(Path(path))
     return [name.strip() for name in lines[0][1]] if lines else []
 
 
 def read_column(path: str | Path, column: str) -> list[str]:
     """The texts in a column of a CSV file that has been checked, [] if it has no such column."""
-    (_, header), *rows = _lines(Path(path))
+    (_, header), *rows = read_lines(Path(path))
     names = [name.strip() for name in header]
     return [line[names.index(column)].strip() for _, line in rows] if column in names else []
 
 
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Lines of a CSV file that aren't blank, with their numbers."""
-    reader = csv.reader(io.StringIO(read_text(path, MOST_BYTES)), strict=True)
+def read_lines(path: Path) -> Lines:
+    """Lines of a CSV file that aren't blank, with their numbers; the first is the header.
+
+    Spreadsheets of some countries separate by semicolons and write decimal commas, which are read as points.
+    """
+    text = read_text(path, MOST_BYTES)
+    header = text.lstrip().partition("\n")[0]
+    mark = next((each for each in ";\t" if each in header and "," not in header), ",")
+    reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)
     try:
-        return [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
+        lines = [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
     except csv.Error as error:
         raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Correct this line") from None
+    while lines and all(len(line) == len(lines[0][1]) > 1 and not line[-1].strip() for _, line in lines):
+        lines = [(number, line[:-1]) for number, line in lines]  # columns that a spreadsheet leaves behind
+    return lines if mark == "," else _with_points(path, lines)
+
+
+def check_widths(path: Path, lines: Lines) -> None:
+    """Refuse a row that has not as many fields as the header."""
+    for number, line in lines[1:]:
+        if len(line) != len(lines[0][1]):
+            problem = f"{len(line)} fields where the header has {len(lines[0][1])}"
+            raise InputError(path, f"row {number}", problem, "Correct the commas; quote texts that hold one")
+
+
+def _with_points(path: Path, lines: Lines) -> Lines:
+    """Lines with decimal points, of a table in which commas separate nothing."""
+    comma = re.compile(r"\s*[-+−]?\d+,\d+(?:[eE][-+]?\d+)?\D*")
+    fields = [field for _, line in lines[1:] for field in line]
+    written = next((field.strip() for field in fields if comma.fullmatch(field)), "")
+    pointed = next((field.strip() for field in fields if comma.fullmatch(field.replace(".", ","))), "")
+    if written and pointed and pointed != written:
+        problem = f"decimal commas and points in one table ('{written}', '{pointed}')"
+        raise InputError(path, None, problem, "Write all numbers with a point")
+    return [
+        (number, [field.replace(",", ".") if comma.fullmatch(field) else field for field in line])
+        for number, line in lines
+    ]
 
 
 def _check_header(path: Path, number: int, header: list[str], columns: Mapping[str, CsvColumn]) -> None:
@@ -108,10 +144,6 @@ def _check_header(path: Path, number: int, header: list[str], columns: Mapping[s
     needed = f"The header must hold: {', '.join(name for name, column in columns.items() if column.always)}"
     if other := [name for name, column in columns.items() if not column.always]:
         needed += f"; it may hold: {', '.join(other)}"
-    if any(mark in header[0] for mark in ";\t") and len(header) == 1:
-        mark = "semicolons" if ";" in header[0] else "tabs"
-        remedy = "Put commas between the fields, and points, not commas, into numbers"
-        raise InputError(path, f"row {number}", f"{mark} stand between the fields", remedy)
     stems = {name.rsplit("_", 1)[0] for name in columns}
     if len(missing) > 1 and not any(name in columns or name.rpartition("_")[0] in stems for name in header):
         raise InputError(path, f"row {number}", "no header of this table: no column has a known name", needed)
@@ -143,13 +175,17 @@ def _value(path: Path, row: int, name: str, text: str, column: CsvColumn) -> Any
             raise InputError(path, where, f"'{text}' is not known", "Write" + _allowed(column))
         return text
     number = "a whole number" if column.type is int else "a number"
+    text = text.replace("\u2212", "-")  # the minus sign of printed tables
     plain = text.isascii() and "_" not in text  # Python would read 1_000 as 1000, and the digits of any script
     try:
         value = column.type(text) if plain else None
     except ValueError:
         value = None
     if value is None:
-        raise InputError(path, where, f"'{text}' is not {number}", f"Write {number} without a unit")
+        remedy = f"Write {number} without a unit" + (
+            ", with a point before decimals and nothing between thousands" if "," in text else ""
+        )
+        raise InputError(path, where, f"'{text}' is not {number}", remedy)
     if not math.isfinite(value):
         raise InputError(path, where, f"'{text}' is not a finite number", "Write a number, or remove the row")
     if abs(value) > 10.0**column.digits or vanished(text, value):

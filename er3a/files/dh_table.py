@@ -6,7 +6,8 @@ Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, if known, 
 ``speed_mm_s``. Calibrated tables may have ``beta_deg``, Hayati's rotation about y, and ``calibrated`` (true), which
 allows lengths below 2 mm. Leave a cell empty if it does not apply to a joint. A column ``convention`` (standard or
 modified, the same in all rows) takes precedence over the reader's argument. Columns may be in metres, inches or radians
-instead, and are then named ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``.
+instead, and are then named ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``. Headings and cells may also be as books
+print them (:mod:`er3a.files.printed_table`).
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.csv_file import CsvColumn, read_csv, read_lines
+from er3a.files.printed_table import as_columns
 from er3a.files.robot_file import SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MOST_DEG, RADIANS_BELOW_DEG, look_like_radians
 from er3a.files.yaml_file import parse
@@ -84,14 +86,16 @@ def read_dh_table(
         naming row and column, or the field of the robot file that the values do not fit
     """
     path = Path(path)
-    names = {_usual_unit(column)[0]: column for column in read_header(path)}
+    printed = as_columns(path, read_lines(path))
+    names = {_usual_unit(column)[0]: column for column in (printed.lines[0][1] if printed.lines else ())}
     known = NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in names}
-    rows = read_csv(path, {names.get(column, column): kind for column, kind in known.items()})
+    rows = read_csv(path, {names.get(column, column): kind for column, kind in known.items()}, printed.lines)
     converted = {column: scale for column, name in names.items() if (scale := _usual_unit(name)[1]) is not None}
     rows = [{_usual_unit(column)[0]: value for column, value in row.items()} for row in rows]
     for row in rows:
         row |= {column: row[column] * scale for column, scale in converted.items() if row[column] is not None}
-    notes = list(_in_own_units(path, rows, length_unit, angle_unit, as_printed, {*converted}))
+    convention = printed.convention or convention
+    notes = [*printed.notes, *_in_own_units(path, rows, length_unit, angle_unit, as_printed, {*converted})]
     lengths = [(abs(row[key]), row, key) for row in rows for key in ("a_mm", "d_mm") if row[key]]
     short = [(row, key) for length, row, key in lengths if length < SHORTEST_PLAIN_LENGTH_MM]
     unsaid = [each for each in short if each[1] not in converted]
@@ -237,7 +241,10 @@ def _check_kind(path: Path, row: dict[str, Any], given: set[str]) -> None:
             raise InputError(path, where, "empty", "Fill in a value")
         if column not in own and row[column]:
             kind = "slides" if unit == "mm" else "turns"
-            raise InputError(path, where, f"joint {row['joint']} {kind}", "Leave the cell empty, or correct its type")
+            remedy = "Leave the cell empty, or correct its type"
+            if column == "theta_deg":
+                remedy = "Write what theta is with the joint at 0 as offset_deg, or correct the joint's type"
+            raise InputError(path, where, f"joint {row['joint']} {kind}", remedy)
 
 
 def _far_normals(rows: list[dict[str, Any]], convention: str) -> bool:

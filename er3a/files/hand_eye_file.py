@@ -132,7 +132,6 @@ def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, posi
 
 STREAM_SAMPLES = 60
 SHOWN_HEADER = 60
-SEPARATORS = {";": "semicolons", "\t": "tabs"}
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
 LEAST_SQUARE_MM = 0.5
 EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
@@ -352,12 +351,8 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
             columns |= {f"{stream}_{name}": CsvColumn() for name in (*POSITION, *FORMS[form])}
     if not columns:
         first = ", ".join(header)[:SHOWN_HEADER]
-        apart = next((word for mark, word in SEPARATORS.items() if len(header) == 1 and mark in header[0]), None)
-        problem = (
-            f"the columns are separated by {apart}" if apart else f"the first line names no column of samples: {first}"
-        )
-        remedy = "Separate them by commas" if apart else f"Begin with a header such as {EXAMPLE}"
-        raise InputError(table, "header", problem, remedy)
+        problem = f"the first line names no column of samples: {first}"
+        raise InputError(table, "header", problem, f"Begin with a header such as {EXAMPLE}")
     rows = read_csv(table, columns)
     if not rows:
         raise InputError(table, None, "the table has a header but no samples", "Add a row for each sample")

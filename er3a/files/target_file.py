@@ -65,8 +65,6 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
 def _without_one_form(header: list[str], forms: list[str]) -> str:
     if not header:
         return "the file is empty"
-    if len(header) == 1 and ";" in header[0]:
-        return "its columns are separated by semicolons instead of commas"
     if forms:
         return f"the table has two forms of orientation, {forms[0]} and {forms[1]}"
     strange = [name for name in header if name.strip() not in ("name", *TEXTS, *POSITION, *REFERENCE)]

@@ -20,6 +20,8 @@ Model = TypeVar("Model", bound=BaseModel)
 
 MAX_YAML_BYTES = 250_000  # of which the worst takes seconds to read
 
+CLOSE = 0.7  # how alike a key and the one that was meant are at least
+
 RENAMED = {
     "full_speed_after_s": "acceleration_time_s",
     "overlap_mm": "penetration_tolerance_mm",
@@ -27,6 +29,7 @@ RENAMED = {
 }
 """Keys of files by the names that they had, and the names that they have."""
 
+_KINDS = ("union_tag_invalid", "union_tag_not_found")  # faults of the key that says which of several entries one is
 _FIELD = re.compile(r"([A-Za-z_]\w*(?:\.[\w-]+|\[\d+\])*): ")
 _REMEDIES = {
     "float_type": "Write a number, without quotes or unit",
@@ -75,7 +78,10 @@ class _PlainLoader(Composer, yaml.CSafeLoader):
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, str):
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"the key {key!r} is not a word; put it in quotes", key_node.start_mark
+                    None,
+                    None,
+                    f"the key {key!r} is not a word (or a decimal comma stands before it)",
+                    key_node.start_mark,
                 )
             if key in seen:
                 raise yaml.constructor.ConstructorError(
@@ -119,6 +125,8 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}" if mark else None
+        if mark and text.split("\n")[mark.line].lstrip(" ").startswith("\t"):
+            raise InputError(path, where, "a tab character at the start of the line", "Indent by spaces") from None
         raise InputError(path, where, error.problem or "not valid YAML", "Correct this line") from None
     except RecursionError:
         raise InputError(path, None, "nested too deeply", "Input tables are flat; correct the brackets") from None
@@ -147,7 +155,7 @@ def parse(model: type[Model], data: dict[str, Any], path: str | Path | None) -> 
     except ValidationError as error:
         faults = error.errors()
         first = min(faults, key=lambda fault: (fault["loc"] != ("kind",), fault["type"] != "extra_forbidden"))
-        field = _dotted(first["loc"])
+        field = _dotted((*first["loc"], "kind") if first["type"] in _KINDS else first["loc"])
         problem, remedy = _explain(first, model)
         if named := _FIELD.match(problem):
             field, problem = ".".join(filter(None, (field, named[1]))), problem[named.end() :]
@@ -187,9 +195,15 @@ def _explain(fault: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
         if str(key) in RENAMED:
             return f"the key {str(key)!r} has another name now", f"Write '{RENAMED[str(key)]}'"
         known = _known_keys(model)
-        close = difflib.get_close_matches(str(key), known, n=1)
+        close = difflib.get_close_matches(str(key), known, n=1, cutoff=CLOSE)
         hint = f"Did you mean '{close[0]}'?" if close else "Remove it, or check its place in the file"
         return f"unknown key {str(key)!r}", hint
+    if kind == "union_tag_invalid":
+        return f"'{fault['ctx']['tag']}' is not known", f"Write one of: {fault['ctx']['expected_tags']}".replace(
+            "'", ""
+        )
+    if kind == "union_tag_not_found":
+        return "missing", "Add the key 'kind'"
     if kind == "missing":
         return "missing", f"Add the key '{key}'"
     if kind == "value_error":

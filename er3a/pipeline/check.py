@@ -14,6 +14,7 @@ from er3a.files.csv_file import read_header
 from er3a.files.dh_table import read_dh_table
 from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye, sample_rows
 from er3a.files.path_file import PathFile, ProgramPath, TablePath, load_paths, read_path_table
+from er3a.files.printed_table import is_printed_table
 from er3a.files.program_file import ProgramsFile, load_programs
 from er3a.files.reference_sets import FILE as DOCUMENTS
 from er3a.files.reference_sets import (
@@ -26,15 +27,15 @@ from er3a.files.reference_sets import (
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import load_of, load_robot
 from er3a.files.scene_file import SceneFile, load_scene
-from er3a.files.target_file import TargetFile, read_targets
+from er3a.files.target_file import POSITION, TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
-from er3a.formats.mesh_file import read_text
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.class_follow import follows_tool_paths
+from er3a.planning.commands import CommandSource
 from er3a.programs.languages import SUFFIXES, read_program
 from er3a.robots.robot import Robot
 
@@ -50,12 +51,18 @@ SCHEMAS: dict[str, type[BaseModel]] = {
 }
 
 
-def _check_paths(path: Path) -> None:
-    for planned in load_paths(path).paths:
-        if isinstance(planned, TablePath):
-            read_path_table(planned.file)
-        elif isinstance(planned, ProgramPath):
+def _check_paths(path: Path, robot: Robot | None = None) -> None:
+    for i, planned in enumerate(load_paths(path).paths):
+        if isinstance(planned, ProgramPath):
             read_program(planned.program)
+        elif robot is not None:
+            source = CommandSource(path, f"paths[{i}]")
+            try:
+                planned.command(source, robot)
+            except InputError as error:
+                raise error if error.file else source.error(error.field or "", error.problem, error.remedy) from None
+        elif isinstance(planned, TablePath):
+            read_path_table(planned.file)
 
 
 def _check_programs(path: Path) -> None:
@@ -150,7 +157,10 @@ def check_file(path: Path) -> str:
         read_program(path)
         return "a robot program"
     if path.suffix not in (".yaml", ".yml"):
-        raise InputError(path, None, f"'{path.suffix}' files are none of er3a's inputs", "Give a .yaml or .csv file")
+        if not path.exists():
+            raise InputError(path, None, "there is no such file", "Check the path")
+        ending = f"'{path.suffix}' files" if path.suffix else "files without an ending"
+        raise InputError(path, None, f"{ending} are none of er3a's inputs", "Give a .yaml or .csv file")
     kind = read_yaml(path).get("kind")
     if not isinstance(kind, str) or kind not in _CHECKS:
         problem = "missing" if kind is None else f"'{kind}' is not known"
@@ -176,14 +186,26 @@ def _is_outside(folder: Path) -> bool:
 
 
 def _check_table(path: Path) -> str:
-    if path.stem not in FORMATS and {"target_x_mm", "seen_x_mm"} & set(read_header(path)):
+    header = [] if path.stem in FORMATS else read_header(path)
+    if {"target_x_mm", "seen_x_mm"} & set(header):
         return check_samples(path)
-    if path.stem not in FORMATS and "q1_deg" in read_text(path).partition("\n")[0]:
+    if {"q1_deg", "q1_mm"} & set(header) and "point" in header:
         load_measurements(path)
         return "measured positions"
-    if path.stem not in FORMATS and "alpha_deg" in read_text(path).partition("\n")[0]:
+    if is_printed_table(header):
         read_dh_table(path, "arm")
         return "a D-H table"
+    if {"name", *POSITION} <= set(header):
+        read_targets(path)
+        return _WORDS["targets"]
+    if {"q1_deg", "q1_mm", *POSITION} & set(header):
+        read_path_table(path)
+        return "a path"
+    if path.stem not in FORMATS:
+        remedy = "A D-H table has the columns joint, a_mm, alpha_deg, d_mm; targets name, x_mm, y_mm, z_mm and an "
+        remedy += "orientation; measured positions q1_deg ..., point, x_mm, y_mm, z_mm; a reference table is named one "
+        remedy += f"of {', '.join(f'{name}.csv' for name in FORMATS)}"
+        raise InputError(path, "header", "no table that er3a reads has these columns", remedy)
     check_reference_file(path)
     return f"references about {path.stem}"
 
@@ -198,8 +220,8 @@ def check_study(path: Path) -> Study:
             raise InputError(error.file or path, error.field, error.problem, error.remedy) from None
         sets = [load_references(reference, robot) for reference in robot.references]
         check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
-        read_targets(entry.targets)
-        _check_paths(Path(entry.paths))
+        load_targets(entry.targets, robot)
+        _check_paths(Path(entry.paths), robot)
         if entry.programs:
             _check_programs(Path(entry.programs))
         if entry.vision:

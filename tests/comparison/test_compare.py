@@ -12,6 +12,7 @@ from er3a.comparison.compare import best_of
 from er3a.files.arm_file import read_arm
 from er3a.formats.urdf_tree import read_chain
 from er3a.geometry.transforms import rot_x, rot_z
+from er3a.pipeline.messages.comparison import headline
 from testing.arm_pairs import KINDS, Arm, defined_elsewhere, flange_at, name, random_arm, with_wrong_entries
 from testing.arms import made_of
 from testing.published_tables import PAIRS, best_alignment_mm, urdf_flange, urdf_path, write_csv
@@ -219,6 +220,12 @@ def test_limits_are_compared_as_the_other_arms_zeros_and_directions_have_them():
     found = er3a.compare(right, other.replace(upper=other.upper + np.radians([0, 0, 0, 0, 2, 0]))).limits
     assert [(each.joint, each.entry) for each in found.differences] == [(5, "upper")]
     assert found.differences[0].b - found.differences[0].a == pytest.approx(2)
+
+
+def test_what_is_aligned_exactly_is_0_mm_off_in_words():
+    right = er3a.load_robot("er3a_c60")
+    turned = right.replace(offset=right.offset + np.radians([0, 0, 90, 0, 0, 0]))
+    assert headline(er3a.compare(turned, right)).endswith(" mm off as printed, 0 mm aligned)")
 
 
 def test_the_arm_that_fits_best_comes_first():

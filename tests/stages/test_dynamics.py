@@ -18,6 +18,7 @@ from er3a.dynamics.plausibility import MissingLink
 from er3a.errors import InputError
 from er3a.files.robot_file import Placement, WristLoadGroup, check_masses
 from er3a.files.robot_library import LoadFields
+from er3a.files.robot_writer import write_robot
 from er3a.pipeline.messages import dynamics
 from er3a.pipeline.messages.say import listed, say
 from er3a.pipeline.results import Stored, read_results
@@ -39,6 +40,7 @@ from er3a.pipeline.stages.dynamics.record import record
 from er3a.pipeline.stages.dynamics.report import report
 from er3a.pipeline.study import Study, load_study
 from er3a.robots.masses import Load
+from testing.arms import scara
 
 CLAIM = {"source": "made up", "grade": "claim"}
 LOAD = {"mass_kg": 1.5, "centre_mm": [20.0, 0.0, 90.0], "inertia_kg_m2": [0.002, 0.002, 0.001, 0.0, 0.0, 0.0]}
@@ -121,6 +123,22 @@ def test_a_robot_without_masses_has_no_data(tmp_path):
     assert len(found.results.torques) == 0
     for view, name in ((report, "page.html"), (record, "recording.rrd")):
         view(study, found, tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 1000
+
+
+def test_an_arm_of_four_joints_without_masses_gets_page_and_recording(tmp_path):
+    write_robot(scara().replace(name="arm"), tmp_path / "arm.yaml")
+    move = {"name": "move", "kind": "joint", "title": "move", "duration_s": 5, "samples": 20}
+    move |= {"start_deg": [0, 0, 50, 0], "end_deg": [20, 30, 90, 10]}
+    (tmp_path / "paths.yaml").write_text(yaml.safe_dump({"kind": "paths", "paths": [move]}))
+    study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
+    entry = {"file": str(tmp_path / "arm.yaml"), "targets": "none.yaml", "paths": str(tmp_path / "paths.yaml")}
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(study | {"robots": {"arm": entry}}))
+    of_scara = load_study(tmp_path / "study.yaml")
+    found = computed(tmp_path, of_scara, "arm")
+    assert found.status == "no_reference"
+    for view, name in ((report, "page.html"), (record, "recording.rrd")):
+        view(of_scara, found, tmp_path / name)
         assert (tmp_path / name).stat().st_size > 1000
 
 

@@ -125,8 +125,6 @@ def test_rotation_vectors_in_degrees_are_told(tmp_path, poses):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("flange_x_mm;flange_y_mm\n1;2\n", "separated by semicolons"),
-        ("flange_x_mm\tflange_y_mm\n1\t2\n", "separated by tabs"),
         ("hand,0.1,0.2\neye,0.1,0.2\n", "names no column of samples: hand, 0.1"),
         ("flange_x_m,flange_y_m,flange_z_m,flange_qw\n1,2,3,1\n", "not a unit"),
     ],

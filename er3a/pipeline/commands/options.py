@@ -129,14 +129,17 @@ def print_note(text: str) -> None:
 
 
 def print_warning(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
-    """Print an :class:`er3a.InputWarning` as one line; other warnings as Python shows them."""
+    """Print an :class:`er3a.InputWarning` as one line, once; other warnings as Python shows them."""
     if issubclass(category, InputWarning):
-        print(f"warning: {message}", file=sys.stderr)
+        if str(message) not in _told:
+            print(f"warning: {message}", file=sys.stderr)
+        _told.add(str(message))
     else:
         _show_warning(message, category, *rest, **named)
 
 
 _show_warning = warnings.showwarning
+_told: set[str] = set()
 
 
 def print_error(error: Er3aError | str) -> None:

@@ -58,7 +58,7 @@ def headline(found: Comparison) -> str:
         "{verdict} (at the worst joint angles the tool is {printed:.1f} mm off as printed, {aligned:.4g} mm aligned)",
         verdict=text,
         printed=found.as_printed_mm,
-        aligned=found.aligned_mm,
+        aligned=round(found.aligned_mm, 3),
     )
 
 

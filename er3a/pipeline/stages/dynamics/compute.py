@@ -490,7 +490,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         else (),
     )
     followed = [path.rows for path in paths if path.demand]
-    rows = model.TorqueRows.stacked(followed)
+    rows = model.TorqueRows.stacked(followed).of_joints(robot.slides)
     return model.DynamicsResults(summary, rows, diagram_rows(robot, load, settings.gravity_m_s2))
 
 

@@ -1,0 +1,109 @@
+"""D-H tables as books, articles and spreadsheets print them: every one gives the numbers that its book means."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import er3a
+from er3a.errors import InputError
+from er3a.files.dh_table import read_dh_table
+from er3a.files.robot_library import robot_of
+from testing.arms import dh_matrix
+
+CRAIG = """i,α(i−1),a(i−1),d(i),θ(i)
+1,0,0,0,θ1
+2,−90°,0,0,θ2
+3,0,431.8,149.09,θ3
+4,−90°,20.32,433.07,θ4
+5,90°,0,0,θ5
+6,−90°,0,0,θ6
+"""
+PI_FRACTIONS = """Link,a_i (m),α_i,d_i (m),θ_i
+1,0.07,−π/2,0.352,q1*
+2,0.36,0,0,q2 - π/2
+3,0.05,-pi/2,0,-q3
+4,0,0.5*pi,0.38,q4+1.5
+"""
+SPREADSHEET = """Gelenk;a [mm];alpha [°];d [mm];theta [°];;\r
+1;260,5;-90;675,0;q1;;\r
+2;680,0;0;0;q2-90;;\r
+;;;;;;\r
+"""
+STANFORD = """Link,θ,d,a,α
+1,θ1*,412,0,-90
+2,θ2*,154,0,90
+3,-90,d3*,0,0
+4,θ4*,0,0,-90
+"""
+CHINESE = """关节i,连杆长度a/mm,扭转角α/(°),偏距d/mm,关节角θ/(°)
+1,150,-90,450,θ1(0)
+2,590,0,0,θ2（-90）
+"""
+AT_ZERO = """joint,theta_deg,d_mm,a_mm,alpha_deg
+J1,0,450,150,-90
+J2,-90,0,590 mm,0
+"""
+RADIANS = """j,theta,d,a,alpha
+1,q1,400,70,pi/2
+2,q2-1.5707963267949,0,360,0
+"""
+# (a mm, alpha deg, d mm, direction, offset deg or None where the joint slides) for each row
+MEANT = {
+    "craig": (CRAIG, "modified", [(0, 0, 0, 1, 0), (0, -90, 0, 1, 0), (431.8, 0, 149.09, 1, 0)]),
+    "pi": (PI_FRACTIONS, "standard", [(70, -90, 352, 1, 0), (360, 0, 0, 1, -90), (50, -90, 0, -1, 0)]),
+    "spreadsheet": (SPREADSHEET, "standard", [(260.5, -90, 675, 1, 0), (680, 0, 0, 1, -90)]),
+    "stanford": (
+        STANFORD,
+        "standard",
+        [(0, -90, 412, 1, 0), (0, 90, 154, 1, 0), (0, 0, 0, 1, None), (0, -90, 0, 1, 0)],
+    ),
+    "chinese": (CHINESE, "standard", [(150, -90, 450, 1, 0), (590, 0, 0, 1, -90)]),
+    "at zero": (AT_ZERO, "standard", [(150, -90, 450, 1, 0), (590, 0, 0, 1, -90)]),
+    "radians": (RADIANS, "standard", [(70, 90, 400, 1, 0), (360, 0, 0, 1, -90)]),
+}
+
+
+@pytest.mark.parametrize("name", MEANT)
+def test_a_printed_table_gives_the_numbers_that_it_means(tmp_path, name):
+    text, convention, rows = MEANT[name]
+    (tmp_path / "arm.csv").write_bytes(text.encode("utf-8-sig"))
+    content, _ = read_dh_table(tmp_path / "arm.csv", "arm")
+    assert content.dh.convention == convention
+    for row, zero, (a, alpha, d, direction, offset) in zip(content.dh.rows, content.zero.rows, rows):
+        np.testing.assert_allclose([row.a_mm, row.alpha_deg, row.d_mm], [a, alpha, d], atol=1e-9)
+        assert zero.direction == direction
+        assert (row.type == "prismatic") == (offset is None)
+        assert zero.offset_deg is None or zero.offset_deg == pytest.approx(offset, abs=1e-9)
+
+
+def test_its_arm_stands_where_plain_matrices_put_it(tmp_path):
+    (tmp_path / "arm.csv").write_text(CRAIG, encoding="utf-8")
+    robot = robot_of(read_dh_table(tmp_path / "arm.csv", "arm")[0])
+    q = np.radians([10, -20, 30, 40, -50, 60])
+    T = np.eye(4)
+    for (alpha, a, d), angle in zip([(0, 0, 0), (-90, 0, 0), (0, 431.8, 149.09), (-90, 20.32, 433.07)], q):
+        T = T @ dh_matrix("modified", a / 1000, np.radians(alpha), d / 1000, angle)
+    T = T @ dh_matrix("modified", 0, np.pi / 2, 0, q[4]) @ dh_matrix("modified", 0, -np.pi / 2, 0, q[5])
+    np.testing.assert_allclose(er3a.forward(robot, q), T, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        ("1,70,90,352,θ1+θ2", "two variables"),
+        ("1,70,-π/2°,352,θ1", "fractions of pi in a column of degrees"),
+        ("1,70,90°00',352,θ1", "is not a number"),
+        ('1,"1,070",90,352,θ1', "nothing between thousands"),
+    ],
+)
+def test_a_cell_that_can_mean_two_things_is_refused(tmp_path, row, told):
+    (tmp_path / "arm.csv").write_text(f"i,a (mm),α,d (mm),θ\n{row}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=told):
+        read_dh_table(tmp_path / "arm.csv", "arm")
+
+
+def test_offsets_in_two_columns_are_refused(tmp_path):
+    (tmp_path / "arm.csv").write_text("i,a,alpha,d,theta,offset\n1,70,90,352,q1-90,90\n", encoding="utf-8")
+    with pytest.raises(InputError, match="another column"):
+        read_dh_table(tmp_path / "arm.csv", "arm")
