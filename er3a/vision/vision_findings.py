@@ -103,8 +103,11 @@ class PositionAxes:
     code: Literal["position_axes"] = "position_axes"
 
 
-ReadingKind = Literal["quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction"]
-READINGS: tuple[ReadingKind, ...] = get_args(ReadingKind)
+ReadingKind = Literal[
+    "quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction", "joint_zero"
+]
+READINGS: tuple[ReadingKind, ...] = get_args(ReadingKind)[:-1]
+"""What is tried of all samples; zeros only where joint values are recorded."""
 
 
 @dataclass(frozen=True)
@@ -176,6 +179,26 @@ class MovedBetween:
     code: Literal["moved_between"] = "moved_between"
 
 
+@dataclass(frozen=True)
+class NotConverged:
+    """The search for the likeliest poses, or for their intervals, does not end; what is given is where it stopped."""
+
+    samples: int
+    code: Literal["not_converged"] = "not_converged"
+
+
+@dataclass(frozen=True)
+class JointZero:
+    """The samples fit if a joint stands ``offset`` beside its recorded value, with half its 95 % interval."""
+
+    joint: int
+    offset_deg: float
+    half_width_deg: float
+    rms_given_mm: float
+    rms_other_mm: float
+    code: Literal["joint_zero"] = "joint_zero"
+
+
 RotationReading = QuaternionOrder | AngleOrder | TransposedRotations
 OtherReading = RotationReading | PositionAxes
 CalibrationWarning = (
@@ -191,11 +214,13 @@ CalibrationWarning = (
     | FewSamples
     | MoreScatter
     | MovedBetween
+    | NotConverged
+    | JointZero
 )
 
 
 MUCH_SCATTER = 3.0
-_GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, MovedBetween, *get_args(OtherReading))
+_GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, MovedBetween, NotConverged, JointZero, *get_args(OtherReading))
 
 
 def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationWarning, ...]:

@@ -250,7 +250,7 @@ def hand_eye(
     from er3a.pipeline.messages.vision import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
-    from er3a.vision.table_corrections import correct_table
+    from er3a.vision.table_corrections import correct_table, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
     arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
@@ -260,6 +260,7 @@ def hand_eye(
         at(f"{file}: the camera's pose is estimated")
         try:
             found = calibrate_hand_eye(samples)
+            found = zeros_tried(found, arm)[0] if arm else found
         except HandEyeError as error:
             raise Er3aError(f"{file}: {say(error.finding)}") from None
         at(f"{file}: the table's corrections are estimated")
