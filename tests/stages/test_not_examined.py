@@ -421,7 +421,7 @@ def test_a_line_whose_tilt_the_arms_joints_leave_off_is_no_pass(tmp_path, monkey
     for tilt, named in (([180, 0, 0], ()), ([165, 0, 0], ("tilted",))):
         ends = {"start": {"xyz_mm": [400, -50, 300], "rpy_deg": tilt}, "end": {"xyz_mm": [400, 50, 300], "rpy_deg": tilt}}
         line = {"name": "tilted", "title": "A line", "kind": "line", "duration_s": 4.0, "samples": 20, **ends}
-        Path("data/paths/scara.yaml").write_text(yaml.safe_dump({"kind": "paths", "paths": [line]}), encoding="utf-8")
+        Path("data/paths/scara.yaml").write_text(json.dumps({"kind": "paths", "paths": [line]}), encoding="utf-8")
         summary = trajectory(written, "scara").summary
         assert [path.verdict for path in summary.paths] == ["safe"]
         assert [each.names for each in summary.not_examined if each.subject == "orientations"] == [named] * bool(named)

@@ -398,8 +398,9 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
             lacking, outcome = wrist_partition_missing(robot), each.outcome_unfollowed
             skipped.append(model.PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
             continue
-        if motion.followed and each.expect in (None, "safe") and (seen := np.isfinite(motion.q).all(axis=1)).any():
-            turned.append((each.name, motion.tool(motion.t[seen]), motion.q[seen]))
+        path, seen = motion.built.tool, np.isfinite(motion.q).all(axis=1)
+        if path and seen.any() and each.expect in (None, "safe"):
+            turned.append((each.name, path.poses(path.progress(motion.t[seen])[0]), motion.q[seen]))
         found = judgement.judge(robot, motion, near, limits)
         along = judgement.measured(surroundings, motion)
         avoided = avoidance.avoid(motion, found, along)
