@@ -164,3 +164,15 @@ def test_each_file_that_a_study_names_is_looked_at(tmp_path, monkeypatch, place)
     study.write_text(yaml.safe_dump(content))
     with pytest.raises(InputError, match=r"users\.txt"):
         check_file(study)
+
+
+def test_a_robot_that_names_an_unknown_document_is_refused_with_its_field(tmp_path):
+    """As in a study with it: the robot's own reference sets say which documents there are."""
+    text = Path("data/robots/er3a_c60.yaml").read_text(encoding="utf-8")
+    file = tmp_path / "er3a_c60.yaml"
+    file.write_text(text.replace("  convention: standard\n", "  convention: standard\n  origin: hearsay\n", 1))
+    with pytest.raises(InputError, match="the document 'hearsay' is not known") as found:
+        check_file(file)
+    assert found.value.field == "dh.origin"
+    file.write_text(text, encoding="utf-8")
+    assert check_file(file) == "a robot"

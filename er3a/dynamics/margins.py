@@ -331,7 +331,8 @@ def load_diagram(
     if behind is None or not (wrist.moment or wrist.inertia):
         return None
     last, before = [np.full((len(mass), 1), np.inf) for _ in range(2)]
-    levers_of = [(joint, allowed / (mass[:, None] * gravity)) for joint, allowed in wrist.moment]
+    with np.errstate(divide="ignore"):  # a load without weight bends no wrist, however long its lever
+        levers_of = [(joint, allowed / (mass[:, None] * gravity)) for joint, allowed in wrist.moment]
     levers_of += [(joint, np.sqrt(allowed / mass[:, None])) for joint, allowed in wrist.inertia]
     for joint, lever in levers_of:
         last, before = (np.minimum(last, lever), before) if joint == robot.rows else (last, np.minimum(before, lever))

@@ -51,6 +51,16 @@ SCHEMAS: dict[str, type[BaseModel]] = {
 }
 
 
+def _check_robot(path: Path) -> None:
+    check_references(load_robot(path))
+
+
+def check_references(robot: Robot) -> None:
+    """Check a robot's reference sets, and that the documents which its file names are among theirs."""
+    sets = [load_references(reference, robot) for reference in robot.references]
+    check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
+
+
 def _check_paths(path: Path, robot: Robot | None = None) -> None:
     for i, planned in enumerate(load_paths(path).paths):
         if isinstance(planned, ProgramPath):
@@ -91,7 +101,7 @@ def _check_vision(path: Path) -> None:
 
 _CHECKS: dict[str, Callable[[Path], object]] = {
     "study": lambda path: check_study(path),
-    "robot": load_robot,
+    "robot": _check_robot,
     "targets": read_targets,
     "paths": _check_paths,
     "scene": load_scene,
@@ -218,8 +228,7 @@ def check_study(path: Path) -> Study:
             robot, entry = study.robot(name), study.entry(name)
         except InputError as error:
             raise InputError(error.file or path, error.field, error.problem, error.remedy) from None
-        sets = [load_references(reference, robot) for reference in robot.references]
-        check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
+        check_references(robot)
         load_targets(entry.targets, robot)
         _check_paths(Path(entry.paths), robot)
         if entry.programs:

@@ -136,9 +136,13 @@ LeftOutSubject = Literal[
     "program_torques",
     "program_loads",
     "drive_behaviour",
+    "other_gravity",
+    "mounting",
     "real_camera",
     "boardless_images",
     "left_out_samples",
+    "copied_samples",
+    "joint_zeros",
     "touched_points",
     "detections",
     "gripped_parts",
@@ -191,7 +195,7 @@ LeftOutSubject = Literal[
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
     (
-        *("obstacles", "uncovered_links", "bare_tool", "allowed_contacts", "program_rest", "given_rates"),
+        *("obstacles", "uncovered_links", "bare_tool", "allowed_contacts", "program_rest", "given_rates", "other_gravity"),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside"),
     )
 )

@@ -45,6 +45,7 @@ class CodeBuilder:
         self.name, self.parameters, self.place, self.thread = name, parameters, place, thread
         self.code: list[syntax.Operation] = []
         self.blocks: list[Block] = []
+        self.settings: tuple[tuple[str, syntax.Expression], ...] = ()  # of each motion of a block
         self._labels: dict[str, int] = {}
         self._gotos: list[tuple[int, str]] = []
         self._hidden = 0

@@ -373,7 +373,7 @@ LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 SURE = 0.95
 MOST_FACTS = 10
-SCALE_ROUNDS = 20
+ONE_MORE_ROUNDS = 20
 SURE_SCALE = 3.0  # half widths of its interval, from 0; a vaguer factor comes of samples that don't fit at all
 LEAST_SCALE_ERROR = 2e-3
 DIRECTIONS = ((False, False), (True, True), (True, False), (False, True))
@@ -449,6 +449,11 @@ class HandEye(ByValue, Displayed):
     without_suspects: Reals | None
     touch: TouchCheck | None
     mismatch: Reals
+
+    @property
+    def copies(self) -> tuple[str, ...]:
+        """Names of samples left out as equal to an earlier one in both poses."""
+        return tuple(name for name, copy in zip(self.samples.names, _copies(self.samples)) if copy)
 
     def sheet(self) -> Sheet:
         """The twelve numbers with half their 95 % intervals."""
@@ -604,6 +609,8 @@ def _warnings(
     directions: tuple[vision_findings.DirectionTried, ...],
 ) -> list[vision_findings.CalibrationWarning]:
     found: list[vision_findings.CalibrationWarning] = []
+    if not refined.converged.all():
+        found.append(vision_findings.NotConverged(len(samples)))
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
         found.append(vision_findings.LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
     if (places := _places(samples.flange)) <= FEW_SAMPLES:
@@ -629,23 +636,38 @@ def _warnings(
 
 def board_scale(samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[float, float]:
     """The factor by which distances seen have to grow to fit best, and half its 95 % interval."""
-    X, Y, s = refined.X, refined.Y, 1.0
-    weight = 1 / np.repeat(refined.deviations, 3)
-    for _ in range(SCALE_ROUNDS):
+    seen = np.concatenate([samples.target[:, :3, 3], np.zeros((len(samples), 3))], axis=1)
+
+    def grown(X: Reals, Y: Reals, s: float) -> tuple[Reals, Reals, Reals]:
         B = samples.target.copy()
-        B[:, :3, 3] *= s
-        raw, J = residuals(samples.hand, B, X, Y)
-        seen = np.concatenate([samples.target[:, :3, 3], np.zeros((len(B), 3))], axis=1)[..., None]
-        J = (np.concatenate([J, seen], axis=2) * weight[:, None]).reshape(-1, 13)
+        B[:, :3, 3] *= 1 + s
+        return *residuals(samples.hand, B, X, Y), seen
+
+    more, half_width, _ = with_one_more(grown, (refined.X, refined.Y), refined.deviations)
+    return 1 + more, half_width
+
+
+def with_one_more(
+    at: Callable[[Reals, Reals, float], tuple[Reals, Reals, Reals]], poses: tuple[Reals, Reals], deviations: Reals
+) -> tuple[float, float, Reals]:
+    """One more unknown beside the twelve: its value, half its 95 % interval, and the residuals (N, 6) with it.
+
+    ``at(X, Y, value)`` gives residuals (N, 6), their derivatives by the twelve (N, 6, 12), and by the value (N, 6).
+    """
+    (X, Y), value = poses, 0.0
+    weight = 1 / np.repeat(deviations, 3)
+    for _ in range(ONE_MORE_ROUNDS):
+        raw, J, own = at(X, Y, value)
+        J = (np.concatenate([J, own[..., None]], axis=2) * weight[:, None]).reshape(-1, UNKNOWNS + 1)
         r = (raw * weight).ravel()
         inverse = np.linalg.pinv(J.T @ J)
         step = -inverse @ (J.T @ r)
-        X, Y, s = moved(X, step[:6]), moved(Y, step[6:12]), float(s + step[12])
+        X, Y, value = moved(X, step[:6]), moved(Y, step[6:12]), float(value + step[12])
         if np.abs(step).max() < 1e-10:
             break
-    free = len(r) - 13
-    scatter = np.sqrt(r @ r / max(free, 1))
-    return s, float(scipy.special.stdtrit(max(free, 1), (1 + SURE) / 2) * scatter * np.sqrt(inverse[12, 12]))
+    free = max(len(r) - UNKNOWNS - 1, 1)
+    half_width = scipy.special.stdtrit(free, (1 + SURE) / 2) * np.sqrt(r @ r / free * inverse[12, 12])
+    return value, float(half_width), raw
 
 
 def _answer(

@@ -31,6 +31,7 @@ MOST_STEPS = 60
 STEP_ENDS = 1e-11  # m and rad
 VARIANCE_ROUNDS = 12
 WEIGHT_ROUNDS = 3
+SETTLED = 1e-2  # share by which deviations may still change in the last round
 START_DEVIATIONS = (1e-3, 5e-3)  # m, rad
 LEAST_DEVIATION = 1e-12
 
@@ -66,7 +67,7 @@ class Refined:
     freedom : (..., 12), degrees of freedom of the scale that each number's interval rests on
     scatter : (...,), root mean square of the whitened residuals, by degrees of freedom
     deviations : (..., 2), m and rad: of the camera's position and rotation, root mean square by axis
-    converged : (...,)
+    converged : (...,), whether the steps ended, and the deviations with them
     """
 
     X: Reals
@@ -157,6 +158,7 @@ def refine(seen: PoseObservations, X: Reals, Y: Reals) -> Refined:
             deviations = np.maximum(deviations * ratio, LEAST_DEVIATION)
             if np.abs(ratio - 1).max() < 1e-6:
                 break
+            converged = converged & (np.abs(ratio - 1) < SETTLED).all(axis=-1)
     freedom_all = 6.0 * seen.F.shape[-3] - UNKNOWNS
     scatter = np.sqrt((white**2).sum(axis=(-2, -1)) / freedom_all)
     if known is None:

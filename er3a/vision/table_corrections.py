@@ -10,7 +10,7 @@ with the weights and intervals of :mod:`er3a.vision.likelihood`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -24,12 +24,15 @@ from er3a.calibration.parameters import DEPENDENT, Parameter, parallel_pairs, pa
 from er3a.calibration.parameters import moved as moved_tables
 from er3a.geometry.transforms import inverse_right_jacobian, inverted, moved, step_between
 from er3a.kinematics.chain import row_values
+from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import Tables, frames_of, join, robot_of, tables_of
 from er3a.numerics.arrays import Reals
+from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
 from er3a.vision import likelihood
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.hand_eye import SURE, HandEye
+from er3a.vision.hand_eye import SURE, HandEye, calibrate_hand_eye, with_one_more
+from er3a.vision.vision_findings import CalibrationWarning, JointZero, UnexplainedResiduals, grave_warnings
 
 STEP = 1e-6  # m and rad
 STEPS = 40
@@ -132,6 +135,91 @@ def correct_table(found: HandEye, robot: Robot, level: LevelName = "all_entries"
         return NoCorrections("few")
     fit = _fit(problem, kept, found)
     return NoCorrections("steps") if fit is None else _result(problem, (level, kept, held), found, fit)
+
+
+ZERO_CHANCE = 1e-4  # of sound sets in which a zero is called wrong
+LEAST_ZERO = np.radians(0.5)
+ZERO_STEP = 1e-5
+
+
+def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...]]:
+    """A calibration whose warnings name the joint with a wrong zero, if one explains all that speaks against it.
+
+    A zero is named if its value is more than chance, and nothing grave speaks against the samples with it.
+
+    Returns
+    -------
+    found, unseen : names of joints whose zero the samples don't tell from the two poses: all where no joint values are
+        recorded, those that slide, and mostly the first and the last
+    """
+    names, q = joint_names(robot), found.samples.q
+    if q is None:
+        return found, names
+    samples = found.samples.take(found.used)
+    squares = float(((found.residual[found.used] / np.repeat(found.deviations, 3)) ** 2).sum())
+    free = 6 * len(samples) - likelihood.UNKNOWNS - 1
+    best, unseen = (1.0, 0, 0.0, 0.0, np.inf), []
+    for k, name in enumerate(names):
+        turn = _Turned(robot, samples, k)
+        if robot.slides[k] or not turn.seen(found.X, found.Y):
+            unseen.append(name)
+            continue
+        value, half_width, raw = with_one_more(turn.at, (found.X, found.Y), found.deviations)
+        left = float(((raw / np.repeat(found.deviations, 3)) ** 2).sum())
+        chance = float(scipy.special.fdtrc(1, free, max(squares - left, 0.0) / (left / free))) * len(names)
+        rms = float(1000 * np.sqrt((raw[:, :3] ** 2).mean()))
+        best = min(best, (chance, k, value, half_width, rms))
+    chance, k, value, half_width, rms = best
+    tried = replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
+    explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
+    if chance > ZERO_CHANCE or abs(value) < LEAST_ZERO or not explained:
+        return tried, tuple(unseen)
+    mended = _Turned(robot, found.samples, k).flange(value)
+    if grave_warnings(calibrate_hand_eye(replace(found.samples, flange=mended)).warnings):
+        return tried, tuple(unseen)
+    given = float(1000 * np.sqrt((found.residual[found.used, :3] ** 2).mean()))
+    zero = JointZero(k + 1, float(np.degrees(value)), float(np.degrees(half_width)), given, rms)
+    others = tuple(each for each in found.warnings if each.code not in EXPLAINED_BY_A_ZERO)
+    return replace(found, warnings=(zero, *others)), tuple(unseen)
+
+
+EXPLAINED_BY_A_ZERO = {"board_scale", "unexplained_residuals", "moved_between", "more_scatter"}
+
+
+def _zeros_too(warning: CalibrationWarning) -> CalibrationWarning:
+    if isinstance(warning, UnexplainedResiduals):
+        return replace(warning, tried=(*warning.tried, "joint_zero"))
+    return warning
+
+
+@dataclass(frozen=True, eq=False)
+class _Turned:
+    """Samples whose joint k, from 0, stands beside its recorded values."""
+
+    robot: Robot
+    samples: CalibrationSet
+    k: int
+
+    def flange(self, value: float) -> Reals:
+        """T_base_flange (N, 4, 4) with this many rad more."""
+        return forward(self.robot.without_tool(), self.samples.q + value * np.eye(self.robot.joints)[self.k])
+
+    def at(self, X: Reals, Y: Reals, value: float) -> tuple[Reals, Reals, Reals]:
+        """As :func:`er3a.vision.hand_eye.with_one_more` asks for it."""
+        flange, setup = self.flange(value), self.samples.setup
+        F = flange if setup == "eye_in_hand" else inverted(flange)
+        raw, J = likelihood.residuals(F, self.samples.target, X, Y)
+        shift = step_between(self.flange(value - ZERO_STEP), self.flange(value + ZERO_STEP)) / (2 * ZERO_STEP)
+        own = -np.einsum("nij,nj->ni", likelihood.flange_to_camera(setup, F, X, Y), shift)
+        own[:, 3:] = np.einsum("nij,nj->ni", inverse_right_jacobian(raw[:, 3:]), own[:, 3:])
+        return raw, J, own
+
+    def seen(self, X: Reals, Y: Reals) -> bool:
+        """Whether the zero moves the samples otherwise than the two poses do."""
+        _, J, own = self.at(X, Y, 0.0)
+        J, column = J.reshape(-1, J.shape[-1]), own.ravel()
+        left = column - J @ np.linalg.lstsq(J, column, rcond=None)[0]
+        return bool(np.linalg.norm(left) > DEPENDENT * np.linalg.norm(column))
 
 
 def _seen(samples: CalibrationSet, F: Reals, covariance: Reals | None) -> likelihood.PoseObservations:

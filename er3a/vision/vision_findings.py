@@ -87,8 +87,11 @@ class PositionAxes(Finding):
     rms_other_mm: float
 
 
-ReadingKind = Literal["quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction"]
-READINGS: tuple[ReadingKind, ...] = get_args(ReadingKind)
+ReadingKind = Literal[
+    "quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction", "joint_zero"
+]
+READINGS: tuple[ReadingKind, ...] = get_args(ReadingKind)[:-1]
+"""What is tried of all samples; zeros only where joint values are recorded."""
 
 
 class UnexplainedResiduals(Finding):
@@ -146,6 +149,22 @@ class MovedBetween(Finding):
     probability: float
 
 
+class NotConverged(Finding):
+    """The search for the likeliest poses, or for their intervals, does not end; what is given is where it stopped."""
+
+    samples: int
+
+
+class JointZero(Finding):
+    """The samples fit if a joint stands ``offset`` beside its recorded value, with half its 95 % interval."""
+
+    joint: int
+    offset_deg: float
+    half_width_deg: float
+    rms_given_mm: float
+    rms_other_mm: float
+
+
 RotationReading = QuaternionOrder | AngleOrder | TransposedRotations
 OtherReading = RotationReading | PositionAxes
 CalibrationWarning = (
@@ -161,11 +180,13 @@ CalibrationWarning = (
     | FewSamples
     | MoreScatter
     | MovedBetween
+    | NotConverged
+    | JointZero
 )
 
 
 MUCH_SCATTER = 3.0
-_GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, MovedBetween, *get_args(OtherReading))
+_GRAVE = (NoMajority, BoardScale, UnexplainedResiduals, MovedBetween, NotConverged, JointZero, *get_args(OtherReading))
 
 
 def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationWarning, ...]:

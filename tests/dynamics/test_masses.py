@@ -7,9 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio
 import pytest
 import trimesh
 import yaml
+from scipy.spatial.transform import Rotation
 
 import er3a
 from er3a.dynamics.arm_model import capsule_body, estimated_links, filled
@@ -237,6 +239,24 @@ def test_a_written_file_reads_back(arm, tmp_path):
 
 
 # URDF
+
+
+@pytest.mark.parametrize("rpy_deg", [(90, 0, 0), (0, 90, 0), (0, -90, 30), (180, 0, 0), (25, 0, 70)])
+def test_torques_of_an_arm_on_a_wall_a_ceiling_or_a_slope_are_pinocchios(rpy_deg):
+    """Pinocchio has the URDF of the arm on the floor, and a gravity turned the other way."""
+    robot = er3a.load_robot("er3a_c60").without_tool()
+    R = Rotation.from_euler("xyz", rpy_deg, degrees=True).as_matrix()
+    base = np.eye(4)
+    base[:3, :3], base[:3, 3] = R, (0.5, -1.0, 2.0)
+    model = pinocchio.buildModelFromXML(export_urdf(robot))
+    model.gravity.linear = R.T @ [0.0, 0.0, -9.81]
+    random = np.random.default_rng(3)
+    q, qd, qdd = random.uniform(-1, 1, (3, 20, 6))
+    theirs = [pinocchio.rnea(model, model.createData(), *each) for each in zip(q, qd, qdd)]
+    ours = er3a.torques(robot.replace(base=base), q, qd, qdd)
+    np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.abs(theirs).max())
+    upright = er3a.torques(robot, q, qd, qdd)
+    assert np.abs(ours - upright).max() > 1.0
 
 
 def test_urdf_out_and_in_keeps_the_torques(arm, tmp_path):

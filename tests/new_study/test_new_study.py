@@ -136,7 +136,30 @@ def test_the_readme_tells_what_stands_there_and_which_references_count(written):
     text = (folder / "README.md").read_text(encoding="utf-8")
     assert f"data/robots/{name}.yaml" in text
     assert ("no references yet" in text) == (not load_robot(name).references)
+    for each in load_robot(name).references:
+        assert len(load_references(folder / "data/manual_refs" / each).documents.by_name) > 0
     assert (folder / "data/robots" / f"{name}.yaml").read_bytes() == (ROOT / f"data/robots/{name}.yaml").read_bytes()
+
+
+def test_the_references_of_a_robot_come_along(tmp_path):
+    """A shipped robot's, and those that stand beside a robot's file wherever it is."""
+    shipped = arm_of(None, None, "er3a_c60").references
+    assert shipped["data/manual_refs/er3a_c60/limits.csv"].startswith("joint")
+    for place, text in shipped.items():
+        assert text == (ROOT / place).read_text(encoding="utf-8")
+    other = tmp_path / "cell"
+    shutil.copytree(ROOT / "data/manual_refs/er3a_c60", other / "data/manual_refs/mine")
+    text = (ROOT / "data/robots/er3a_c60.yaml").read_text(encoding="utf-8")
+    file = other / "data/robots/er3a_c60.yaml"
+    file.parent.mkdir()
+    file.write_text(text.replace("references: [er3a_c60]", "references: [mine]"), encoding="utf-8")
+    arm = arm_of(None, None, str(file))
+    assert list(arm.references.values()) == list(shipped.values())
+    for place in arm.references:
+        assert place.startswith("data/manual_refs/mine/")
+    shutil.rmtree(other / "data/manual_refs")
+    with pytest.raises(InputError, match="no reference set 'mine'"):
+        arm_of(None, None, str(file))
 
 
 def test_a_urdf_with_an_odd_name(tmp_path):

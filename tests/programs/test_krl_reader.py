@@ -290,3 +290,26 @@ def test_lines_that_are_no_krl_are_kept_and_named(line, tmp_path):
 def test_a_position_of_axes_and_coordinates_is_none(tmp_path):
     (motion,) = moves(run(tmp_path, "PTP {X 400,A1 5}"))
     assert motion.target.reason == "not_understood"
+
+
+def test_what_a_splines_head_says_holds_for_its_segments_alone(tmp_path):
+    """A segment's own WITH comes after it; behind the block the frames are those of before."""
+    where = "{X 400,Y 0,Z 500,A 0,B 90,C 0}"
+    body = f"""$TOOL=$NULLFRAME
+$BASE=$NULLFRAME
+SPLINE WITH $BASE={{X 100,Y 0,Z 0,A 0,B 0,C 0}}, $VEL.CP=0.1
+SLIN {where}
+SLIN {where} WITH $BASE={{X 7,Y 0,Z 0,A 0,B 0,C 0}}
+ENDSPLINE
+SLIN {where}"""
+    found = moves(run(tmp_path, body))
+    assert [each.base.pose[0, 3] for each in found] == [0.1, 0.007, 0.0]
+    assert [each.speed.value for each in found[:2]] == [0.1, 0.1]
+
+
+def test_relative_motions_by_a_tool_beside_the_arm_are_not_understood(tmp_path):
+    """The workpiece moves by them, not the tool: the way of the flange is another."""
+    body = "$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}\n$IPO_MODE=#TCP\n"
+    line, joint = moves(run(tmp_path, f"{body}LIN_REL {{X 5}}\nPTP_REL {{A1 5}}", robot=load_robot("er3a_c60")))[1:]
+    assert line.target.reason == "external_tool"
+    assert not isinstance(joint.target, PoseTarget)

@@ -241,3 +241,14 @@ def test_structures_lists_and_remote_objects_of_urscript(tmp_path):
     np.testing.assert_allclose(first.target.joints, [0.1, 0, 0, 0, -1, 0])
     np.testing.assert_allclose(second.target.joints, first.target.joints)
     assert [step for step in execution.steps if isinstance(step.instruction, Unknown)] == []
+
+
+@pytest.mark.parametrize(
+    ("up", "known"),
+    [("[0, 0, 9.82]", True), ("[0.05, 0, 9.82]", True), ("[9.82, 0, 0]", False), ("[0, 0, -9.82]", False), ("g", False)],
+)
+def test_gravity_that_says_that_the_arm_hangs_is_not_passed_over(tmp_path, up, known):
+    path = tmp_path / "wall.script"
+    path.write_text(f"def wall():\n  set_gravity({up})\n  movej([0,-1,1,0,1,0])\nend\n", encoding="utf-8")
+    first = execute(read_program(path)).steps[0].instruction
+    assert isinstance(first, Aside if known else Unknown)

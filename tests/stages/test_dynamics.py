@@ -251,7 +251,7 @@ def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
     assert left["paths_not_run"].names == ("line_shoulder", "line_out")
     assert left["torque_peaks"].amount == 101
     named = {each.subject for each in full[1].results.summary.not_examined}
-    assert named == {"paths_not_run", "torque_peaks", "program_torques", "drive_behaviour"}
+    assert named == {"paths_not_run", "torque_peaks", "program_torques", "drive_behaviour", "mounting"}
 
     def change(content: dict[str, Any]) -> None:
         limited(1.0)(content)
@@ -351,6 +351,25 @@ def test_process_forces_and_gravity_reach_the_results(tmp_path, bare):
     assert np.abs(rows.gravity).max() == 0
     assert np.abs(rows.tool).max() > 5
     assert np.abs(bare.results.torques.tool).max() == 0
+
+
+@pytest.mark.parametrize(("gravity", "named"), [(0.0, True), (1.62, True), (9.8, False)])
+def test_no_verdict_passes_by_a_gravity_that_is_not_earths(tmp_path, gravity, named):
+    """Weightless, any drive is strong enough."""
+    study = a_study(
+        tmp_path, limited(20.0), entry={"payload": CLAIM | {"body": LOAD}}, settings={"gravity_m_s2": gravity}, kept=ONE
+    )
+    summary = computed(tmp_path, study).results.summary
+    left = {each.subject: each.amount for each in summary.not_examined}
+    assert left.get("other_gravity") == (gravity if named else None)
+    assert ("other_gravity" in {each.subject for each in summary.verdict.missed}) == named
+
+
+@pytest.mark.parametrize("rpy_deg", [None, [0, 0, 0], [90, 0, 0]])
+def test_a_mounting_that_nothing_states_is_named(tmp_path, rpy_deg):
+    placed = {"base": {"xyz_mm": [0, 0, 0], "rpy_deg": rpy_deg}} if rpy_deg else {}
+    summary = computed(tmp_path, a_study(tmp_path, entry=placed, kept=ONE)).results.summary
+    assert ("mounting" in {each.subject for each in summary.not_examined}) == (rpy_deg is None)
 
 
 def test_a_load_concerns_this_stage_alone(full):

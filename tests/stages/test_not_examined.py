@@ -22,6 +22,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import LEAST_SINGULAR_VALUE
 from er3a.pipeline.messages.left_out import left_out_names, left_out_text
 from er3a.pipeline.messages.say import say, say_all
+from er3a.pipeline.new_study.write import arm_of, write_study
 from er3a.pipeline.results import (
     NEVER_A_PASS,
     LeftOut,
@@ -35,8 +36,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.inverse.compute import compute as inverse
-from er3a.pipeline.stages.inverse.compute import orientations_off
-from er3a.pipeline.stages.left_out import left_out_of_collisions
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_orientations
 from er3a.pipeline.stages.programs.compute import compute as programs
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as trajectory
@@ -349,6 +349,15 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
         verdict = vision(changed(study, {"vision": str(tmp_path / "vision.yaml")}, vision=few), ROBOT).summary.verdict
         assert verdict.status == ("caution" if subject else "pass"), more
         assert [(each.subject, each.names) for each in verdict.missed] == ([(subject, names)] if subject else [])
+    rows = (tmp_path / "fixed_camera.csv").read_text(encoding="utf-8").splitlines()
+    again = "again" + rows[-1][rows[-1].index(",") :]
+    (tmp_path / "fixed_camera.csv").write_text("\n".join([*rows, again, ""]), encoding="utf-8")
+    summary = vision(changed(study, {"vision": str(tmp_path / "vision.yaml")}, vision=few), ROBOT).summary
+    left = {each.subject: each.names for each in summary.not_examined}
+    assert left["left_out_samples"] == ("pose_12",)
+    assert left["copied_samples"] == ("again",)
+    assert left["joint_zeros"] == ("J1", "J6")
+    assert summary.verdict.finding.left_out == ("pose_12", "again")
 
 
 def test_what_no_verdict_passes_without_turns_it_and_is_said():
@@ -393,12 +402,30 @@ def test_orientations_that_an_arm_of_few_joints_leaves_off_are_named():
     q = np.array([[0.3, 0.5, 0.1, 0.2], [0.5, -0.5, 0.05, 0.0]])
     T = forward(scara, q)
     tilted = T[1] @ transform(np.zeros(3), np.array([np.radians(30), 0, 0]))
-    targets = {name: SimpleNamespace(T=pose) for name, pose in (("own", T[0]), ("tilted", tilted))}
-    asked = [SimpleNamespace(name=name) for name in targets]
-    (found,) = orientations_off(scara, targets, asked, q)
+    asked = [("own", T[0], q[0]), ("tilted", tilted, q[1])]
+    (found,) = left_out_of_orientations(scara, asked)
     assert found == LeftOut("orientations", ("tilted",), pytest.approx(30))
-    assert list(orientations_off(scara, targets, asked[:1], q[:1])) == []
+    assert left_out_of_orientations(scara, asked[:1]) == ()
     assert "orientations" in NEVER_A_PASS
+
+
+@pytest.mark.long
+def test_a_line_whose_tilt_the_arms_joints_leave_off_is_no_pass(tmp_path, monkeypatch):
+    """A SCARA runs it upright, however it is asked to turn."""
+    monkeypatch.chdir(tmp_path)
+    rows = ["1,revolute,325,0,400,-130,130,,", "2,revolute,275,180,0,-140,140,,", "3,prismatic,0,0,0,,,0,200"]
+    head = "joint,type,a_mm,alpha_deg,d_mm,lower_deg,upper_deg,lower_mm,upper_mm"
+    (tmp_path / "scara.csv").write_text("\n".join([head, *rows, "4,revolute,0,0,50,-360,360,,"]), encoding="utf-8")
+    write_study(arm_of(None, tmp_path / "scara.csv", None), tmp_path)
+    written = load_study("config/config.yaml")
+    for tilt, named in (([180, 0, 0], ()), ([165, 0, 0], ("tilted",))):
+        ends = {"start": {"xyz_mm": [400, -50, 300], "rpy_deg": tilt}, "end": {"xyz_mm": [400, 50, 300], "rpy_deg": tilt}}
+        line = {"name": "tilted", "title": "A line", "kind": "line", "duration_s": 4.0, "samples": 20, **ends}
+        Path("data/paths/scara.yaml").write_text(json.dumps({"kind": "paths", "paths": [line]}), encoding="utf-8")
+        summary = trajectory(written, "scara").summary
+        assert [path.verdict for path in summary.paths] == ["safe"]
+        assert [each.names for each in summary.not_examined if each.subject == "orientations"] == [named] * bool(named)
+        assert ("orientations" in {each.subject for each in summary.verdict.missed}) == bool(named)
 
 
 def test_what_the_robots_file_allows_and_where_the_base_stands_is_named():

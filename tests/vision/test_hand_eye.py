@@ -202,6 +202,14 @@ def test_copies_of_samples_narrow_no_interval():
     np.testing.assert_allclose(found.half_width, calibrate_hand_eye(once).half_width, rtol=1e-6)
     assert found.used.sum() == 6
     assert sum(isinstance(each, RepeatedPose) for each in found.suspects) == 12
+    assert found.copies == tuple(str(k) for k in range(7, 19))
+
+
+def test_a_fit_that_does_not_converge_can_not_be_used():
+    """Three samples: the two variances run away from each other, and intervals change threefold from round to round."""
+    for seed, converged in ((4, True), (5, False)):
+        found = calibrate_hand_eye(a_set("eye_in_hand", seed, 3))
+        assert ("not_converged" in {each.code for each in grave_warnings(found.warnings)}) == (not converged)
 
 
 def test_a_pose_written_again_at_the_end_is_no_other_setup():

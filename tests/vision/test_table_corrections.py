@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -11,7 +13,8 @@ from scipy.stats import t as student
 from er3a.calibration.outcomes import MovesNothing, NotToldApart
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
-from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table
+from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table, zeros_tried
+from er3a.vision.vision_findings import grave_warnings
 from testing.hand_eye_coverage import POSITION, ROBOT, ROTATION, a_set
 from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
 
@@ -57,6 +60,29 @@ def test_what_can_not_be_told_apart_is_named(setup, base, flange):
         assert held[entry].entries == (entry, pose)
     assert set(held["d2"].entries) == {"d2", "d3"}
     assert held["d2"].parallel_joints == (2, 3)
+
+
+@pytest.mark.parametrize("setup", ["eye_in_hand", "eye_to_hand"])
+def test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_examined(setup):
+    for joint, deg in ((3, 5.0), (6, 5.0), (3, 0.0)):
+        samples = a_set(setup, 5, {f"offset{joint}": ROBOT.direction[joint - 1] * np.radians(deg)}, 12, stated=False)
+        found, unseen = zeros_tried(calibrate_hand_eye(samples), ROBOT)
+        assert unseen == ("J1", "J6")
+        if joint in (1, 6) or not deg:
+            assert found.warnings == ()
+            continue
+        (zero,) = grave_warnings(found.warnings)
+        assert zero.joint == joint
+        assert abs(zero.offset_deg - deg) < 2 * zero.half_width_deg < 0.5
+    poses = replace(samples, q=None)
+    assert zeros_tried(calibrate_hand_eye(poses), ROBOT)[1] == ("J1", "J2", "J3", "J4", "J5", "J6")
+
+
+def test_a_moved_camera_is_no_joint_zero():
+    samples = a_set("eye_to_hand", 6, {}, 14, stated=False)
+    samples.target[7:, :3, 3] += [0.02, 0, 0]
+    found, _ = zeros_tried(calibrate_hand_eye(samples), ROBOT)
+    assert "moved_between" in {each.code for each in found.warnings}
 
 
 @pytest.mark.long

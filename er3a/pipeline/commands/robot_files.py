@@ -264,7 +264,7 @@ def hand_eye(
     from er3a.pipeline.messages.vision import correction_lines, hand_eye_lines, hand_eye_record
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
-    from er3a.vision.table_corrections import correct_table
+    from er3a.vision.table_corrections import correct_table, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
     arm, asked = load_robot(robot) if robot else None, load(HandEyeFile, file).table_corrections
@@ -274,6 +274,7 @@ def hand_eye(
         at(f"{file}: estimating the camera's pose")
         try:
             found = calibrate_hand_eye(samples)
+            found = zeros_tried(found, arm)[0] if arm else found
         except HandEyeError as error:
             raise Er3aError(f"{file}: {say(error.finding)}") from None
         at(f"{file}: estimating corrections of the table")

@@ -66,9 +66,21 @@ TEXTS = texts(
         "left_out.drive_behaviour": (
             "what changes with speed, heat and wear in motors, gears and brakes, and what elasticity adds"
         ),
+        "left_out.other_gravity": (
+            "torques on the ground: the study sets gravity to {amount:g} m/s², which no place on Earth has"
+        ),
+        "left_out.mounting": (
+            "torques of an arm on a wall, a slope or a ceiling: neither robot file nor study places the base, and it "
+            "is taken to stand upright"
+        ),
         "left_out.real_camera": "what a real camera sees: the samples are simulated",
         "left_out.boardless_images": "images in which no board was found",
         "left_out.left_out_samples": "samples that contradict the others: the calibration does not rest on them",
+        "left_out.copied_samples": "samples that repeat another one exactly: they measure nothing and are left out",
+        "left_out.joint_zeros": (
+            "whether the zeros of these joints are right: the samples hold no joint angles, or a wrong zero acts on "
+            "them as another pose of camera or board would"
+        ),
         "left_out.touched_points": "where the arm really touches what the camera sees: no touched points are given",
         "left_out.detections": "whether detected objects are where the detector says, within the deviations stated",
         "left_out.gripped_parts": "collisions of the objects themselves and of a part in the gripper",
@@ -98,7 +110,7 @@ TEXTS = texts(
         "left_out.uncertain_solutions": "whether the solutions found are all",
         "left_out.advice": "what would help at targets without a solution",
         "left_out.orientations": (
-            "how the tool is turned at these targets: the arm's joints set only part of it (off by up to {amount:.1f}°)"
+            "how the tool is turned at these targets and on these paths: the arm's joints set only part of it (off by up to {amount:.1f}°)"
         ),
         "left_out.rules": "rules of the mix for which the robot's file has no data",
         "left_out.ways_between": "motions from one target, or path, to the next",

@@ -58,6 +58,7 @@ READING_WORDS: dict[ReadingKind, str] = {
     "transposed_rotations": N_("transposed rotations"),
     "position_axes": N_("axes of positions negated or swapped"),
     "other_direction": N_("inverted poses"),
+    "joint_zero": N_("the zero of one joint"),
 }
 POSES = {
     "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
@@ -192,6 +193,15 @@ TEXTS = texts(
             "of the two parts of the set alone, or take the samples again",
             board="from {sample} on the board stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one of "
             "the two parts of the set alone, or take the samples again",
+        ),
+        "not_converged": (
+            "the fit of the {samples} samples does not converge, so neither the poses nor their intervals hold: add "
+            "samples, and check that both streams belong together"
+        ),
+        "joint_zero": (
+            "the zero of J{joint}, or another entry of the arm's table, is wrong: with the joint {offset_deg:+.2f} ± "
+            "{half_width_deg:.1g} deg from its recorded angle the residuals are {rms_other_mm:.2g} mm, as given "
+            "{rms_given_mm:.3g} mm. Set the joint's zero again and repeat the samples"
         ),
         "few_samples": (
             "samples at only {samples} poses: a wrong one can't be found among so few, and the intervals rest on "

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, combinations, islice, product
 from pathlib import Path
@@ -24,11 +24,11 @@ import numpy as np
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
-from er3a.errors import Er3aError
+from er3a.errors import Er3aError, InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.kept_files import ROOT, write_atomically
 from er3a.files.path_file import PathFile, ProgramPath
-from er3a.files.reference_sets import FORMATS
+from er3a.files.reference_sets import FORMATS, reference_folder
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
 from er3a.files.robot_library import read_robot, robot_of, robot_path
 from er3a.files.robot_writer import robot_file, robot_text, yaml_text
@@ -436,12 +436,14 @@ class Arm:
     text : of the robot file
     notes : what was assumed about it, in words
     meshes : what links have as shapes of their meshes, if any
+    references : texts of the files of its reference sets, by their place in the study
     """
 
     robot: Robot
     text: str
     notes: tuple[str, ...] = ()
     meshes: Literal["hulls", "pieces"] | None = None
+    references: Mapping[str, str] = field(default_factory=dict)
 
 
 def arm_of(
@@ -507,14 +509,28 @@ def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None], split
 
 
 def _known(robot: str, name: str | None) -> Arm:
-    """A robot file as it is written, with its comments; under another name if one is asked for."""
+    """A robot file as it is written, with its comments, and its references; under another name if one is asked for."""
     path = robot_path(robot)
     content = read_robot(path)
     text = read_text(path)
     if name is not None and name != content.name:
         content = content.model_copy(update={"name": name})
         text = re.sub(r"^name:.*$", f"name: {name}", text, count=1, flags=re.MULTILINE)
-    return Arm(robot_of(content), text)
+    return Arm(robot_of(content), text, references=_references(path, content.references))
+
+
+def _references(robot: Path, names: Sequence[str]) -> dict[str, str]:
+    """The files of sets that stand beside a robot's file, else in the study at hand or in er3a."""
+    found = {}
+    for name in names:
+        beside = robot.parent.parent / "manual_refs" / name
+        folder = beside if beside.is_dir() else reference_folder(name)
+        if not folder.is_dir():
+            problem, remedy = f"there is no reference set '{name}'", f"Copy its folder to {beside}, or leave the name out"
+            raise InputError(robot, "references", problem, remedy)
+        files = (each for each in sorted(folder.iterdir()) if each.suffix.lower() in (".csv", ".po"))
+        found |= {f"{REFERENCES}/{name}/{each.name}": each.read_text(encoding="utf-8") for each in files}
+    return found
 
 
 def _text(content: RobotFile) -> str:
@@ -523,7 +539,8 @@ def _text(content: RobotFile) -> str:
 
 STUDY = "config/config.yaml"
 SCENE = "data/scenes/cell.yaml"
-HELP = "data/manual_refs/README.md"
+REFERENCES = "data/manual_refs"
+HELP = f"{REFERENCES}/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
@@ -575,7 +592,8 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
         a file stands where one would be written; then nothing is written
     """
     name = arm.robot.name
-    places = {"README.md", STUDY, SCENE, *(f"data/{kind}/{name}.yaml" for kind in ("robots", "targets", "paths"))}
+    own = (f"data/{kind}/{name}.yaml" for kind in ("robots", "targets", "paths"))
+    places = {"README.md", STUDY, SCENE, *own, *arm.references}
     if there := sorted(place for place in places if (folder / place).exists()):
         raise Er3aError(f"{folder / there[0]} is there already, and is kept; give another folder")
     found = _found(arm)
@@ -586,6 +604,7 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
         f"data/targets/{name}.yaml": _with_schema("targets", {"kind": "targets", "targets": _targets(found)}),
         f"data/paths/{name}.yaml": _with_schema("paths", {"kind": "paths", "paths": found.paths}),
         "README.md": _readme(arm, found),
+        **arm.references,
     }
     aids = [HELP, *(f"config/{kind}.schema.json" for kind in SCHEMAS)]
     texts |= {place: (ROOT / place).read_text(encoding="utf-8") for place in aids}

@@ -11,7 +11,9 @@ from er3a.collision.matrix import PairState, base_contacts
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, has_bare_tool
-from er3a.numerics.arrays import Flags
+from er3a.geometry.transforms import rotation_angle
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import LeftOut, LeftOutSubject
 from er3a.robots.robot import Robot
 
@@ -69,6 +71,19 @@ def left_out_of_collisions(
 def left_out_without_tool(robot: Robot) -> tuple[LeftOut, ...]:
     """That the flange's centre stands for a tool's tip, if the robot's file gives no tool."""
     return () if "tool" in robot.sources or not np.array_equal(robot.tool, np.eye(4)) else (LeftOut("tool"),)
+
+
+ORIENTATION_OFF_DEG = 0.1  # of what an arm of few joints can't set, which a target may be off by
+
+
+def left_out_of_orientations(robot: Robot, asked: Iterable[tuple[str, Reals, Reals]]) -> tuple[LeftOut, ...]:
+    """Targets and paths, by name, whose poses (..., 4, 4) the joints (..., n) keep but for how the tool is turned.
+
+    An arm of few joints sets only part of it.
+    """
+    angles = {name: np.degrees(rotation_angle(forward(robot, q)[..., :3, :3], T[..., :3, :3])) for name, T, q in asked}
+    off = {name: float(np.nanmax(each)) for name, each in angles.items() if np.nanmax(each) > ORIENTATION_OFF_DEG}
+    return (LeftOut("orientations", tuple(off), amount=max(off.values())),) if off else ()
 
 
 def left_out_of_rates(speed_known: Flags, jerk: bool) -> tuple[LeftOut, ...]:

@@ -75,6 +75,8 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
         if memory.here.joints is None or not isinstance(change, instructions.JointTarget):
             return instructions.UnresolvedTarget(text, "position_unknown")
         return instructions.JointTarget(memory.here.joints + change.joints)
+    if memory.read("$IPO_MODE") == "#TCP":
+        return instructions.UnresolvedTarget(text, "external_tool")
     steps = syntax.Record(value.kind, (*((key, 0.0) for key in FRAME_KEYS if value.get(key) is None), *value.items))
     offset, seen = record_pose(steps), memory.here.seen(*frames, memory.cell.flange)
     if offset is None or seen is None:

@@ -117,7 +117,8 @@ def statement(
 ) -> None:
     """Add a line to the code of its routine; one that is not understood is kept as such."""
     if (plain := PLAIN.match(text)) is not None and (target := plain_record(plain[2], plain[3])) is not None:
-        builder.add(syntax.Move(place, plain[1].upper(), (target,), text, tuple(plain[4].upper().split())))
+        flags = tuple(plain[4].upper().split())
+        builder.add(syntax.Move(place, plain[1].upper(), (target,), text, flags, builder.settings))
         return
     if inside_data and (plain := PLAIN_DATA.match(text)) is not None and (found := plain_record("", plain[3])):
         builder.add(syntax.Assign(place, syntax.Variable(plain[2].upper()), found, text, plain[1].upper()))
@@ -244,16 +245,17 @@ class _Statement:
             elif words.accept("CA"):
                 settings.append(("CA", words.expression()))
             elif words.accept("WITH"):
-                settings += self._with()
+                settings += self.with_settings()
             elif words.kind == "enum":
                 flags.append("#" + words.take()[1:].strip().upper())
             elif words.next.startswith("C_"):
                 flags.append(words.take())
             else:
                 raise MisreadError(f"'{words.next}' not expected")
+        settings = [*self.builder.settings, *settings]
         self.builder.add(syntax.Move(self.place, form, tuple(arguments), self.text, tuple(flags), tuple(settings)))
 
-    def _with(self) -> list[tuple[str, syntax.Expression]]:
+    def with_settings(self) -> list[tuple[str, syntax.Expression]]:
         settings = []
         while True:
             name = _text_of(self.words.reference())
@@ -381,6 +383,8 @@ HANDLERS: dict[str, Handler] = {
 def _spline(reading: _Statement) -> None:
     """Begin and end of a spline are moves without target: the run numbers its blocks by them."""
     form = "ENDSPLINE" if reading.text.upper().startswith("ENDSPLINE") else "SPLINE"
+    begins = form == "SPLINE" and reading.words.accept("WITH")
+    reading.builder.settings = tuple(reading.with_settings()) if begins else ()
     call = syntax.Invocation(f"%{form}", ())
     reading.builder.add(syntax.Doing(reading.place, call, reading.text))
 

@@ -303,6 +303,8 @@ def _joints_of(
     value: syntax.Record, frames: tuple[instructions.NamedFrame, instructions.NamedFrame], text: str
 ) -> instructions.Target:
     """The joints of a target for a tool and a work object, as a pose of those of the motion."""
+    if len(value.items) > len(("TARGET", "TOOL", "WOBJ")):  # the program has changed an axis of it
+        return instructions.UnresolvedTarget(text, "not_understood")
     target = data_types.part(value, "TARGET")
     pose = data_types.pose_matrix(target)
     tool, _ = frame_of_tool(data_types.part(value, "TOOL"))

@@ -30,6 +30,7 @@ PASSING = "%passing"  # whether the program goes on while the arm still moves to
 READING = ("get_actual_", "get_target_", "get_forward_kin")  # beginnings of functions that read where the arm is
 NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
 SAME_TURN = 1e-9
+UPRIGHT = 0.02  # tangent of the angle within which gravity is straight down
 HALF_A_TURN = math.pi - 1e-6
 HARMLESS_TEXT = """
 assert binary_list_to_integer conveyor_pulse_decode enable_external_ft_sensor encoder_enable_pulse_decode
@@ -54,7 +55,7 @@ read_port_register request_boolean_from_primary_client request_float_from_primar
 request_integer_from_primary_client request_string_from_primary_client rpc_factory rtde_set_watchdog
 set_analog_inputrange set_analog_out set_analog_outputdomain set_baselight_off set_baselight_solid
 set_configurable_digital_input_action set_configurable_digital_out set_conveyor_tick_count set_digital_out
-set_euromap_output set_euromap_runstate_dependent_choice set_flag set_gp_boolean_input_action set_gravity
+set_euromap_output set_euromap_runstate_dependent_choice set_flag set_gp_boolean_input_action
 set_input_actions_to_default
 set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
 set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
@@ -249,6 +250,10 @@ class UrScriptDialect(Dialect):
                 return instructions.Unknown(doing.text)
             memory.write("%tcp", given["pose"])
             return None
+        if call.function == "set_gravity":  # other than upright it says that the arm hangs on a wall or a ceiling
+            up = syntax.numbers(values[0]) if len(values) == 1 and isinstance(values[0], tuple) else None
+            upright = up is not None and len(up) == 3 and up[2] > 0 and np.hypot(up[0], up[1]) < UPRIGHT * up[2]
+            return instructions.Aside(doing.text) if upright else instructions.Unknown(doing.text, may_move=False)
         if call.function in LOADS:
             loaded = _placed(LOADS[call.function], values, keywords)
             memory.write(

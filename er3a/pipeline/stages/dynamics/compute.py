@@ -485,7 +485,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         motors=motors,
         uses=uses,
         power_imbalance=max(imbalances, default=None),
-        not_examined=(*rest, *_left_out(robot, summaries, skipped, unknown, settings.samples))
+        not_examined=(*rest, *_left_out(robot, summaries, skipped, unknown, settings.samples), *_weight(study, name, settings))
         if holding or uses
         else (),
     )
@@ -572,6 +572,17 @@ def _left_out(
     if not_run := (*skipped, *(path.name for path in paths if not path.counts)):
         found.append(LeftOut("paths_not_run", not_run))
     return (*found, LeftOut("torque_peaks", amount=samples), LeftOut("program_torques"), LeftOut("drive_behaviour"))
+
+
+ON_EARTH = (9.76, 9.84)  # m/s^2, from the equator's mountains to the poles
+
+
+def _weight(study: Study, name: str, settings: DynamicsSettings) -> Iterator[LeftOut]:
+    """Gravity other than Earth's, and a base of which nothing says how it is mounted."""
+    if not ON_EARTH[0] <= settings.gravity_m_s2 <= ON_EARTH[1]:
+        yield LeftOut("other_gravity", amount=settings.gravity_m_s2)
+    if study.table(name).base is None and study.entry(name).base is None:
+        yield LeftOut("mounting")
 
 
 def _paths(

@@ -38,7 +38,7 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.entry import InverseSettings
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
+from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_orientations, left_out_without_tool
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, meant, shown
@@ -365,7 +365,6 @@ def solution_map(robot: Robot, cells: int, scene: Scene | None) -> model.MapRows
 STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9
 REPRODUCED_RAD = 1e-9
-ORIENTATION_OFF_DEG = 0.1  # of what an arm of few joints can't set, which a target may be off by
 MOST_ADVISED = 100  # of many targets those for which it is looked for what would help
 ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
 
@@ -391,6 +390,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     results = tuple(one.result for one in solved)
     asked = [each for each in results if each.chosen_deg is not None and each.expect in (None, "reached")]
     chosen = meant(robot, np.reshape([each.chosen_deg for each in asked], (-1, robot.joints)))
+    T_of = {target.name: target.T for target in targets}
     least = bodies_of(robot, scene).min_distance(chosen)[0].tolist()
     rests_on = shapes_assumed(robot, motion.assumed_margin_mm / 1000, {each.name: d for each, d in zip(asked, least)})
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
@@ -411,7 +411,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
         round_trips=_round_trips(trips) if trips else None,
         not_examined=(
             *_left_out(robot, results, many, settings.mix, trips),
-            *orientations_off(robot, {target.name: target for target in targets}, asked, chosen),
+            *left_out_of_orientations(robot, ((each.name, T_of[each.name], q) for each, q in zip(asked, chosen))),
             *left_out_of_collisions(robot, bodies_of(robot, scene), scene),
             *left_out_without_tool(robot),
         ),
@@ -444,19 +444,6 @@ def _left_out(
     if unknown := tuple(rule for rule in mix if rule not in known):
         yield LeftOut("rules", unknown)
     yield LeftOut("ways_between")
-
-
-def orientations_off(
-    robot: Robot, targets: Mapping[str, Target], asked: Sequence[model.TargetResult], chosen: Reals
-) -> Iterator[LeftOut]:
-    """Targets whose orientation the chosen arms (n, joints) miss, because the arm's joints set only part of it."""
-    if not asked:
-        return
-    wanted = np.array([targets[each.name].T[:3, :3] for each in asked])
-    off = np.degrees(rotation_angle(forward(robot, chosen)[:, :3, :3], wanted))
-    if (off > ORIENTATION_OFF_DEG).any():
-        names = tuple(each.name for each, by in zip(asked, off) if by > ORIENTATION_OFF_DEG)
-        yield LeftOut("orientations", names, amount=float(off.max()))
 
 
 def _is_certain(method: Method) -> bool:

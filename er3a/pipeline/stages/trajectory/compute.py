@@ -23,7 +23,12 @@ from er3a.numerics.si_units import from_si, stated
 from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, unmet_expectations
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates, left_out_without_tool
+from er3a.pipeline.stages.left_out import (
+    left_out_of_collisions,
+    left_out_of_orientations,
+    left_out_of_rates,
+    left_out_without_tool,
+)
 from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
@@ -374,6 +379,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     programs: list[model.ProgramFiles] = []
     skipped: list[model.PathNotFollowed] = []
     rest: list[LeftOut] = []
+    turned: list[tuple[str, Reals, Reals]] = []
     for each in listed_motions(file, planning, required, settings.checks_per_sample):
         motion = each.motion
         rest += each.left_out if each.expect in (None, "safe") else ()
@@ -382,6 +388,9 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
             lacking, outcome = wrist_partition_missing(robot), each.outcome_unfollowed
             skipped.append(model.PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
             continue
+        path, seen = motion.built.tool, np.isfinite(motion.q).all(axis=1)
+        if path and seen.any() and each.expect in (None, "safe"):
+            turned.append((each.name, path.poses(path.progress(motion.t[seen])[0]), motion.q[seen]))
         found = judgement.judge(robot, motion, near, limits)
         along = judgement.measured(surroundings, motion)
         avoided = avoidance.avoid(motion, found, along)
@@ -420,6 +429,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
             *left_out_of_rates(np.isfinite(robot.speed), limits.jerk is not None),
             *_left_out(paths, skipped, only),
             *by_subject(rest),
+            *left_out_of_orientations(robot, turned),
             *left_out_without_tool(robot),
             LeftOut("torques"),
         ),

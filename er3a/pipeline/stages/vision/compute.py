@@ -47,7 +47,7 @@ from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspP
 from er3a.vision.hand_eye import HandEye, MethodAnswer, calibrate_hand_eye, spread_of
 from er3a.vision.next_view import FieldOfView, NextView, in_sight, next_view
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
-from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table
+from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table, zeros_tried
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
 MARGIN = 0.25  # of the objects' extent
@@ -235,6 +235,7 @@ def calibration_result(
         table=_table_result(table) if isinstance(table, TableCorrections) else table,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
         boardless=boardless,
+        copies=found.copies,
         intrinsics_estimated=images is not None and images.views.shared is not None,
     )
 
@@ -340,7 +341,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
     try:
-        found = calibrate_hand_eye(samples)
+        found, unseen_zeros = zeros_tried(calibrate_hand_eye(samples), robot)
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
         return _without_calibration(
@@ -375,7 +376,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         calibration=calibration,
         objects=objects,
         not_examined=(
-            *_left_out(calibration, task_file),
+            *_left_out(calibration, task_file, unseen_zeros),
             *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH),
             *left_out_of_rates(np.isfinite(robot.speed), motions.jerk_deg_s3 is not None),
             LeftOut("torques"),
@@ -420,7 +421,7 @@ def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
     )
 
 
-def _left_out(found: model.CalibrationResult, file: VisionFile) -> Iterator[LeftOut]:
+def _left_out(found: model.CalibrationResult, file: VisionFile, zeros: tuple[str, ...]) -> Iterator[LeftOut]:
     """What the calibration does not rest on, what nothing checks it against, and what grasps leave open."""
     places = np.array([each.pose()[:3, 3] for each in file.objects])
     seen = in_sight(file.view.view(NO_BOARD), places)
@@ -432,8 +433,12 @@ def _left_out(found: model.CalibrationResult, file: VisionFile) -> Iterator[Left
         yield LeftOut("real_camera")
     if found.boardless:
         yield LeftOut("boardless_images", tuple(each.sample for each in found.boardless))
-    if found.left_out:
-        yield LeftOut("left_out_samples", found.left_out)
+    if wrong := found.left_out[: len(found.left_out) - len(found.copies)]:
+        yield LeftOut("left_out_samples", wrong)
+    if found.copies:
+        yield LeftOut("copied_samples", found.copies)
+    if zeros:
+        yield LeftOut("joint_zeros", zeros)
     if found.touch is None:
         yield LeftOut("touched_points")
     yield LeftOut("detections")

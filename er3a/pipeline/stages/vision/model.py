@@ -205,6 +205,7 @@ class CalibrationResult:
     spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
     moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
     table : corrections to the arm's table, where the set asks for them
+    copies : samples left out as exact copies of earlier ones
     open_tilts : images that leave open which way the board is tilted; boardless : images left out, without a board
     intrinsics_estimated : from the same images; the intervals include their errors
     """
@@ -237,12 +238,14 @@ class CalibrationResult:
     table: TableResult | NoCorrections | None
     open_tilts: tuple[AmbiguousTilt, ...] = ()
     boardless: tuple[BoardlessImage, ...] = ()
+    copies: tuple[str, ...] = ()
     intrinsics_estimated: bool = False
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """The samples that the calibration does not use: suspects, but for poses that come again."""
-        return tuple(each.sample for each in self.suspects if not isinstance(each, RepeatedPose))
+        """The samples that the calibration does not use: they contradict the others, or are exact copies."""
+        wrong = tuple(each.sample for each in self.suspects if not isinstance(each, RepeatedPose))
+        return (*wrong, *self.copies)
 
 
 @dataclass(frozen=True)
