@@ -43,13 +43,13 @@ SelfChecked = Literal[
 ]
 
 
-class SelfCheck(Subject, Finding):
+class SelfCheck(Subject):
     """A check of the model that needs no document."""
 
     quantity: SelfChecked
 
 
-class WholeGroup(Subject, Finding):
+class WholeGroup(Subject):
     """All that references of a group could say."""
 
     group: str
