@@ -264,13 +264,14 @@ class Finding:
 
     The last field of each is its ``code``, the stable identifier that summaries hold: the name of the class in lower
     case with underscores (``WrongUnit``: "wrong_unit"), unless ``class AllSafe(Finding, code="trajectory.safe")`` gives
-    another.
+    another. A class with ``code=""`` is none itself, but holds what several findings share.
     """
 
     code: ClassVar[str]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __init_subclass__(cls, code: str | None = None) -> None:
-        cls.code = code or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
-        cls.__annotations__ = get_annotations(cls) | {"code": Literal[cls.code]}
+        if code != "":
+            cls.code = code or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+            cls.__annotations__ = get_annotations(cls) | {"code": Literal[cls.code]}
         dataclass(frozen=True)(cls)

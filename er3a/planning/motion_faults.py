@@ -221,8 +221,7 @@ class BelowLimit(Finding):
     limit_deg: float
 
 
-@dataclass(frozen=True)
-class NeededSpeed:
+class NeededSpeed(Finding, code=""):
     """A speed that a joint (from 1) would need, beyond its limit."""
 
     joint: int
@@ -236,16 +235,15 @@ class NeededSpeed:
         return self.needed_deg_s / self.limit_deg_s
 
 
-class TooFast(NeededSpeed, Finding):
+class TooFast(NeededSpeed):
     """A joint (from 1) would have to move faster than it can; values are in mm if it ``slides``."""
 
 
-class TooFastIfAssumed(NeededSpeed, Finding):
+class TooFastIfAssumed(NeededSpeed):
     """A joint (from 1), whose maximum speed is assumed, would have to move faster; in mm if it ``slides``."""
 
 
-@dataclass(frozen=True)
-class NeededAcceleration:
+class NeededAcceleration(Finding, code=""):
     """An acceleration that a joint (from 1) would need, beyond its limit."""
 
     joint: int
@@ -259,11 +257,11 @@ class NeededAcceleration:
         return self.needed_deg_s2 / self.limit_deg_s2
 
 
-class AccelerationTooGreat(NeededAcceleration, Finding):
+class AccelerationTooGreat(NeededAcceleration):
     """A joint (from 1) would have to accelerate more than it can; in mm if it ``slides``."""
 
 
-class AccelerationTooGreatIfAssumed(NeededAcceleration, Finding):
+class AccelerationTooGreatIfAssumed(NeededAcceleration):
     """A joint (from 1), whose maximum acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Literal, Self
 
 from er3a.by_value import Finding
@@ -11,8 +11,7 @@ from er3a.references.quantities import Coordinate, Extremity, Point, SectionAxis
 CornerLabel = Literal["x", "abs_x", "z"]
 
 
-@dataclass(frozen=True)
-class Subject:
+class Subject(Finding, code=""):
     """Base of all subjects; each has a ``code``."""
 
     @property
@@ -29,21 +28,21 @@ class Subject:
         )
 
 
-class AxisDirection(Subject, Finding):
+class AxisDirection(Subject):
     """Direction of a joint's axis; ``signed``: of positive rotation."""
 
     joint: int
     signed: bool
 
 
-class AxisPosition(Subject, Finding):
+class AxisPosition(Subject):
     """Where a joint's axis lies."""
 
     joint: int
     coordinate: Coordinate | None
 
 
-class PointAtPose(Subject, Finding):
+class PointAtPose(Subject):
     """Where a point lies at a pose that the source names."""
 
     pose: str
@@ -51,26 +50,26 @@ class PointAtPose(Subject, Finding):
     coordinate: Coordinate | None
 
 
-class OrientationAtPose(Subject, Finding):
+class OrientationAtPose(Subject):
     """How the flange is oriented at a pose that the source names."""
 
     pose: str
     coordinate: Coordinate | None
 
 
-class PoseExcess(Subject, Finding):
+class PoseExcess(Subject):
     """How far a pose that the source names lies outside the limits."""
 
     pose: str
 
 
-class SegmentInclination(Subject, Finding):
+class SegmentInclination(Subject):
     """How far a segment of the arm leans from the vertical."""
 
     segment: Segment
 
 
-class DrawingCorner(Subject, Finding):
+class DrawingCorner(Subject):
     """A corner of the workspace drawing, at angles of joints 2 and 3."""
 
     q2_deg: float
@@ -78,14 +77,14 @@ class DrawingCorner(Subject, Finding):
     coordinate: CornerLabel | None
 
 
-class DrawingExtent(Subject, Finding):
+class DrawingExtent(Subject):
     """How far the workspace drawing extends."""
 
     extreme: Extremity
     axis: SectionAxis
 
 
-class Reach(Subject, Finding):
+class Reach(Subject):
     """Largest or smallest distance of a point from the axis of joint 1 or 2."""
 
     extreme: Extremity
@@ -93,20 +92,20 @@ class Reach(Subject, Finding):
     axis: int
 
 
-class JointLimit(Subject, Finding):
+class JointLimit(Subject):
     """A joint's lower or upper limit."""
 
     joint: int
     side: Side
 
 
-class JointSpeed(Subject, Finding):
+class JointSpeed(Subject):
     """A joint's maximum speed."""
 
     joint: int
 
 
-class MotionOfJoint(Subject, Finding):
+class MotionOfJoint(Subject):
     """What is seen while a joint is jogged in +."""
 
     joint: int
@@ -114,7 +113,7 @@ class MotionOfJoint(Subject, Finding):
     seen: str
 
 
-class EntryOfTable(Subject, Finding):
+class EntryOfTable(Subject):
     """An entry of the table, measured by itself."""
 
     column: Literal["a", "d", "alpha", "offset"]

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import er3a.pipeline.messages.references  # noqa: F401
-from er3a.by_value import Finding
 from er3a.files.csv_file import CsvColumn, Written
 from er3a.files.reference_sets import FORMATS, Format, load_references
 from er3a.files.robot_library import load_robot
@@ -30,7 +29,7 @@ class StandingHeight(Quantity):
         return state.axis(2)[1][..., 2]
 
 
-class Shoulder(Subject, Finding):
+class Shoulder(Subject):
     """The shoulder's height."""
 
 

@@ -43,13 +43,13 @@ SelfChecked = Literal[
 ]
 
 
-class SelfCheck(Finding, Subject, code="self_check"):
+class SelfCheck(Subject):
     """A check of the model that needs no document."""
 
     quantity: SelfChecked
 
 
-class WholeGroup(Finding, Subject, code="whole_group"):
+class WholeGroup(Subject):
     """All that references of a group could say."""
 
     group: str
