@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -170,7 +171,7 @@ def test_a_robot_that_names_an_unknown_document_is_refused_with_its_field(tmp_pa
     """As in a study with it: the robot's own reference sets say which documents there are."""
     text = Path("data/robots/er3a_c60.yaml").read_text(encoding="utf-8")
     file = tmp_path / "er3a_c60.yaml"
-    file.write_text(text.replace("  convention: standard\n", "  convention: standard\n  origin: hearsay\n", 1))
+    file.write_text(re.sub(r"(?m)^  origin: \w+", "  origin: hearsay", text, count=1), encoding="utf-8")
     with pytest.raises(InputError, match="the document 'hearsay' is not known") as found:
         check_file(file)
     assert found.value.field == "dh.origin"

@@ -195,7 +195,15 @@ LeftOutSubject = Literal[
 
 NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
     (
-        *("obstacles", "uncovered_links", "bare_tool", "allowed_contacts", "program_rest", "given_rates", "other_gravity"),
+        *(
+            "obstacles",
+            "uncovered_links",
+            "bare_tool",
+            "allowed_contacts",
+            "program_rest",
+            "given_rates",
+            "other_gravity",
+        ),
         *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside"),
     )
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from er3a.collision.along import bodies_of, clearance
 from er3a.errors import Er3aError, InputError
 from er3a.files.dh_table import read_dh_table
 from er3a.files.kept_files import ROOT
+from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot, robot_of
 from er3a.formats.urdf import export_urdf
 from er3a.kinematics.singularity import scaled_jacobian

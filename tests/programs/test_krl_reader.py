@@ -301,9 +301,11 @@ SPLINE WITH $BASE={{X 100,Y 0,Z 0,A 0,B 0,C 0}}, $VEL.CP=0.1
 SLIN {where}
 SLIN {where} WITH $BASE={{X 7,Y 0,Z 0,A 0,B 0,C 0}}
 ENDSPLINE
+SLIN {where} WITH $TOOL.Z=100
 SLIN {where}"""
     found = moves(run(tmp_path, body))
-    assert [each.base.pose[0, 3] for each in found] == [0.1, 0.007, 0.0]
+    assert [each.base.pose[0, 3] for each in found] == [0.1, 0.007, 0.0, 0.0]
+    assert [each.tool.pose[2, 3] for each in found] == [0.0, 0.0, 0.1, 0.0]
     assert [each.speed.value for each in found[:2]] == [0.1, 0.1]
 
 

@@ -245,7 +245,13 @@ def test_structures_lists_and_remote_objects_of_urscript(tmp_path):
 
 @pytest.mark.parametrize(
     ("up", "known"),
-    [("[0, 0, 9.82]", True), ("[0.05, 0, 9.82]", True), ("[9.82, 0, 0]", False), ("[0, 0, -9.82]", False), ("g", False)],
+    [
+        ("[0, 0, 9.82]", True),
+        ("[0.05, 0, 9.82]", True),
+        ("[9.82, 0, 0]", False),
+        ("[0, 0, -9.82]", False),
+        ("g", False),
+    ],
 )
 def test_gravity_that_says_that_the_arm_hangs_is_not_passed_over(tmp_path, up, known):
     path = tmp_path / "wall.script"

@@ -375,8 +375,13 @@ def test_calc_functions_use_the_arm(tmp_path):
     body += "MoveAbsJ CalcJointT(t,gripper\\WObj:=table),@;"
     joints = move(tmp_path, body, robot=ROBOT)
     np.testing.assert_allclose(joints.base.pose @ joints.target.pose, flange, atol=1e-9)
-    for change in ("j.robax.rax_1:=j.robax.rax_1+5;", "j.extax.eax_a:=100;"):  # of joints that only the arm's table gives
-        changed = move(tmp_path, f"{body.split('MoveAbsJ')[0]}j:=CalcJointT(t,gripper\\WObj:=table);{change}MoveAbsJ j,@;")
+    for change in (
+        "j.robax.rax_1:=j.robax.rax_1+5;",
+        "j.extax.eax_a:=100;",
+    ):  # of joints that only the arm's table gives
+        changed = move(
+            tmp_path, f"{body.split('MoveAbsJ')[0]}j:=CalcJointT(t,gripper\\WObj:=table);{change}MoveAbsJ j,@;"
+        )
         assert changed.target.reason == "not_understood"
     beside, aside = "fixed:=[FALSE,[[0,0,120],[1,0,0,0]]", "fixed:=[TRUE,[[50,0,120],[0,1,0,0]]"
     held = move(

@@ -419,7 +419,10 @@ def test_a_line_whose_tilt_the_arms_joints_leave_off_is_no_pass(tmp_path, monkey
     write_study(arm_of(None, tmp_path / "scara.csv", None), tmp_path)
     written = load_study("config/config.yaml")
     for tilt, named in (([180, 0, 0], ()), ([165, 0, 0], ("tilted",))):
-        ends = {"start": {"xyz_mm": [400, -50, 300], "rpy_deg": tilt}, "end": {"xyz_mm": [400, 50, 300], "rpy_deg": tilt}}
+        ends = {
+            "start": {"xyz_mm": [400, -50, 300], "rpy_deg": tilt},
+            "end": {"xyz_mm": [400, 50, 300], "rpy_deg": tilt},
+        }
         line = {"name": "tilted", "title": "A line", "kind": "line", "duration_s": 4.0, "samples": 20, **ends}
         Path("data/paths/scara.yaml").write_text(json.dumps({"kind": "paths", "paths": [line]}), encoding="utf-8")
         summary = trajectory(written, "scara").summary

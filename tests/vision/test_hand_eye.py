@@ -525,6 +525,7 @@ MENDED = {
         lambda samples, found: scaled(samples, found.factor),
     ),
     "few_samples": (lambda: a_set("eye_in_hand", 3, 5), lambda samples, _: with_poses_added(samples)),
+    "not_converged": (lambda: a_set("eye_in_hand", 5, 3), lambda samples, _: with_poses_added(samples)),
     "moved_between": (
         lambda: of_two_setups("eye_in_hand", 24, 14, pose([0, 0, 0], [0.005, 0.002, 0])),
         lambda samples, found: samples.take(np.arange(samples.names.index(found.sample))),

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
 from er3a.calibration.outcomes import MovesNothing, NotToldApart
+from er3a.kinematics.forward import forward
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.table_corrections import NoCorrections, TableCorrections, correct_table, zeros_tried
@@ -74,6 +75,9 @@ def test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_e
         (zero,) = grave_warnings(found.warnings)
         assert zero.joint == joint
         assert abs(zero.offset_deg - deg) < 2 * zero.half_width_deg < 0.5
+        q = samples.q + np.radians(zero.offset_deg) * np.eye(6)[joint - 1]
+        again = replace(samples, q=q, flange=forward(ROBOT.without_tool(), q))
+        assert zeros_tried(calibrate_hand_eye(again), ROBOT)[0].warnings == ()
     poses = replace(samples, q=None)
     assert zeros_tried(calibrate_hand_eye(poses), ROBOT)[1] == ("J1", "J2", "J3", "J4", "J5", "J6")
 

@@ -110,7 +110,8 @@ TEXTS = texts(
         "left_out.uncertain_solutions": "whether the solutions found are all",
         "left_out.advice": "what would help at targets without a solution",
         "left_out.orientations": (
-            "how the tool is turned at these targets and on these paths: the arm's joints set only part of it (off by up to {amount:.1f}°)"
+            "how the tool is turned at these targets and on these paths: the arm's joints set only part of it (off by "
+            "up to {amount:.1f}°)"
         ),
         "left_out.rules": "rules of the mix for which the robot's file has no data",
         "left_out.ways_between": "motions from one target, or path, to the next",

@@ -526,7 +526,10 @@ def _references(robot: Path, names: Sequence[str]) -> dict[str, str]:
         beside = robot.parent.parent / "manual_refs" / name
         folder = beside if beside.is_dir() else reference_folder(name)
         if not folder.is_dir():
-            problem, remedy = f"there is no reference set '{name}'", f"Copy its folder to {beside}, or leave the name out"
+            problem, remedy = (
+                f"there is no reference set '{name}'",
+                f"Copy its folder to {beside}, or leave the name out",
+            )
             raise InputError(robot, "references", problem, remedy)
         files = (each for each in sorted(folder.iterdir()) if each.suffix.lower() in (".csv", ".po"))
         found |= {f"{REFERENCES}/{name}/{each.name}": each.read_text(encoding="utf-8") for each in files}

@@ -286,6 +286,11 @@ def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression
         if name in ("$VEL_AXIS[1]", "$ACC_AXIS[1]"):
             _all_axes(memory, name[:-3], value)
         else:
+            frame, _, part = name.partition(".")
+            if part and frame in ("$TOOL", "$BASE"):
+                old = memory.read(frame)
+                name = frame
+                value = old.having(part, value) if isinstance(old, syntax.Record) else syntax.Unclear(f"{frame}.{part}")
             memory.write(name, value)
             memory.shared.pop(name + "%name", None)
         return

@@ -485,7 +485,11 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         motors=motors,
         uses=uses,
         power_imbalance=max(imbalances, default=None),
-        not_examined=(*rest, *_left_out(robot, summaries, skipped, unknown, settings.samples), *_weight(study, name, settings))
+        not_examined=(
+            *rest,
+            *_left_out(robot, summaries, skipped, unknown, settings.samples),
+            *_weight(study, name, settings),
+        )
         if holding or uses
         else (),
     )
