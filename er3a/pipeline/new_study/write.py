@@ -521,7 +521,7 @@ def _known(robot: str, name: str | None) -> Arm:
 
 def _references(robot: Path, names: Sequence[str]) -> dict[str, str]:
     """The files of sets that stand beside a robot's file, else in the study at hand or in er3a."""
-    found = {}
+    found: dict[str, str] = {}
     for name in names:
         beside = robot.parent.parent / "manual_refs" / name
         folder = beside if beside.is_dir() else reference_folder(name)
