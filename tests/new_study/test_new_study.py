@@ -219,14 +219,6 @@ def test_an_arm_without_a_spherical_wrist_gets_targets_and_paths(tmp_path, monke
 
 
 @pytest.mark.long
-def test_a_slow_arm_gets_the_time_that_its_paths_take(tmp_path):
-    table = tmp_path / "slow.csv"
-    rows = [line + (",speed_deg_s" if "joint" in line else ",10") for line in UR.splitlines()]
-    table.write_text("\n".join(rows), encoding="utf-8")
-    assert "too fast" not in "".join(write_study(arm_of(None, table, None), tmp_path / "cell").shortcomings)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(("table", "joints"), [(SCARA, 4), (FIVE, 5), (ON_A_TRACK, 8)])
 def test_arms_with_other_joints_get_a_study_that_holds(tmp_path, monkeypatch, table, joints):
     file = tmp_path / "arm.csv"

@@ -153,7 +153,7 @@ DOWN_DEG = (180, 0, 0)
 HEIGHTS, DISTANCES, ASIDE = (0.3, 0.4, 0.22), (0.6, 0.5, 0.7, 0.42), (0.0, 0.25, -0.25, 0.12, -0.12)  # of the reach
 STEPS = ((0, 1, 0), (0, 0, 1), (1, 0, 0), (0, -1, 0), (0, 0, -1), (-1, 0, 0))
 LENGTHS = (0.3, 0.2, 0.12, 0.06)  # of the reach
-DURATIONS_S = (3.0, 6.0, 12.0, 24.0)
+DURATIONS_S = (3.0, 6.0, 12.0)
 PATH_SAMPLES = 50
 
 
