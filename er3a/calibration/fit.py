@@ -336,7 +336,8 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
         if the steps don't end
     """
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
-    nothing = np.zeros((1, len(kept)))
+    nothing, start = np.zeros((1, len(kept))), _base_at(robot, kept, observations)
+    far = bool(start.any())  # a large turn is no small one behind another
     prior = np.full(sum(term.count for term in terms), 1 / TYPICAL)
 
     def with_errors(coefficients: Reals) -> Observations:
@@ -351,14 +352,15 @@ def fit(robot: Robot, kept: Sequence[Parameter], observations: Observations, ter
 
     def slopes(here: Robot, amounts: Reals, coefficients: Reals) -> Reals:
         seen = with_errors(coefficients)
-        J = jacobian(robot, kept, seen, amounts) / deviation[:, None]
+        slope = jacobian(robot, kept, seen, amounts) if far else jacobian(here, kept, seen)
+        J = slope / deviation[:, None]
         if not (terms and isinstance(observations, PointObservations) and isinstance(seen, PointObservations)):
             return J
         by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]
         return np.block([[J, by_terms], [np.zeros((len(prior), len(kept))), np.diag(prior)]])
 
     n, k = len(observations), len(kept)
-    unknowns = np.r_[_base_at(robot, kept, observations), np.zeros(len(prior))]
+    unknowns = np.r_[start, np.zeros(len(prior))]
     before = weighted(robot, unknowns[k:])[:n]
     here = corrected(robot, kept, unknowns[:k])
     rest = weighted(here, unknowns[k:])

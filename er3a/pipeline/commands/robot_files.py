@@ -157,6 +157,17 @@ def _print_plan(arm: Robot, rows: Sequence[Measurement], count: int, fixed: Sequ
     options.print_json(plan_record(proposed)) if as_json else print(plan_lines(proposed, arm))
 
 
+def _write_calibrated(corrected: Robot, record: dict[str, object], output: Path) -> Path:
+    """Write the robot file, and beside it the whole model, whose path is returned."""
+    from er3a.files.kept_files import write_atomically
+    from er3a.files.robot_writer import write_robot
+
+    write_robot(corrected, output)
+    model = output.with_name(f"{output.stem}_model.json")
+    write_atomically(model, partial(Path.write_text, data=options.as_json_text(record) + "\n", encoding="utf-8"))
+    return model
+
+
 @options.app.command(rich_help_panel=options.ROBOT_FILES)
 def calibrate(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file: the table to start from")],
@@ -185,10 +196,8 @@ def calibrate(
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.by_name import load_measurements
-    from er3a.files.kept_files import write_atomically
     from er3a.files.reference_sets import load_references
     from er3a.files.robot_library import load_robot
-    from er3a.files.robot_writer import write_robot
     from er3a.pipeline.messages.calibration import calibration_record, held_back_lines, kept_lines, lines_of
     from er3a.pipeline.messages.say import say
 
@@ -218,10 +227,7 @@ def calibrate(
     alone = " (without terms beyond a robot file)" if found.beyond else ""
     corrected = found.robot.replace(name=name, title=f"{found.robot.title}, calibrated{alone}")
     record = {"output": str(output) if output else None, **calibration_record(found, arm, others)}
-    model = output.with_name(f"{output.stem}_model.json") if output else None
-    if output and model:
-        write_robot(corrected, output)
-        write_atomically(model, partial(Path.write_text, data=options.as_json_text(record) + "\n", encoding="utf-8"))
+    model = _write_calibrated(corrected, record, output) if output else None
     if html or rrd:
         from er3a.pipeline.viewing.calibration import measured_errors, record_calibration, write_calibration
     if html:
