@@ -388,9 +388,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
             lacking, outcome = wrist_partition_missing(robot), each.outcome_unfollowed
             skipped.append(model.PathNotFollowed(each.name, each.title, lacking, outcome, each.expect, stops))
             continue
-        path, seen = motion.built.tool, np.isfinite(motion.q).all(axis=1)
-        if path and seen.any() and each.expect in (None, "safe"):
-            turned.append((each.name, path.poses(path.progress(motion.t[seen])[0]), motion.q[seen]))
+        turned += _asked_of_tool(each.name, motion) if each.expect in (None, "safe") else ()
         found = judgement.judge(robot, motion, near, limits)
         along = judgement.measured(surroundings, motion)
         avoided = avoidance.avoid(motion, found, along)
@@ -406,8 +404,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         programs.append(program_files(robot, motion, verdict, *asked, near=close, repaired=repair, speed=speed))
     checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
     own = checks.take(checks.sample)
-    length = characteristic_length(robot)
-    used = _limits_used(robot, limits, settings)
+    length, used = characteristic_length(robot), _limits_used(robot, limits, settings)
     least = {
         path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.expect in (None, "safe")
     }
@@ -442,6 +439,13 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         avoidance=model.AvoidanceRows.stacked(strategies).of_joints(robot.slides),
         programs=model.ProgramFiles.stacked(programs),
     )
+
+
+def _asked_of_tool(name: str, motion: Motion) -> Iterator[tuple[str, Reals, Reals]]:
+    """The poses (N, 4, 4) that a path of the tool asks for where joints (N, n) reach it."""
+    path, seen = motion.built.tool, np.isfinite(motion.q).all(axis=1)
+    if path and seen.any():
+        yield name, path.poses(path.progress(motion.t[seen])[0]), motion.q[seen]
 
 
 def _limits_used(robot: Robot, limits: JointLimits, settings: TrajectorySettings) -> model.LimitsUsed:
