@@ -211,7 +211,7 @@ def wait(segment: SingularSegment) -> Avoidance | NotPossible:
     return Avoidance(segment.along(0, last), done=0.1) if segment.good[:last].all() else BeginsInRegion()
 '''
     edits = {
-        "er3a/planning/names.py": (('"planned"]', '"planned", "wait"]'),),
+        "er3a/planning/names.py": (('"planned"]', '"wait", "planned"]'),),
         "er3a/planning/avoidance/wait.py": module,
         "er3a/planning/avoidance/strategies.py": (
             ('    "stop": stop,\n', '    "stop": stop,\n    "wait": wait,\n'),
