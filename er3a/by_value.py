@@ -15,7 +15,7 @@ short, whatever the size of the object.
 
 Findings: codes with typed parameters. Their sentences are made in ``er3a.pipeline.messages``.
 
-The fields of a :class:`Finding` but its code are the parameters, plain or findings themselves, with the unit in the
+All fields of a :class:`Finding` except ``code`` are its parameters, plain or findings themselves, with the unit in the
 name. Several kinds of finding in one place are a union. Code decides by type or code, never by a sentence.
 """
 
@@ -260,11 +260,11 @@ def _cut(text: str) -> str:
 
 @dataclass_transform(frozen_default=True)
 class Finding:
-    """Base of what computation finds: frozen dataclasses by being derived from it.
+    """Base of findings. Each subclass becomes a frozen dataclass.
 
     The last field of each is its ``code``, the stable identifier that summaries hold: the name of the class in lower
     case with underscores (``WrongUnit``: "wrong_unit"), unless ``class AllSafe(Finding, code="trajectory.safe")`` gives
-    another. A class with ``code=""`` is none itself, but holds what several findings share.
+    another. ``code=""`` marks a base that only holds shared fields.
     """
 
     code: ClassVar[str]

@@ -142,7 +142,8 @@ def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     lengths = parameters_of(robot, "lengths")
     effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
     moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
-    alone = [entry for entry in moving if not _replaceable(robot, entry, observations)] or moving
+    replaceable = _replaceable(robot, moving, observations)
+    alone = [entry for entry in moving if entry not in replaceable] or moving
     longest = max(alone, key=lambda entry: abs(entry.nominal(robot)), default=None)
     if longest is None:
         return None
@@ -151,13 +152,20 @@ def scale_of(robot: Robot, observations: PointObservations) -> Parameter | None:
     return longest if np.linalg.norm(slid) < least else None
 
 
-def _replaceable(robot: Robot, entry: Parameter, observations: PointObservations) -> bool:
-    """Whether others move the points as a length does: it can be as it is then, and all shrink to a point."""
-    every = (*placements_of(observations.free), *parameters_of(robot, "all_entries"))
-    J = jacobian(robot, [entry, *(each for each in every if each != entry)], observations.as_coordinates())
-    own, others = J[:, 0], J[:, 1:] / np.maximum(np.linalg.norm(J[:, 1:], axis=0), 1e-300)
-    rest = own - others @ np.linalg.lstsq(others, own, rcond=DEPENDENT**2)[0]
-    return bool(np.linalg.norm(rest) <= DEPENDENT * np.linalg.norm(own))
+def _replaceable(robot: Robot, lengths: Sequence[Parameter], observations: PointObservations) -> list[Parameter]:
+    """Lengths in whose place others move the points alike: such a one may stay as it is while all shrink to a point."""
+    every = [*placements_of(observations.free), *parameters_of(robot, "all_entries")]
+    J = jacobian(robot, every, observations.as_coordinates())
+    sizes = np.linalg.norm(J, axis=0)
+    J /= np.maximum(sizes, 1e-300)
+    found = []
+    for entry in lengths:
+        k = every.index(entry)
+        own, others = J[:, k], np.delete(J, k, axis=1)
+        rest = own - others @ np.linalg.lstsq(others, own, rcond=DEPENDENT**2)[0]
+        if np.linalg.norm(rest) <= DEPENDENT:
+            found.append(entry)
+    return found
 
 
 def without_scale(parameters: Sequence[Parameter], scale: Parameter | None) -> tuple[Parameter, ...]:

@@ -118,16 +118,16 @@ def check_widths(path: Path, lines: Lines) -> None:
     for number, line in lines[1:]:
         if len(line) != len(lines[0][1]):
             problem = f"{len(line)} fields where the header has {len(lines[0][1])}"
-            raise InputError(path, f"row {number}", problem, "Correct the commas; quote texts that hold one")
+            raise InputError(path, f"row {number}", problem, "Correct the separators; quote texts that hold one")
 
 
 def _with_points(path: Path, lines: Lines) -> Lines:
     """Lines with decimal points, of a table in which commas separate nothing."""
-    comma = re.compile(r"\s*[-+−]?\d+,\d+(?:[eE][-+]?\d+)?\D*")
+    comma = re.compile(r"\s*[-+−]?\d+,\d+(?:[eE][-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?\s*")
     fields = [field for _, line in lines[1:] for field in line]
     written = next((field.strip() for field in fields if comma.fullmatch(field)), "")
-    pointed = next((field.strip() for field in fields if comma.fullmatch(field.replace(".", ","))), "")
-    if written and pointed and pointed != written:
+    pointed = next((field.strip() for field in fields if "." in field and comma.fullmatch(field.replace(".", ","))), "")
+    if written and pointed:
         problem = f"decimal commas and points in one table ('{written}', '{pointed}')"
         raise InputError(path, None, problem, "Write all numbers with a point")
     return [

@@ -249,7 +249,7 @@ class HandEyeFile(StrictModel):
             raise ValueError("samples and streams: only one of the two is allowed, and one is needed | Give one")
         if self.flange_standard_deviation and not (self.camera_standard_deviation or self.images):
             raise ValueError(
-                "flange_standard_deviation: can't be used while the camera's is estimated from the same residuals |  "
+                "flange_standard_deviation: can't be used while the camera's is estimated from the same residuals | "
                 "State camera_standard_deviation too, or remove it"
             )
         return self

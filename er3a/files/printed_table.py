@@ -44,7 +44,7 @@ _UNITS |= {"°": "deg", "deg": "deg", "degree": "deg", "degrees": "deg", "度": 
 _BEFORE = re.compile(r"i-1|ᵢ₋₁|j-1")
 _PLAIN = str.maketrans({"−": "-", "–": "-", "ϑ": "θ", "⍺": "α", "∗": "*", "＊": "*", "（": "(", "）": ")"})
 _PLAIN |= str.maketrans(dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789")))
-_VARIABLE = re.compile(r"([+-]?)(?:(?:q|θ|theta|d)_?\d*\*?|\*|var(?:iable|\.)?|变量)(?:\(t\))?(?=[-+(]|$)")
+_VARIABLE = re.compile(r"(?<![\w.])([+-]?)(?:(?:q|θ|theta|d)_?\d*\*?|\*|var(?:iable|\.)?|变量)(?:\(t\))?(?=[-+(]|$)")
 _PI = re.compile(r"([+-]?)(\d+(?:\.\d*)?)?\*?(?:π|pi)(?:/(\d+(?:\.\d*)?))?")
 
 
@@ -91,7 +91,7 @@ def as_columns(path: Path, lines: Lines) -> PrintedTable:
     Raises
     ------
     InputError
-        for a cell that is neither a number nor a variable, naming row and column
+        for a row that has not as many fields as the header, and for a cell with two variables
     """
     header = [name.strip() for name in lines[0][1]] if lines else []
     found = {k: own for k, name in enumerate(header) if (own := heading_of(name))}
@@ -125,10 +125,10 @@ class _Table:
                 offsets = self._theta(k, sliding, columns)
             else:
                 self._plain(k, own, sliding, columns)
-        if any(sliding):
+        if any(sliding) and "type" not in self.header:
             columns["type"] = ["prismatic" if slides else "revolute" for slides in sliding]
         before = {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")}
-        convention: Convention | None = "modified" if before == {True} else None
+        convention: Convention | None = "modified" if before == {True} and "convention" not in self.header else None
         notes = ["a and alpha of the link before the joint (i-1): read as modified D-H (Craig)"] if convention else []
         if offsets:
             notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
@@ -153,6 +153,8 @@ class _Table:
     def _sliding(self) -> list[bool]:
         """Whether each row's d is a variable, and its theta none."""
         k = self.column.get("d")
+        if "type" in self.header:
+            return [cells[self.header.index("type")].strip() == "prismatic" for _, cells in self.rows]
         variable = [k is not None and _variable(cells[k]) is not None for _, cells in self.rows]
         theta = self.column.get("theta")
         return [
@@ -184,6 +186,9 @@ class _Table:
         if any(sliding):
             self._add(k, "theta", [text if slides else "" for slides, (_, text) in zip(sliding, parts)], columns)
         if any(sign < 0 for sign, _ in parts):
+            if "direction" in self.header:
+                problem = "directions stand in another column too"
+                raise InputError(self.path, f"column {self.header[k]}", problem, "Keep one")
             columns["direction"] = ["-1" if sign < 0 else "1" for sign, _ in parts]
         return offsets
 
@@ -193,7 +198,7 @@ class _Table:
         if found is None:
             return 1, cell.strip() or "0"
         plain = _compact(cell)
-        beside = (plain[: found.start()] + plain[found.end() :]).strip("+()") or "0"
+        beside = (plain[: found.start()] + plain[found.end() :]).strip("+()").replace(",", ".") or "0"
         if _variable(beside) is not None:
             where = f"row {number}, column {self.header[k]}"
             raise InputError(self.path, where, f"'{cell}' holds two variables", "Write one variable and a number")

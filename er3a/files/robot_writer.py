@@ -223,7 +223,7 @@ def write_robot(robot: Robot, path: Path) -> None:
 
 
 def robot_text(content: RobotFile) -> str:
-    """The content of a robot file as YAML, without what is as it is by itself."""
+    """The content of a robot file as YAML, without default values."""
     return yaml_text(content.model_dump(exclude_none=True, exclude_defaults=True))
 
 

@@ -80,7 +80,7 @@ class _PlainLoader(Composer, yaml.CSafeLoader):
                 raise yaml.constructor.ConstructorError(
                     None,
                     None,
-                    f"the key {key!r} is not a word (or a decimal comma stands before it)",
+                    f"the key {key!r} is not a word: put it in quotes, or write decimals with a point, not a comma",
                     key_node.start_mark,
                 )
             if key in seen:

@@ -317,7 +317,7 @@ class ProgramMemory:
             self.assign(target.of, of.having(target.name, value))
             return True
         if isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record):
-            self.assign(target.of, syntax.Unclear(f"{target.of.name}, changed in part"))  # of which the record has none
+            self.assign(target.of, syntax.Unclear(f"{target.of.name}, changed in part"))  # the record has no such part
             return True
         kept = None if name is None else self.read(name)
         if kept is None or not isinstance(of, syntax.Unclear):

@@ -155,10 +155,11 @@ def refine(seen: PoseObservations, X: Reals, Y: Reals) -> Refined:
         if known is None:
             squares = np.stack([(white[..., part] ** 2).sum(axis=(-2, -1)) for part in (slice(3), slice(3, 6))], -1)
             ratio = np.sqrt(squares / redundancy)
-            deviations = np.maximum(deviations * ratio, LEAST_DEVIATION)
-            if np.abs(ratio - 1).max() < 1e-6:
+            before, deviations = deviations, np.maximum(deviations * ratio, LEAST_DEVIATION)
+            change = np.abs(deviations / before - 1)
+            if change.max() < 1e-6:
                 break
-            converged = converged & (np.abs(ratio - 1) < SETTLED).all(axis=-1)
+            converged = converged & (change < SETTLED).all(axis=-1)
     freedom_all = 6.0 * seen.F.shape[-3] - UNKNOWNS
     scatter = np.sqrt((white**2).sum(axis=(-2, -1)) / freedom_all)
     if known is None:

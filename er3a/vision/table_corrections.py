@@ -32,7 +32,13 @@ from er3a.robots.robot import Robot
 from er3a.vision import likelihood
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import SURE, HandEye, calibrate_hand_eye, with_one_more
-from er3a.vision.vision_findings import CalibrationWarning, JointZero, UnexplainedResiduals, grave_warnings
+from er3a.vision.vision_findings import (
+    CalibrationWarning,
+    HandEyeError,
+    JointZero,
+    UnexplainedResiduals,
+    grave_warnings,
+)
 
 STEP = 1e-6  # m and rad
 STEPS = 40
@@ -170,12 +176,16 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...]]
         rms = float(1000 * np.sqrt((raw[:, :3] ** 2).mean()))
         best = min(best, (chance, k, value, half_width, rms))
     chance, k, value, half_width, rms = best
-    tried = replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
+    tried = found if len(unseen) == len(names) else replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
     explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
     if chance > ZERO_CHANCE or abs(value) < LEAST_ZERO or not explained:
         return tried, tuple(unseen)
     mended = _Turned(robot, found.samples, k).flange(value)
-    if grave_warnings(calibrate_hand_eye(replace(found.samples, flange=mended)).warnings):
+    try:
+        again = calibrate_hand_eye(replace(found.samples, flange=mended))
+    except HandEyeError:
+        return tried, tuple(unseen)
+    if grave_warnings(again.warnings):
         return tried, tuple(unseen)
     given = float(1000 * np.sqrt((found.residual[found.used, :3] ** 2).mean()))
     zero = JointZero(k + 1, float(np.degrees(value)), float(np.degrees(half_width)), given, rms)

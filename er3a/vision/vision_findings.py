@@ -90,7 +90,7 @@ class PositionAxes(Finding):
 ReadingKind = Literal[
     "quaternion_order", "angle_order", "transposed_rotations", "position_axes", "other_direction", "joint_zero"
 ]
-READINGS: tuple[ReadingKind, ...] = get_args(ReadingKind)[:-1]
+READINGS: tuple[ReadingKind, ...] = tuple(kind for kind in get_args(ReadingKind) if kind != "joint_zero")
 """What is tried of all samples; zeros only where joint values are recorded."""
 
 
@@ -156,7 +156,7 @@ class NotConverged(Finding):
 
 
 class JointZero(Finding):
-    """The samples fit if a joint stands ``offset`` beside its recorded value, with half its 95 % interval."""
+    """The samples fit if a joint is off its recorded value by ``offset_deg``, with half its 95 % interval."""
 
     joint: int
     offset_deg: float

@@ -101,7 +101,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
 
 
 def as_json_text(content: Any) -> str:
-    """The same as text."""
+    """JSON text, as :func:`print_json` prints it."""
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
 
 
