@@ -126,7 +126,7 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     there = {"xyz_mm": named.tolist(), "rpy_deg": list(entry.end.rpy_deg)}
     (shorter,) = paths_of(tmp_path, "line_out", end=there, duration_s=path.duration_s * part)
     assert path.verdict == "unreachable"
-    assert "It is within reach up to t = " in said
+    assert "it is out of reach besides" in said
     assert f"End it there, with the tool at x, y, z = {point} mm" in fault.to_do
     assert named == pytest.approx(start + part * (end - start), abs=0.06)
     assert shorter.verdict == "safe"
@@ -161,7 +161,9 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     (fault,) = faults(replace(results, summary=replace(results.summary, paths=(several,))))
     assert (fault.when, fault.what[:18]) == ("0.500 s", "wrist singularity;")
     beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=PathOutOfReach(())),))
-    assert "another fault before: from t = 0.5 s, wrist singularity" in advice(beyond, last_sound(beyond, rows))
+    assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
+        beyond, last_sound(beyond, rows)
+    )
 
 
 @pytest.mark.parametrize(
