@@ -11,9 +11,10 @@ import pytest
 import yaml
 from lxml import etree
 
+from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
-from er3a.pipeline.messages.trajectory import advice, first_faults
+from er3a.pipeline.messages.trajectory import advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
@@ -104,6 +105,10 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
     (path,) = paths_of(tmp_path, name)
     xyz, rpy = re.search(r"x, y, z = (.*?) mm and roll, pitch, yaw = (.*?) deg", advice(path)).groups()
     end = {"xyz_mm": [float(x) for x in xyz.split(", ")], "rpy_deg": [float(x) for x in rpy.split(", ")]}
+    shown = end_text(path, path.clear_until.xyz_mm, ShapesAssumed(given=True, margin_mm=20.0, near=()))
+    assert (
+        f"{path.clear_until.margin_mm - 20:.1f} mm if these are wrong by 20 mm, braking distance not included" in shown
+    )
     (shorter,) = paths_of(tmp_path, name, end=end, duration_s=path.duration_s * path.clear_until.s_m / path.length_m)
     assert not shorter.collisions
     assert not shorter.out_of_limits

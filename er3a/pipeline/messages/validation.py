@@ -104,13 +104,13 @@ TEXTS = texts(
         ),
         "validation.left_open#turned": (
             "If {entry} is wrong, the tool point (without a tool: the flange's centre) is where it should be, but "
-            "turned by up to {deg:.0f} deg; the tip of what reaches L beyond it is then up to {factor:.2g} L off. Run no "
-            "Cartesian target with a tool before these are checked."
+            "turned by up to {deg:.0f} deg; the tip of what reaches L beyond it is then up to {factor:.2g} L off. Run "
+            "no Cartesian target with a tool before these are checked."
         ),
         "validation.left_open#turned_at_least": (
             "If {entry} is wrong, the tool point (without a tool: the flange's centre) is where it should be, but "
-            "turned by {deg:.0f} deg or more; the tip of what reaches L beyond it is then up to 2 L off. Run no Cartesian "
-            "target with a tool before these are checked."
+            "turned by {deg:.0f} deg or more; the tip of what reaches L beyond it is then up to 2 L off. Run no "
+            "Cartesian target with a tool before these are checked."
         ),
         "validation.left_open#entry": "an open or weak entry",
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
