@@ -162,6 +162,15 @@ def test_a_filter_stays_in_the_address(browser, small_study):
     assert browser.execute_script(shown, field) == kept
 
 
+def test_a_link_into_a_fold_opens_it(browser, small_study):
+    browser.get((small_study.folder / "reports/index.html").as_uri())
+    fold = browser.find_element(By.ID, "runs-er3a_c60")
+    assert not fold.get_property("open")
+    browser.find_element(By.CSS_SELECTOR, 'a[href="#runs-er3a_c60"]').click()
+    WebDriverWait(browser, PAUSE).until(lambda _: fold.get_property("open"))
+    assert fold.find_element(By.CSS_SELECTOR, "a[href$='#line_clean']").is_displayed()
+
+
 def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
     field = browser.find_element(By.CSS_SELECTOR, ".find input")
