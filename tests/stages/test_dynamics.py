@@ -462,7 +462,7 @@ def test_moments_about_a_joint_that_slides_are_refused():
     wrist_group = WristLoadGroup.model_validate(
         {"source": "a sheet", "grade": "claim", "rows": [{"joint": 3, "moment_n_m": 4.0}]}
     )
-    with pytest.raises(ValueError, match="joint 3 slides"):
+    with pytest.raises(ValueError, match="joint 3 is prismatic"):
         check_masses(None, None, wrist_group, [False, False, True, False])
 
 
