@@ -31,7 +31,7 @@ rule all:
 onerror:
     print(
         "\nWhat failed, in short:",
-        *(told("error: ") or ["no job said why, as one that is stopped can't; see the logs named above"]),
+        *(told("error: ") or ["no job gave a reason (a job that was killed can't); see the logs named above"]),
         sep="\n",
     )
 

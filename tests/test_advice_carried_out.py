@@ -82,7 +82,8 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("contradiction#one", "contradiction#more"),
     *("all_samples_equal#target", "ambiguous_tilt", "void_advice#cause", "void_advice#predicate"),
     *("read_limit#lower", "read_limit#upper", "time_joint", "at_singularity#wrist", "other_direction#both"),
-    *("payload.unknown", "void.expected"),
+    *("payload.unknown", "void.expected", "advice.near", "advice.slowly"),
+    *("validation.left_open#turned", "validation.left_open#turned_at_least"),
 }
 NO_ADVICE = {f"not_of_this_arm#{why}" for why in ("no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns")}
 

@@ -216,13 +216,18 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert not stop.usable
         assert 0 < stop.motion.done_ratio < 1
     assert paths["line_out"].strategy is None
-    assert "out of reach from t =" in advice(paths["line_out"])
+    assert advice(paths["line_out"]).endswith("it is out of reach besides")
     last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
     assert 0 < last.t_s < met.t0_s
     assert f"up to t = {last.t_s:.4g} s ({last.s_m * 1000:.1f} mm): end the path there" in advice(
         paths["line_collides"]
     )
-    assert paths["line_limits"].strategy == "planned" or "limit" in advice(paths["line_limits"])
+    planned = paths["line_limits"]
+    assert planned.strategy == "planned" or "limit" in advice(planned)
+    if planned.strategy == "planned":
+        assert advice(planned).startswith("The path itself can't be driven. Use another motion instead")
+        shorter = planned.chosen.motion.duration_s < planned.duration_s
+        assert (f"no faster than the {planned.duration_s:.2f} s programmed" in advice(planned)) == shorter
     mended = paths["line_wrist"]
     assert mended.chosen.motion.max_joint_speed_ratio <= mended.max_joint_speed_ratio * (1 + 1e-6)
     assert mended.chosen.motion.max_joint_acceleration_ratio <= mended.max_joint_acceleration_ratio * (1 + 1e-6)
@@ -381,6 +386,8 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
     listed = index.split('id="faults-er3_600-trajectory"')[1].split("</table>")[0]
     assert 'play=line_wrist%2C+repaired&amp;t=0.0#line_wrist">line_<wbr>wrist, repaired</a>' in listed
     assert "trajectory.html?play=line_clean&amp;t=0#line_clean" in index  # a sound one is named too
+    assert '<details class="faults tight" id="runs-er3_600">' in index
+    assert "run none on the arm before its table is confirmed" in index
     for each in meant:
         t, place = re.search(rf'trajectory.html\?play={each.name}&amp;t=([\d.]+)#(\w+)"', listed).groups()
         path = next(path for path in stored["er3_600"].results.summary.paths if path.name == each.name)

@@ -11,9 +11,10 @@ import pytest
 import yaml
 from lxml import etree
 
+from er3a.collision.pairs import ShapesAssumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
-from er3a.pipeline.messages.trajectory import advice, first_faults
+from er3a.pipeline.messages.trajectory import advice, end_text, first_faults
 from er3a.pipeline.program_reports import programs_of
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.trajectory.compute import compute
@@ -104,6 +105,10 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
     (path,) = paths_of(tmp_path, name)
     xyz, rpy = re.search(r"x, y, z = (.*?) mm and roll, pitch, yaw = (.*?) deg", advice(path)).groups()
     end = {"xyz_mm": [float(x) for x in xyz.split(", ")], "rpy_deg": [float(x) for x in rpy.split(", ")]}
+    shown = end_text(path, path.clear_until.xyz_mm, ShapesAssumed(given=True, margin_mm=20.0, near=()))
+    assert (
+        f"{path.clear_until.margin_mm - 20:.1f} mm if these are wrong by 20 mm, braking distance not included" in shown
+    )
     (shorter,) = paths_of(tmp_path, name, end=end, duration_s=path.duration_s * path.clear_until.s_m / path.length_m)
     assert not shorter.collisions
     assert not shorter.out_of_limits
@@ -126,7 +131,7 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     there = {"xyz_mm": named.tolist(), "rpy_deg": list(entry.end.rpy_deg)}
     (shorter,) = paths_of(tmp_path, "line_out", end=there, duration_s=path.duration_s * part)
     assert path.verdict == "unreachable"
-    assert "It is within reach up to t = " in said
+    assert "it is out of reach besides" in said
     assert f"End it there, with the tool at x, y, z = {point} mm" in fault.to_do
     assert named == pytest.approx(start + part * (end - start), abs=0.06)
     assert shorter.verdict == "safe"
@@ -161,7 +166,9 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     (fault,) = faults(replace(results, summary=replace(results.summary, paths=(several,))))
     assert (fault.when, fault.what[:18]) == ("0.500 s", "wrist singularity;")
     beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=PathOutOfReach(())),))
-    assert "another fault before: from t = 0.5 s, wrist singularity" in advice(beyond, last_sound(beyond, rows))
+    assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
+        beyond, last_sound(beyond, rows)
+    )
 
 
 @pytest.mark.parametrize(

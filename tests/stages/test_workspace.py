@@ -119,6 +119,25 @@ def test_what_is_read_is_what_was_computed(found, tmp_path):
         assert (tmp_path / "again.parquet").read_bytes() == (tmp_path / f"{name}.parquet").read_bytes(), name
 
 
+def test_a_void_at_the_shoulder_names_the_limit_that_nothing_confirms_and_a_contradicted_table_has_no_place(
+    small_results, tmp_path
+):
+    study, name = load_study("config/small.yaml"), "er3a_c60"
+    stored = read_stage(small_results("workspace", name, study), STAGES["workspace"])
+    lower = np.degrees(study.robot(name).lower[2])
+    said = f"The bounds hold for J3 ≥ {lower:.4g} deg, which nothing confirms. With a tool".replace("-", "−")
+    assert said in void_text(stored.results.summary, confirmed=False)
+    assert "which nothing confirms" not in void_text(stored.results.summary)
+    for status in ("caution", "fail"):
+        report(study, replace(stored, rests_on={"validation": status}), tmp_path / "page.html")
+        page = (tmp_path / "page.html").read_text(encoding="utf-8")
+        assert ("Put the box on" in page, "No place for the box is recommended" in page) == (
+            status != "fail",
+            status == "fail",
+        )
+        assert ("No path or program was checked with" in page) == (status != "fail")
+
+
 def test_void_centres_have_no_inverse_solution(small_results, random):
     """The closed form, over random orientations, is an independent witness of what the samples left out."""
     study, name = load_study("config/small.yaml"), "er3a_c60_article"

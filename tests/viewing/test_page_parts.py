@@ -40,13 +40,14 @@ def test_the_first_of_a_name_leads_on_and_texts_stay_texts():
 
 def test_the_table_to_use_is_whole_and_as_its_file_gives_it():
     real, article = er3a.load_robot("er3a_c60"), er3a.load_robot("er3a_c60_article")
-    section = table_to_use(article, real)
+    section = table_to_use(article, real, "alpha 6, all limits")
     rows = [[value for value, _ in cells] for _, cells in section["rows"]]
+    assert section["text"].endswith("Not confirmed: alpha 6, all limits.")
     assert section["page"] == "../er3a_c60/validation.html"
     assert rows[1] == ["270", "0", "0", "−90", "−1", "−130", "90"]
     marked = np.array([[differs for _, differs in cells] for _, cells in section["rows"]])
     assert marked[1].tolist() == [True, False, False, True, True, True, True]
-    assert not np.array([[differs for _, differs in cells] for _, cells in table_to_use(real, real)["rows"]]).any()
+    assert not np.array([[differs for _, differs in cells] for _, cells in table_to_use(real, real, "")["rows"]]).any()
 
 
 @pytest.mark.parametrize(

@@ -91,8 +91,7 @@ TEXTS = texts(
             "± {tolerance:.2g} {unit}, at J{joint}."
         ),
         "dynamics.no_limits#at_rest": (
-            "Holding still in the worst pose found takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}: choose "
-            "motors by the greater."
+            "Holding still in the worst pose found takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}."
         ),
         "dynamics.fits": "Fits: every quantity with a known limit is within it; highest utilisation: {use}.",
         "dynamics.unlimited": "Unknown, wholly or in part: {what}.",
@@ -118,7 +117,8 @@ TEXTS = texts(
         ),
         "dynamics.inferred": "Masses are inferred: the results are orders of magnitude only.",
         "dynamics.graded": (
-            "The masses are {grade}, neither measured nor given by the manufacturer, and the torques are as uncertain."
+            "The masses are {grade}, neither measured nor given by the manufacturer, so the torques are just as "
+            "uncertain."
         ),
         "dynamics.not_run": Plural(
             "count",
@@ -154,8 +154,13 @@ TEXTS = texts(
         "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
         "payload.bounded": "At most {kg:.3g} kg on the paths that may be run, limited by torques on {path}.",
         "payload.partly": "Left out, because not known: {what}.",
-        "payload.unknown": "Unknown, so assume none. Ask the manufacturer for: {what}.",
-        "payload.not_examined": "Unknown, so assume none: whether the motors carry a load was not examined.",
+        "payload.unknown": (
+            "Not known: mount nothing until the manufacturer gives the rated payload. Ask for: {what}."
+        ),
+        "payload.not_examined": (
+            "Not known: mount nothing until the manufacturer gives the rated payload. Whether the motors carry a load "
+            "was not examined."
+        ),
         "payload.rated": "The robot's file gives a rated payload of {kg:.3g} kg; nothing here confirms it.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why})",
     }

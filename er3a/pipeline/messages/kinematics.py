@@ -137,8 +137,10 @@ TEXTS = texts(
         ),
         "by_class_numbered": "{arm_class}; no signs separate its branches, so they are numbered",
         "wrist_too_near_axis_1": "the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset",
-        "wrist_too_far": "the wrist centre would be {gap} too far from axis 2 (stretched, the arm reaches {reach})",
-        "wrist_too_near": "the wrist centre would be {gap} too near to axis 2 (folded, the arm reaches {least})",
+        "wrist_too_far": "{gap} beyond reach (the stretched arm brings the wrist centre {reach} from axis 2)",
+        "wrist_too_near": (
+            "the wrist centre would be {gap} too near to axis 2 (folded, the arm gets no nearer than {least})"
+        ),
         "side_unsolved": "to the {side}: {why}",
         "greatest_move": "greatest joint move {angle_deg:.1f} deg (J{joint})",
         "only_admissible": "{move}; the only admissible solution",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
+from er3a.by_value import Finding
 from er3a.pipeline.messages.say import bracketed, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import LeftOut, LeftOutSubject, NoPass
 
@@ -13,6 +14,8 @@ TEXTS = texts(
         "left_out.obstacles": (
             "obstacles: none are given, so the arm was checked only against itself and what it carries"
         ),
+        "reserved.grasp_counts": "This is of the bare arm: no gripper was checked.",
+        "reserved.dynamics.no_limits": "These are lower bounds, so don't choose motors by them.",
         "no_pass": "Not examined, and therefore no pass: {missed}.",
         "left_out.bare_links": "collisions of links without a shape that lie within the shapes of others",
         "left_out.uncovered_links": (
@@ -145,12 +148,22 @@ TEXTS = texts(
 
 MOST_NAMED = 6  # in a sentence; the table names all
 _words: dict[LeftOutSubject, tuple[str, Mapping[str, str]]] = {}
+RESERVED: Mapping[str, tuple[LeftOutSubject, ...]] = {
+    "grasp_counts": ("carried", "bare_tool"),
+    "dynamics.no_limits": ("link_masses", "load", "friction"),
+}
 NameT = TypeVar("NameT", bound=str)
 
 
 def names_in_words(subject: LeftOutSubject, code: str, words: Mapping[NameT, str]) -> None:
     """Say a subject's names by a table of words marked with ``N_``; a stage's messages call this."""
     _words[subject] = code, {str(name): text for name, text in words.items()}
+
+
+def say_reserved(finding: Finding, not_examined: Iterable[LeftOut]) -> str:
+    """A verdict's finding, and what it is not to be taken for where its stage left something out."""
+    reserved = any(each.subject in RESERVED.get(finding.code, ()) for each in not_examined)
+    return joined([say(finding), sentence(f"reserved.{finding.code}") if reserved else ""], " ")
 
 
 def left_out_names(found: LeftOut, most: int | None = None) -> str:

@@ -121,10 +121,12 @@ TEXTS = texts(
         "coordinate_of": "{vector} {coordinate}",
         "read_limit": by(
             "side",
-            upper="jog joint {joint} to its upper limit and read the angle",
-            lower="jog joint {joint} to its lower limit and read the angle",
+            upper="read joint {joint}'s upper software limit in the controller; drive there only in T1, way free",
+            lower="read joint {joint}'s lower software limit in the controller; drive there only in T1, way free",
         ),
-        "time_joint": "time a long turn of joint {joint} at full speed, to ±{half_width_deg_s:g} deg/s",
+        "time_joint": (
+            "in a cleared cell, time a long turn of joint {joint} at full speed, to ±{half_width_deg_s:g} deg/s"
+        ),
         "not_the_robot_described": (
             "This is not the robot that these describe: {against:; }. Positions differ by up to {mismatch_mm:.0f} mm; "
             "the best correction of one or two entries (of {tried} tried) still leaves {left_mm:.1f} mm."
@@ -141,8 +143,14 @@ TEXTS = texts(
         ),
         "part_off": "{part}: {status} (the tool could be off by {mm:.0f} mm, {deg:.0f} deg)",
         "part": "{part}: {status}",
-        "look_at_motion_from": "jog +J{joint} from ({own_pose}) deg and see whether {motion} (forward is +x)",
-        "look_at_motion": "jog +J{joint} from the zero pose and see whether {motion} (forward is +x)",
+        "look_at_motion_from": (
+            "in a cleared cell, at reduced speed (T1), jog +J{joint} a few degrees from ({own_pose}) deg and see "
+            "whether {motion} (forward is +x)"
+        ),
+        "look_at_motion": (
+            "in a cleared cell, at reduced speed (T1), jog +J{joint} a few degrees from the zero pose and see whether "
+            "{motion} (forward is +x)"
+        ),
         "inconsistent_with_own_text": (
             "The table contradicts its own text ({against:; }): to agree with it, {entry} would have to be {needed:g} "
             "{unit} instead of {given:g}. This is no evidence about a real robot."

@@ -102,7 +102,7 @@ TEXTS = texts(
         "bodies_overlap.more": "{touches}; and more later",
         "path.either_way": "{open}; the path is not safe in either case",
         "path.singular": "{type} singularity",
-        "path.too_fast_until": "{cause} (until t = {end:.4g} s)",
+        "path.too_fast_until": "too fast until t = {end:.4g} s; at worst, {cause}",
         "advice.out_of_reach": "it is out of reach {when}",
         "advice.only": "{way}, as the study requires, does not repair it: {reason}",
         "advice.none": "No avoidance strategy completes this path: {why}",
@@ -126,8 +126,7 @@ TEXTS = texts(
             "to the arm"
         ),
         "advice.within_reach#later": (
-            "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path), but has another fault before: from "
-            "t = {first:.4g} s, {what}"
+            "From t = {first:.4g} s: {what}; from t = {t:.4g} s ({far:.1f} mm of the path) it is out of reach besides"
         ),
         "advice.sound": (
             "The last point computed before anything is wrong is at t = {t:.4g} s, the tool at x, y, z = {xyz} mm: end "
@@ -137,19 +136,24 @@ TEXTS = texts(
         "advice.end": "End it there, with the tool at x, y, z = {xyz} mm.",
         "advice.end#clear": "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear.",
         "advice.end#assumed": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, which may be "
-            "wrong by {wrong:g} mm."
+            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes; {left:.1f} mm "
+            "if these are wrong by {wrong:g} mm, braking distance not included."
         ),
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
-        "advice.near": "The arm is near-singular at the start, so no part of the path is recommended",
+        "advice.instead": "The path itself can't be driven",
+        "advice.slowly": "Run it in a cleared cell and no faster than the {programmed:.2f} s programmed",
+        "advice.near": "Run no part of it: the arm is near-singular at the start",
         "advice.region": "It still passes near the singular pose",
         "advice.full_speed": "A joint moves at full speed: start slowly",
         "advice.limits#both": (
             "It uses up to {speed:.0f} % of the assumed joint speeds and {acceleration:.0f} % of the assumed "
-            "accelerations"
+            "accelerations; the controller's own 100 % may be faster: begin at 10 % override"
         ),
-        "advice.limits#speed": "It uses up to {speed:.0f} % of the assumed joint speeds",
+        "advice.limits#speed": (
+            "It uses up to {speed:.0f} % of the assumed joint speeds; the controller's own 100 % may be faster: begin "
+            "at 10 % override"
+        ),
         "advice.limits#acceleration": "It uses up to {acceleration:.0f} % of the assumed joint accelerations",
         "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
         "advice.tool#none": "the tool stays on the path",
@@ -392,7 +396,8 @@ def end_text(path: PathSummary, xyz_mm: tuple[float, ...], assumed: ShapesAssume
     if path.clear_until:
         parts = {"xyz": _numbers(xyz_mm, 1), "margin": path.clear_until.margin_mm}
         if assumed:
-            return sentence("advice.end#assumed", wrong=assumed.margin_mm, **parts)
+            left = max(0.0, path.clear_until.margin_mm - assumed.margin_mm)
+            return sentence("advice.end#assumed", wrong=assumed.margin_mm, left=left, **parts)
         return sentence("advice.end#clear", **parts)
     return sentence("advice.end", xyz=_numbers(xyz_mm, 1))
 
@@ -463,8 +468,13 @@ def repair_text(path: PathSummary, limits: LimitsUsed | None = None) -> str:
     )
     passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
     near = sentence("advice.region") if passes else ""
-    full = sentence("advice.full_speed") if (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED else ""
-    return joined([chosen, near, _of_limits(motion, limits) if limits else "", full], ". ")
+    other, slowly = tried.name == "planned", ""
+    if other and motion.duration_s < path.duration_s:
+        slowly = sentence("advice.slowly", programmed=path.duration_s)
+    unsaid = limits is None or not any(limits.speed_assumed)
+    full = sentence("advice.full_speed") if unsaid and (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED else ""
+    first = sentence("advice.instead") if other else ""
+    return joined([first, chosen, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
 
 
 def _of_limits(motion: StrategyMotion, limits: LimitsUsed) -> str:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import er3a.pipeline.messages.diagnosis
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.diagnosis.conclusions import TooSmallToTell
 from er3a.diagnosis.faults import CountedFromGround, ReversedDirection, WrongOffset
+from er3a.identifiability.entries import GROUP_OF
+from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.messages.language import N_, as_text, own_title, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
-from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, PART_WORDS, quoted
+from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, quoted
 from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
@@ -65,6 +68,12 @@ GRADES = {
     "inferred": N_("inferred, not stated"),
 }
 CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
+PART_ENTRIES = {
+    "geometry": N_("lengths and twists"),
+    "zero_and_directions": N_("zeros and directions"),
+    "limits": N_("limits"),
+    "speeds": N_("speeds"),
+}
 names_in_words("references", "reference.group", GROUP_WORDS)
 names_in_words("loose_references", "reference.group", GROUP_WORDS)
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
@@ -94,12 +103,16 @@ TEXTS = texts(
             "If an open or weak entry is wrong, the tool is off by {mm:.0f} mm and {deg:.0f} deg or more."
         ),
         "validation.left_open#turned": (
-            "If an open or weak entry is wrong, the tool's position is right, but it is turned by up to {deg:.0f} deg."
+            "If {entry} is wrong, the tool point (without a tool: the flange's centre) is where it should be, but "
+            "turned by up to {deg:.0f} deg; the tip of what reaches L beyond it is then up to {factor:.2g} L off. Run "
+            "no Cartesian target with a tool before these are checked."
         ),
         "validation.left_open#turned_at_least": (
-            "If an open or weak entry is wrong, the tool's position is right, but it is turned by {deg:.0f} deg or "
-            "more."
+            "If {entry} is wrong, the tool point (without a tool: the flange's centre) is where it should be, but "
+            "turned by {deg:.0f} deg or more; the tip of what reaches L beyond it is then up to 2 L off. Run no "
+            "Cartesian target with a tool before these are checked."
         ),
+        "validation.left_open#entry": "an open or weak entry",
         "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
         "validation.left_open#uncontradicted": (
             "No independent document contradicts this table ({checks}), but not all of it is settled."
@@ -129,19 +142,20 @@ TEXTS = texts(
         "validation.confirmed": (
             "Independent documents settle every entry that moves the tool: {checks} ({grades} data)."
         ),
-        "validation.left_open#parts": "Settled: {parts}.",
+        "validation.left_open#parts": "Confirmed by independent documents: {parts}.",
+        "validation.left_open#open": "Not confirmed: {names}.",
         "validation.left_open#tolerance": (
-            "“Settled” means: what the documents leave open moves the tool by less than {mm} mm and {deg} deg."
+            "“Confirmed” means: what the documents leave open moves the tool by less than {mm} mm and {deg} deg."
         ),
         "validation.left_open#measurement": "Most useful measurement: {next_measurement}.",
         "validation.left_open#unbounded": (
             "Only the table's own source gives {names}: if one of them is wrong, the tool could be off by any amount."
         ),
         "validation.left_open#conflicting": "{count} undecided, because documents contradict each other",
-        "part_found#settled": "{part} {settled} of {entries}",
+        "part_found#all": "all {part}",
+        "part_found#some": "{settled} of {entries} {part}",
         "part_found#up_to_signs": "{count} of them up to signs",
-        "part_found#excluded": "contradicted: {names}",
-        "part_found#open": "open: {names}",
+        "part_found#excluded": "{names} (contradicted)",
         "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
         "validation.another_arm": "Contradicted entries: {names}.",
@@ -230,9 +244,41 @@ def _(found: LeftOpen) -> str:
 
 
 def settled_parts(found: LeftOpen) -> str:
-    """How many entries of each part of a table are settled, and which are open."""
-    parts = [say(part) for part in found.parts if part.part == "geometry" or part.status != "settled"]
-    return sentence("validation.left_open#parts", parts=joined(parts)) if parts else ""
+    """How much of each part of a table is settled, and what is not."""
+    known = [say(part) for part in found.parts if part.settled or part.up_to_signs]
+    confirmed = sentence("validation.left_open#parts", parts=joined(known, ", ")) if known else ""
+    names = unconfirmed(found)
+    return joined([confirmed, sentence("validation.left_open#open", names=names) if names else ""], " ")
+
+
+PARTS = {column: PART_OF_GROUP[group] for column, group in GROUP_OF.items()}
+
+
+def unconfirmed(found: LeftOpen) -> str:
+    """What of a table nothing settles: the entries by name, a part of which none is settled as a whole."""
+    left, named = list(found.unbounded), []
+    for part in found.parts:
+        own = list(dict.fromkeys((*part.open, *(name for name in found.unbounded if _part(name) == part.part))))
+        left = [name for name in left if name not in own]
+        if part.entries and not part.settled + part.up_to_signs:
+            named.append(say_as(part, "all", part=word("part_entries", PART_ENTRIES, part.part)))
+        else:
+            excluded = say_as(part, "excluded", names=shortened(part.contradicted)) if part.contradicted else ""
+            named += [shortened(own), excluded]
+    return joined([*named, shortened(left)], ", ")
+
+
+def _open_alone(found: LeftOpen) -> list[str]:
+    """The open entries that move the tool, where none is weak besides, as weak ones are not named."""
+    moving = [part for part in found.parts if part.part in ("geometry", "zero_and_directions")]
+    named = {name for part in moving for name in (*part.open, *part.contradicted)}
+    named |= {name for name in found.unbounded if _part(name) is not None}
+    left = sum(part.entries - part.settled - part.up_to_signs for part in moving)
+    return [name for part in moving for name in part.open] if left <= len(named) else []
+
+
+def _part(name: str) -> PartName | None:
+    return next((part for column, part in PARTS.items() if column == name.rstrip("0123456789")), None)
 
 
 def how_far_off(found: LeftOpen) -> list[str]:
@@ -242,7 +288,10 @@ def how_far_off(found: LeftOpen) -> list[str]:
         form = "at_least" if found.at_least else "up_to"
         if round(found.off.mm) == 0:
             form = "turned_at_least" if found.at_least else "turned"
-        sentences.append(sentence(f"validation.left_open#{form}", mm=found.off.mm, deg=found.off.deg))
+        entry = bracketed(sentence("validation.left_open#entry"), shortened(_open_alone(found)))
+        factor = 2 * math.sin(math.radians(min(found.off.deg, 180.0) / 2))
+        parts = {"mm": found.off.mm, "deg": found.off.deg, "factor": factor, "entry": entry}
+        sentences.append(sentence(f"validation.left_open#{form}", **parts))
     if found.unbounded:
         sentences.append(sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
     return sentences
@@ -259,13 +308,10 @@ def _what_speaks(counts: CheckCounts) -> str:
 
 @say.register
 def _(found: PartFound) -> str:
-    part, settled = word("part", PART_WORDS, found.part), found.settled + found.up_to_signs
+    part, settled = word("part_entries", PART_ENTRIES, found.part), found.settled + found.up_to_signs
     signs = say_as(found, "up_to_signs", count=found.up_to_signs) if found.up_to_signs else ""
-    counts = bracketed(say_as(found, "settled", part=part, settled=settled), signs)
-    excluded = say_as(found, "excluded", names=shortened(found.contradicted))
-    left = say_as(found, "open", names=shortened(found.open))
-    parts = [counts, excluded if found.contradicted else "", left if found.open else ""]
-    return joined(parts, ", ")
+    form = "some" if settled < found.entries else "all"
+    return bracketed(say_as(found, form, part=part, settled=settled), signs)
 
 
 def shortened(names: Sequence[str]) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import er3a.pipeline.messages.collision
-import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.pipeline.messages.language import N_, as_text, tr
+import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.pipeline.messages.kinematics import sum_of_joints
+from er3a.pipeline.messages.language import N_, as_text, tr, with_unit
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace.model import (
@@ -25,6 +25,7 @@ from er3a.pipeline.stages.workspace.model import (
 from er3a.workspace.causes import (
     Disappears,
     Geometry,
+    OnlySampled,
     Relaxed,
     SeveralLimits,
     SingleChange,
@@ -132,9 +133,9 @@ TEXTS = texts(
         "workspace.rule": Plural(
             "count",
             "An enclosed void away from the shoulder often means a wrong limit or direction of joint 2 or 3. {count} "
-            "was found; widening one limit at a time points to joint 2 or 3 for {named} of them.",
+            "was found; widening one limit at a time points to joint 2 or 3 in {named} of {count} cases.",
             "An enclosed void away from the shoulder often means a wrong limit or direction of joint 2 or 3. {count} "
-            "were found; widening one limit at a time points to joint 2 or 3 for {named} of them.",
+            "were found; widening one limit at a time points to joint 2 or 3 in {named} of {count} cases.",
         ),
         "inverse_unknown": "no method here finds all inverse solutions of this arm",
         "joint_one_shared": (
@@ -166,9 +167,11 @@ TEXTS = texts(
             "The tool point can't reach {lower:.3g} to {upper:.3g} L away from the shoulder: {extent} mm, centre "
             "({centre}) mm."
         ),
-        "void.cause#it": "It {cause}.",
+        "void.cause#it": "The void {cause}.",
         "void.cause#noun": "Its cause: {cause}.",
-        "void.expected": "This is normal for the arm: put no target there, and leave the limits as they are.",
+        "void.expected": "This is normal for the arm: put no target there.",
+        "void.rests": "The bounds hold for {limits}, which nothing confirms.",
+        "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (
             "Out of reach too, but open to the outside: a larger pocket of {lower:.3g} to {upper:.3g} L, centre "
             "({centre}) mm."
@@ -178,25 +181,27 @@ TEXTS = texts(
         ),
         "box.size#turned": "{box} mm, turned by 90 deg (x, y, z: {xyz} mm)",
         "box.size#as_given": "{box} mm (x, y, z)",
+        "box.contradicted": "No place for the box is recommended: evidence contradicts this table.",
         "box.unknown": "Box of {box} mm: {why}",
         "box.nowhere": "Box of {box} mm: no place was found where the tool reaches all of it.",
         "box.put#on": (
-            "Put the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. Collisions with the box were "
-            "not checked."
+            "Put the box on {name}, its centre at ({centre}) mm. Box: {box}; {reached}. No path or program was checked "
+            "with it: before you run any there, put the box into the study's scene file and run again."
         ),
         "box.put#over": (
             "Put the box on a stand {gap} mm high ({least} to {most} mm work too) on {name} (top at z = {height} mm), "
-            "its centre at ({centre}) mm. Box: {box}; {reached}. Directly on {none} no place works. Collisions with "
-            "box and stand were not checked."
+            "its centre at ({centre}) mm. Box: {box}; {reached}. No place directly on {none} works. No path or program "
+            "was checked with them: before you run any there, put both into the study's scene file and run again."
         ),
         "box.put#free": (
-            "Put the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; {reached}. "
-            "Collisions with the box were not checked."
+            "Put the box with its centre at ({centre}) mm; no surface is known there. Box: {box}; {reached}. No path "
+            "or program was checked with it: before you run any there, put the box into the study's scene file and run "
+            "again."
         ),
         "box.proven#all": "the tool point reaches all of it (proven)",
-        "box.proven#upper": "the tool point reaches all of it but the lowest {served_from} mm (proven)",
+        "box.proven#upper": "the tool point reaches all of it except the lowest {served_from} mm (proven)",
         "box.sampled#all": "the tool point reaches all points sampled in it",
-        "box.sampled#upper": "the tool point reaches all points sampled in it but for the lowest {served_from} mm",
+        "box.sampled#upper": "the tool point reaches all points sampled in it except the lowest {served_from} mm",
         "workspace.tool_points_elsewhere": (
             "Nowhere: the arm can't tilt its tool, which points along ({x:.2f}, {y:.2f}, {z:.2f}) and not within the "
             "cone."
@@ -378,9 +383,9 @@ def box_text(summary: Summary) -> str:
     return sentence("box.put#free", **parts)
 
 
-def void_text(summary: Summary) -> str:
+def void_text(summary: Summary, *, confirmed: bool = True) -> str:
     """The void that the verdict tells of, with its bounds, place and cause, and a larger open pocket; empty where voids
-    were not judged."""
+    were not judged. ``confirmed``: whether independent documents settle the joints' limits."""
     finding = summary.verdict.finding
     if isinstance(finding, NoVoid | VoidUncertain):
         return say(finding)
@@ -391,11 +396,31 @@ def void_text(summary: Summary) -> str:
     judged = next(unexpected, voids[0])
     where = sentence("void.shoulder" if judged.holds_shoulder else "void.away", **_void_parts(judged))
     cause = sentence("void.cause#it" if is_predicate(judged.cause) else "void.cause#noun", cause=say(judged.cause))
-    expected = sentence("void.expected") if isinstance(finding, VoidAtShoulder) else ""
+    expected = ""
+    if isinstance(finding, VoidAtShoulder):
+        bare = any(each.subject == "tool" for each in summary.not_examined)
+        rests = "" if confirmed else _resting_on(judged.cause)
+        expected = joined([sentence("void.expected"), rests, sentence("void.no_tool") if bare else ""], " ")
     more = sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else ""
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""
     return joined([where, cause, expected, more, open_one], " ")
+
+
+def _resting_on(cause: VoidCause) -> str:
+    """The limits that make a void, as nothing confirms them; empty where none does."""
+    if isinstance(cause, Disappears):
+        limits = cause.limits
+    elif isinstance(cause, OnlySampled) or cause.most is None:
+        return ""
+    else:
+        limits = (cause.most,)
+    said = [
+        f"{sum_of_joints(limit.joints, limit.factors)} {'≤' if limit.side == 'upper' else '≥'} "
+        + with_unit(as_text(limit.limit, ".4g"), limit.unit)
+        for limit in limits
+    ]
+    return sentence("void.rests", limits=joined(said, ", "))
 
 
 def _void_parts(void: VoidSummary) -> dict[str, float | str]:

@@ -30,10 +30,17 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.messages.collision import near_shapes
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.language import N_, own_title, tr
-from er3a.pipeline.messages.left_out import left_out_text
+from er3a.pipeline.messages.left_out import left_out_text, say_reserved
 from er3a.pipeline.messages.pages import caveat, decision, next_step
 from er3a.pipeline.messages.say import bracketed, joined, say
-from er3a.pipeline.messages.validation import CONVENTIONS, how_far_off, missed_text, settled_parts, shortened
+from er3a.pipeline.messages.validation import (
+    CONVENTIONS,
+    how_far_off,
+    missed_text,
+    settled_parts,
+    shortened,
+    unconfirmed,
+)
 from er3a.pipeline.messages.workspace import box_text, void_text
 from er3a.pipeline.results import (
     AbsentResults,
@@ -51,7 +58,7 @@ from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
-from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen
+from er3a.pipeline.stages.validation.model import AnotherArm, Confirmed, Contradicted, DefinedOtherwise, LeftOpen
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
@@ -592,10 +599,17 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
         "simulated": [stage for stage, head in heads.items() if _misses(head, "real_camera")],
         "answers": [*_answers(heads, robot)],
         "runs": [
-            _run(stage, stored[stage].results, box=_puts_box(heads))
+            _run(stage, stored[stage].results)
             for stage in RUNS
             if stage in stored and heads[stage].status != "not_computed"
         ],
+        "condition": _condition(finding, table),
+        "box": tr(
+            "These pass without the tray or box and its stand: put both into the study's scene file and run again "
+            "before you run any of them there."
+        )
+        if _puts_box(heads)
+        else "",
         "shapes": next(
             (say(replace(shapes, near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""
         ),
@@ -622,7 +636,8 @@ def _proposed(finding: object) -> dict[str, str]:
     seen = N_("If so, {entry} is right; if not, turn its sign in the robot's file, and run again.")
     settles = seen if proposal.code == "look_at_motion" else N_("It settles {entry}.")
     step = [page.whole_sentence(say(proposal)), tr(settles, entry=entry if " " in entry else shortened([entry]))]
-    if finding.unbounded or any(part.settled + part.up_to_signs < part.entries for part in finding.parts):
+    open_ = sum(part.entries - part.settled - part.up_to_signs for part in finding.parts)
+    if open_ > 1 or any(name != entry for name in finding.unbounded):
         step.append(tr("Then check the other entries that are not settled."))
     return {"measurement": joined(step, " "), "entry": entry.replace(" ", "")}
 
@@ -651,7 +666,15 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
     yield tr("Payload"), payload_text(summary, robot), "dynamics.html#payload" if summary else ""
     if workspace:
         place = "#table-voids" if getattr(workspace, "voids", ()) else ""
-        yield tr("Void"), void_text(workspace), f"workspace.html{place}"
+        yield tr("Void"), void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{place}"
+
+
+def _limits_confirmed(heads: Mapping[str, Head]) -> bool:
+    """Whether independent documents settle all limits of the joints."""
+    finding = heads["validation"].finding if "validation" in heads else None
+    if isinstance(finding, LeftOpen):
+        return all(part.settled + part.up_to_signs == part.entries for part in finding.parts if part.part == "limits")
+    return isinstance(finding, Confirmed)
 
 
 def _misses(head: Head, subject: str) -> bool:
@@ -665,11 +688,17 @@ def _puts_box(heads: Mapping[str, Head]) -> bool:
     return bool(getattr(placement, "named_places", ()))
 
 
-def _run(stage: str, results: TrajectoryResults | ProgramsResults, *, box: bool) -> dict[str, Any]:
-    """How many paths or programs there are, which may be run as they are, and why the others may not.
+def _condition(finding: object, table: str) -> str:
+    """What has to be confirmed before anything that passes is run on the arm; empty where the table is confirmed."""
+    if isinstance(finding, LeftOpen) and (names := unconfirmed(finding)):
+        return tr("In the model: run none on the arm before these are confirmed: {entries}.", entries=names)
+    if table in ("pass", "caution"):
+        return ""
+    return tr("In the model: run none on the arm before its table is confirmed.")
 
-    ``box``: whether one is to be put into the cell, which they know nothing of.
-    """
+
+def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
+    """How many paths or programs there are, which may be run as they are, and why the others may not."""
     followed: Sequence[ProgramSummary | PathSummary]
     if isinstance(results, ProgramsResults):
         followed, lost, faults = results.summary.programs, 0, program_faults(results)
@@ -684,7 +713,7 @@ def _run(stage: str, results: TrajectoryResults | ProgramsResults, *, box: bool)
         "lost": lost,
         "sound": sound,
         "faults": faults,
-        "open": [*left_out, *([tr("the tray or box and its stand")] if box else [])],
+        "open": left_out,
     }
 
 
@@ -693,5 +722,5 @@ def _cell(head: Head) -> dict[str, Any]:
     verdict = head.summary.verdict
     unexamined = [say(found) for found in verdict.findings[1:] if found is not verdict.shapes]
     near = near_shapes(verdict.shapes.margin_mm, verdict.shapes.near) if verdict.shapes else ""
-    lead, rest = page.led(joined([say(head.finding), *unexamined, near], " "))
+    lead, rest = page.led(joined([say_reserved(head.finding, head.summary.not_examined), *unexamined, near], " "))
     return {"head": head, "lead": lead, "rest": rest}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isnan
 
 from er3a.pipeline.messages.language import as_number
 
@@ -10,8 +10,8 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def no_noise(value: float) -> float:
-    """0 for what is nothing but rounding, or no number."""
-    return 0.0 if abs(value) < 1e-9 or not isfinite(value) else float(value)
+    """0 for what is nothing but rounding, or no number; an infinite value stays."""
+    return 0.0 if abs(value) < 1e-9 or isnan(value) else float(value)
 
 
 def number(value: float | int | None, digits: int = 4) -> str:

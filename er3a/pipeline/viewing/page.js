@@ -594,6 +594,15 @@ function showOneOf(group) {
   follow();
 }
 
+// What an address leads to may be folded, or inside of what is.
+function unfoldTarget() {
+  const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  let folded = aim?.closest("details:not([open])");
+  if (!folded) return;
+  for (; folded; folded = folded.parentElement.closest("details")) folded.open = true;
+  aim.scrollIntoView();
+}
+
 // The first time that a page uses a term of the glossary, its meaning can be asked for, by pointer, key or touch.
 function explainTerms(terms) {
   const letters = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&").replaceAll(" ", "\\s+");
@@ -651,6 +660,8 @@ document.querySelectorAll("main[data-panel]").forEach(linkJoints);
 if (!document.querySelector("main[data-panel]")) {
   for (const link of document.querySelectorAll('a[href^="teach.html#q="]')) link.replaceWith(...link.childNodes);
 }
+addEventListener("hashchange", unfoldTarget);
+unfoldTarget();
 addContents();
 document.querySelectorAll("[data-one-of]").forEach(showOneOf);
 explainTerms(JSON.parse(document.getElementById("terms").textContent));

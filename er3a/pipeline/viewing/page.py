@@ -28,9 +28,9 @@ from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
 from er3a.pipeline.messages import language
 from er3a.pipeline.messages.language import N_, tr
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text
+from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
-from er3a.pipeline.messages.say import bracketed, say, say_all, word
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.results import AbsentResults, Provenance, Status, Stored, read_stage, read_status
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
@@ -227,7 +227,8 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head
     )
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     meant = len(getattr(verdict.finding, "demonstrations", ()))
-    text = say_all(verdict.findings)
+    found = say_reserved(verdict.finding, stored.results.summary.not_examined)
+    text = joined([found, *listed(verdict.findings[1:])], " ")
     missed = tuple((left_out_text(each), left_out_names(each)) for each in stored.results.summary.not_examined)
     return Head(
         stored.robot,

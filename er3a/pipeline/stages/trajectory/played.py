@@ -148,7 +148,7 @@ def advised(path: PathSummary, rows: PathChecks, limits: LimitsUsed | None = Non
     if text is None or path.chosen:
         return text
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
-        return joined([text, sentence("advice.near")], ". ")
+        return joined([sentence("advice.near"), text], ". ")
     no_part = sound is None and WEIGHTS[path.verdict] == "fail"
     return joined([text, sentence("advice.no_part")], ". ") if no_part else text
 

@@ -13,7 +13,7 @@ from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
 from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
-from er3a.pipeline.messages.say import joined, say, word
+from er3a.pipeline.messages.say import joined, say, sentence, word
 from er3a.pipeline.stages.validation.model import TableEvidence
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.references.quantities import MM
@@ -156,9 +156,10 @@ def _roundest(value: float, each: EntryEvidence) -> float:
     return next((rounded for k in range(3) if low <= (rounded := round(value, k)) <= high), round(value, 3))
 
 
-def table_to_use(robot: Robot, other: Robot) -> dict[str, Any]:
+def table_to_use(robot: Robot, other: Robot, unconfirmed: str) -> dict[str, Any]:
     """The whole table of another robot of the study, limits included, as its file gives it: by joint its values, and
-    whether they differ, which is marked where both tables are of one convention."""
+    whether they differ, which is marked where both tables are of one convention. ``unconfirmed``: what of it nothing
+    settles."""
     kinds = [kind for kind in OTHER_COLUMNS if kind != "beta" or other.beta.any()]
     comparable = robot.convention == other.convention and robot.rows == other.rows and robot.joints == other.joints
     rows = []
@@ -177,6 +178,8 @@ def table_to_use(robot: Robot, other: Robot) -> dict[str, Any]:
     parts = [tr("Source: {source}.", source=own_title(source.source))] if source else []
     if comparable:
         parts.append(tr("What differs is marked."))
+    if unconfirmed:
+        parts.append(sentence("validation.left_open#open", names=unconfirmed))
     return dict(
         title=tr("The table to use: {robot}", robot=other.name),
         text=joined(parts, " "),

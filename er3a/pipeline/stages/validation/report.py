@@ -18,8 +18,9 @@ from er3a.pipeline.messages.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import GRADE_NAMES, decision
 from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, GRADES, GROUPS, counted_checks
-from er3a.pipeline.results import Stored
+from er3a.pipeline.messages.validation import CONVENTIONS, GRADES, GROUPS, counted_checks, unconfirmed
+from er3a.pipeline.results import Stored, read_stage
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import model, validation_figures
 from er3a.pipeline.stages.validation.evidence_section import (
     OTHER_TITLES,
@@ -261,7 +262,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         head=_head(stored, instead),
         robot=robot,
         fold=contradicted,
-        to_use=table_to_use(robot, study.robot(instead)) if instead else None,
+        to_use=table_to_use(robot, study.robot(instead), _unconfirmed(stored, instead)) if instead else None,
         table_evidence=evidence_section(summary.evidence),
         frames=_frames_picture(robot, summary),
         formulas=formulas(robot),
@@ -288,6 +289,14 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         convention=word("convention", CONVENTIONS, robot.convention),
         grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
     )
+
+
+def _unconfirmed(stored: Stored[model.ValidationResults], other: str) -> str:
+    """What nothing settles of the table of another robot of the study."""
+    if stored.folder is None:
+        return ""
+    finding = read_stage(stored.folder.parents[1] / other / "validation", STAGES["validation"]).results.summary.verdict
+    return unconfirmed(finding.finding) if isinstance(finding.finding, model.LeftOpen) else ""
 
 
 def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:

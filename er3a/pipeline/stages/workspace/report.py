@@ -37,6 +37,9 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     """Render the workspace page of a robot from its results."""
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "capability")
+    context = _context(robot, results, scene)
+    if stored.rests_on.get("validation") == "fail":
+        context |= dict.fromkeys(("nowhere", "best_text"), sentence("box.contradicted"))
     render_stage(
         study,
         stored,
@@ -54,7 +57,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         unexpected=isinstance(summary.verdict.finding, model.VoidUnexpected),
         wide=100 * summary.proof.width,
         has_drawing=len(results.drawing) > 0,
-        **_context(robot, results, scene),
+        **context,
     )
 
 
