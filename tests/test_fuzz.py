@@ -55,7 +55,7 @@ FOUND = [
     ("er3_600.yaml", ROBOT, "kind: robot", "kind: robot\n" + "k" * 900 + ": 1", "unknown key"),
     ("scene.yaml", SCENE, "normal: [0, 0, 1]", "normal: [0, 0, 1e200]", "no direction"),  # its length overflowed
     ("targets.yaml", TARGETS, "[0.5, 0.5, 0.5, 0.5]", "[1e200, 0, 0, 0]", "length is 1e+200"),
-    ("targets.yaml", TARGETS, "[[0, 0, 1], ", "[[0, 0, 1e200], ", "no rotation"),
+    ("targets.yaml", TARGETS, "[[0, 0, 1], ", "[[0, 0, 1e200], ", "not a rotation"),
     ("targets/table.csv", TARGET_TABLE, "x_mm,", "x_mm\rx,", "not valid CSV"),  # was a traceback
     ("targets/table.csv", TARGET_TABLE, "300.5", "\u0661\u0662", "is not a number"),  # was 12
     ("targets/table.csv", TARGET_TABLE, "first,0", "first,1e-400", "too small"),  # was 0

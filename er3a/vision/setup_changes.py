@@ -22,6 +22,7 @@ CHANCE = 1e-4  # of sound sets in which a step is found
 LEAST_BLOCK = 2  # samples on either side of a step
 EXPLAINED = 3.0  # standard deviations
 SOLVABLE = 1e8  # condition of a step's equations, beyond which the samples on one side of it don't determine it
+LEAST_STEP = 1e-9  # m, rad; less is rounding, of poses that a simulation gives without errors
 PARTS = {"camera": slice(0, 6), "board": slice(6, 12)}
 
 
@@ -57,7 +58,9 @@ def _of_used(samples: CalibrationSet, refined: Refined) -> MovedBetween | None:
         chance = scipy.special.fdtrc(6, free, drop / 6 / np.maximum(scale, 1e-300)) * 2 * len(drop)
         at = int(chance.argmin())
         best = min(best, (float(chance[at]), at + LEAST_BLOCK, what, step[at]), key=lambda each: each[0])
-    return _finding(samples.names[best[1]], best[2], best[3], best[0]) if best[0] < CHANCE else None
+    if best[0] >= CHANCE or np.linalg.norm(best[3]) < LEAST_STEP:
+        return None
+    return _finding(samples.names[best[1]], best[2], best[3], best[0])
 
 
 def _of_left_out(samples: CalibrationSet, used: Flags, refined: Refined) -> MovedBetween | None:

@@ -49,8 +49,11 @@ def test_a_spreadsheet_s_own_separator_and_decimal_commas_are_read(write, mark):
     assert read_csv(write(text), COLUMNS) == wanted
     left = "".join(line + 2 * mark + "\n" for line in text.splitlines())
     assert read_csv(write(left), COLUMNS) == wanted
-    with pytest.raises(InputError, match="decimal commas and points in one table"):
-        read_csv(write(text.replace("592,8", "592.8")), COLUMNS)
+    for number in ("592,8", "90,5"):
+        with pytest.raises(InputError, match="decimal commas and points in one table"):
+            read_csv(write(text.replace(number, number.replace(",", "."))), COLUMNS)
+    named = HEADER.replace(",", mark) + f"3,5 mm drill{mark}official{mark}1{mark}592,8{mark}0\n"
+    assert read_csv(write(named), COLUMNS)[0]["name"] == "3,5 mm drill"
 
 
 def test_a_header_alone_gives_no_rows(write):

@@ -95,6 +95,8 @@ def test_its_arm_stands_where_plain_matrices_put_it(tmp_path):
         ("1,70,-π/2°,352,θ1", "fractions of pi in a column of degrees"),
         ("1,70,90°00',352,θ1", "is not a number"),
         ('1,"1,070",90,352,θ1', "nothing between thousands"),
+        ("1,70,90,352,2θ1", "is not a number"),
+        ("1,70,90,0.5d1,0", "is not a number"),
     ],
 )
 def test_a_cell_that_can_mean_two_things_is_refused(tmp_path, row, told):

@@ -69,7 +69,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\nb: &b [*a, *a, *a, *a, *a, *a, *a, *a
         ("kind: [whole\n", "line 2, column 1", "expected ',' or ']'"),
         ("kind: whole\n\tcount: 1\n", "line 2, column 1", "a tab character"),
         ("kind: whole\nparts:\n\t- length_mm: 1\n", "line 3, column 1", "a tab character at the start"),
-        ("kind: whole\nparts:\n- {length_mm: 50,0}\n", "line 3, column 18", "a decimal comma stands before it"),
+        ("kind: whole\nparts:\n- {length_mm: 50,0}\n", "line 3, column 18", "write decimals with a point, not a comma"),
         (BOMB, "line 2, column 8", "aliases (*name) are not supported"),
         ("kind: whole\n<<: {count: 1}\n", "line 2, column 1", "merge"),
         ("kind: whole\n1: 2\n", "line 2, column 1", "the key 1 is not a word"),

@@ -195,7 +195,7 @@ def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
 
 @pytest.mark.parametrize(
     ("findings", "missed", "reason"),
-    [((TargetsLeftOut(1),), (), "left out"), ((), (LeftOut("program_rest", ("line: 3",)),), "holds (line: 3)")],
+    [((TargetsLeftOut(1),), (), "left out"), ((), (LeftOut("program_rest", ("line: 3",)),), "checked (line: 3)")],
 )
 def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findings, missed, reason):
     made = PathProgram("line", "safe", {"line.src": "DEF line( )\nEND\n"}, findings, missed)
@@ -205,7 +205,7 @@ def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findin
     assert (tmp_path / "line.src").is_file()
     assert done.exit_code == 1
     assert reason in done.stderr
-    assert "assumed shapes" in done.stderr
+    assert "shapes are assumed" in done.stderr
 
 
 def test_assumed_shapes_and_ways_from_nowhere_are_named():

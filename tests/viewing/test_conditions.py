@@ -12,7 +12,8 @@ from er3a.identifiability.proposals import LookAtMotion
 from er3a.identifiability.reactions import CheckCounts, CheckTally
 from er3a.identifiability.statements import ToolOff
 from er3a.pipeline.messages.left_out import say_reserved
-from er3a.pipeline.messages.validation import how_far_off, say, settled_parts, unconfirmed
+from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
+from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows

@@ -212,6 +212,15 @@ def test_a_fit_that_does_not_converge_can_not_be_used():
         assert ("not_converged" in {each.code for each in grave_warnings(found.warnings)}) == (not converged)
 
 
+@pytest.mark.parametrize("setup", SETUPS)
+def test_poses_without_errors_are_no_reason_to_warn(setup):
+    flange = flange_poses(np.random.default_rng(1), 20)
+    exact, rounded = seen(setup, flange), seen(setup, flange)
+    rounded[:, :3, 3] = np.round(rounded[:, :3, 3], 4)
+    for target in (exact, rounded):
+        assert calibrate_hand_eye(CalibrationSet(setup, flange, target)).warnings == ()
+
+
 def test_a_pose_written_again_at_the_end_is_no_other_setup():
     samples = a_set("eye_in_hand", 4, 12)
     samples.flange[9:], samples.target[9:] = samples.flange[8], samples.target[8]
