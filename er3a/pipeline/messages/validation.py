@@ -154,6 +154,7 @@ TEXTS = texts(
         "validation.left_open#conflicting": "{count} undecided, because documents contradict each other",
         "part_found#all": "all {part}",
         "part_found#some": "{settled} of {entries} {part}",
+        "part_found#more": "{more} more of the {part}",
         "part_found#up_to_signs": "{count} of them up to signs",
         "part_found#excluded": "{names} (contradicted)",
         "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
@@ -247,24 +248,27 @@ def settled_parts(found: LeftOpen) -> str:
     """How much of each part of a table is settled, and what is not."""
     known = [say(part) for part in found.parts if part.settled or part.up_to_signs]
     confirmed = sentence("validation.left_open#parts", parts=joined(known, ", ")) if known else ""
-    names = unconfirmed(found)
+    names = unconfirmed(found.parts, found.unbounded)
     return joined([confirmed, sentence("validation.left_open#open", names=names) if names else ""], " ")
 
 
 PARTS = {column: PART_OF_GROUP[group] for column, group in GROUP_OF.items()}
 
 
-def unconfirmed(found: LeftOpen) -> str:
-    """What of a table nothing settles: the entries by name, a part of which none is settled as a whole."""
-    left, named = list(found.unbounded), []
-    for part in found.parts:
-        own = list(dict.fromkeys((*part.open, *(name for name in found.unbounded if _part(name) == part.part))))
+def unconfirmed(parts: Sequence[PartFound], unbounded: Sequence[str] = ()) -> str:
+    """What of a table nothing settles: the entries by name, as far as they have one here, or how many more there are; a
+    part of which none is settled as a whole. ``unbounded``: entries that only their own document speaks of."""
+    left, named = list(unbounded), []
+    for part in parts:
+        own = list(dict.fromkeys((*part.open, *(name for name in unbounded if _part(name) == part.part))))
         left = [name for name in left if name not in own]
-        if part.entries and not part.settled + part.up_to_signs:
-            named.append(say_as(part, "all", part=word("part_entries", PART_ENTRIES, part.part)))
+        kind, unsettled = word("part_entries", PART_ENTRIES, part.part), part.entries - part.settled - part.up_to_signs
+        more = unsettled - len(own) - len(part.contradicted)
+        if part.entries and unsettled == part.entries:
+            named.append(say_as(part, "all", part=kind))
         else:
             excluded = say_as(part, "excluded", names=shortened(part.contradicted)) if part.contradicted else ""
-            named += [shortened(own), excluded]
+            named += [shortened(own), excluded, say_as(part, "more", more=more, part=kind) if more > 0 else ""]
     return joined([*named, shortened(left)], ", ")
 
 

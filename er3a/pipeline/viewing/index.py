@@ -58,7 +58,7 @@ from er3a.pipeline.stages.programs.played import faults as program_faults
 from er3a.pipeline.stages.registry import STAGES, all_messages
 from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.played import faults as path_faults
-from er3a.pipeline.stages.validation.model import AnotherArm, Confirmed, Contradicted, DefinedOtherwise, LeftOpen
+from er3a.pipeline.stages.validation.model import AnotherArm, Contradicted, DefinedOtherwise, LeftOpen, PartFound
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
@@ -603,7 +603,7 @@ def _entry(study: Study, name: str, results: Path) -> dict[str, Any]:
             for stage in RUNS
             if stage in stored and heads[stage].status != "not_computed"
         ],
-        "condition": _condition(finding, table),
+        "condition": _condition(_parts(heads), getattr(finding, "unbounded", ())),
         "box": tr(
             "These pass without the tray or box and its stand: put both into the study's scene file and run again "
             "before you run any of them there."
@@ -671,10 +671,13 @@ def _answers(heads: Mapping[str, Head], robot: Robot) -> Iterator[tuple[str, str
 
 def _limits_confirmed(heads: Mapping[str, Head]) -> bool:
     """Whether independent documents settle all limits of the joints."""
-    finding = heads["validation"].finding if "validation" in heads else None
-    if isinstance(finding, LeftOpen):
-        return all(part.settled + part.up_to_signs == part.entries for part in finding.parts if part.part == "limits")
-    return isinstance(finding, Confirmed)
+    return not unconfirmed([part for part in _parts(heads) if part.part == "limits"]) and bool(_parts(heads))
+
+
+def _parts(heads: Mapping[str, Head]) -> Sequence[PartFound]:
+    """What is known of each part of the table; empty where validation has no evidence of it."""
+    evidence = getattr(heads["validation"].summary, "evidence", None) if "validation" in heads else None
+    return evidence.parts if evidence else ()
 
 
 def _misses(head: Head, subject: str) -> bool:
@@ -688,13 +691,12 @@ def _puts_box(heads: Mapping[str, Head]) -> bool:
     return bool(getattr(placement, "named_places", ()))
 
 
-def _condition(finding: object, table: str) -> str:
-    """What has to be confirmed before anything that passes is run on the arm; empty where the table is confirmed."""
-    if isinstance(finding, LeftOpen) and (names := unconfirmed(finding)):
-        return tr("In the model: run none on the arm before these are confirmed: {entries}.", entries=names)
-    if table in ("pass", "caution"):
-        return ""
-    return tr("In the model: run none on the arm before its table is confirmed.")
+def _condition(parts: Sequence[PartFound], unbounded: Sequence[str]) -> str:
+    """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
+    if not parts:
+        return tr("In the model: run none on the arm before its table is confirmed.")
+    names = unconfirmed(parts, unbounded)
+    return names and tr("In the model: run none on the arm before these are confirmed: {entries}.", entries=names)
 
 
 def _run(stage: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:

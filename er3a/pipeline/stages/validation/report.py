@@ -295,8 +295,9 @@ def _unconfirmed(stored: Stored[model.ValidationResults], other: str) -> str:
     """What nothing settles of the table of another robot of the study."""
     if stored.folder is None:
         return ""
-    finding = read_stage(stored.folder.parents[1] / other / "validation", STAGES["validation"]).results.summary.verdict
-    return unconfirmed(finding.finding) if isinstance(finding.finding, model.LeftOpen) else ""
+    summary = read_stage(stored.folder.parents[1] / other / "validation", STAGES["validation"]).results.summary
+    parts = summary.evidence.parts if summary.evidence else ()
+    return unconfirmed(parts, getattr(summary.verdict.finding, "unbounded", ()))
 
 
 def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:
