@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +30,6 @@ from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.messages.pages import next_step
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
-    FORMAT_VERSION,
     Stored,
     read_results,
     table_types,
@@ -513,15 +513,15 @@ def test_the_page_says_how_far_each_contradicted_entry_is_off(study, stored, sum
     assert set(rows) == contradicted
 
 
-def test_the_verdict_names_the_table_to_use_instead_if_the_study_has_one_that_holds(study, stored, tmp_path):
+def test_the_verdict_names_the_table_to_use_instead_if_the_study_has_one_that_holds(study, folders, stored, tmp_path):
     found = stored["er3a_c60_article"]
     assert "Use er3a_c60 instead" not in page_of(study, replace(found, folder=tmp_path / "x" / "validation"), tmp_path)
     other = tmp_path / "er3a_c60" / "validation"
-    other.mkdir(parents=True)
+    shutil.copytree(folders["er3a_c60"], other)
+    made = json.loads((other / "summary.json").read_text())
     for status in ("caution", "fail"):
-        verdict = {"status": status, "code": ""}
-        made = {"robot": "er3a_c60", "stage": "validation", "verdict": verdict, "figures": [], "provenance": {}}
-        (other / "summary.json").write_text(json.dumps({"format_version": FORMAT_VERSION, **made}))
+        made["verdict"]["status"] = status
+        (other / "summary.json").write_text(json.dumps(made))
         write_checksums(other)
         page = page_of(study, replace(found, folder=tmp_path / "er3a_c60_article" / "validation"), tmp_path)
         assert ("Never use this table: evidence contradicts it. Use <a" in page) == (status == "caution")
