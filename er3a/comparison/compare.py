@@ -16,18 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.comparison.mechanism import (
-    EntryDifference,
-    Match,
-    Mechanism,
-    Tolerances,
-    is_identity,
-    is_same_mechanism,
-    joints_agree,
-    match,
-    mechanism_of,
-    turn_of,
-)
+from er3a.comparison import mechanism
 from er3a.errors import RobotError
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
@@ -212,18 +201,18 @@ def compare(robot_a: Robot, robot_b: Robot, *, tolerance_mm: float = 0.5, tolera
     if not (tolerance_mm > 0 and tolerance_deg > 0):
         problem = f"the tolerances are {tolerance_mm} mm and {tolerance_deg} deg; both have to be above 0"
         raise RobotError(robot_a.name, problem)
-    return _compared(robot_a, robot_b, Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg)))
+    return _compared(robot_a, robot_b, mechanism.Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg)))
 
 
-def _compared(robot_a: Robot, robot_b: Robot, tolerances: Tolerances, explain: bool = True) -> Comparison:
+def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, explain: bool = True) -> Comparison:
     """What :func:`compare` finds; without causes if they are not to be explained."""
     counts = robot_a.joints, robot_b.joints
     if counts[0] != counts[1] or robot_a.rows != robot_b.rows:
         return Comparison("other_joint_count", joints=counts)
     if (kinds := robot_a.sliding != robot_b.sliding).any():
         return Comparison("other_arm", _other_kinds(robot_a, kinds), joints=counts)
-    a, b = mechanism_of(robot_a), mechanism_of(robot_b)
-    found = match(a, b, tolerances)
+    a, b = mechanism.mechanism_of(robot_a), mechanism.mechanism_of(robot_b)
+    found = mechanism.match(a, b, tolerances)
     same = not found.differences and found.unexplained == 0
     causes = () if same or not explain else tuple(_causes(robot_a, robot_b, found, tolerances))
     differences = tuple(_named(robot_a, each) for each in found.differences)
@@ -264,7 +253,7 @@ def best_of(
 
     Causes are searched for in the best one alone.
     """
-    tolerances = Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
+    tolerances = mechanism.Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
     found = [(name, _compared(robot, other, tolerances, explain=False)) for name, other in others.items()]
     found.sort(key=lambda pair: _misfit(pair[1]))
     best = found[0][0]
@@ -288,7 +277,7 @@ def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
     return GeometryLayer(False, 0.0, 0.0, found)
 
 
-def _named(robot: Robot, found: EntryDifference) -> Difference:
+def _named(robot: Robot, found: mechanism.EntryDifference) -> Difference:
     """A difference by its name, values and unit in A's own table."""
     column, link = found.column, found.link
     angle = column in ("alpha", "beta", "theta")
@@ -307,9 +296,9 @@ def _row_of(robot: Robot, column: str, link: int) -> int:
     return link + (robot.convention == "modified" and column in ("a", "alpha", "beta"))
 
 
-def _placement(T: Reals, tolerances: Tolerances) -> PlacementLayer:
+def _placement(T: Reals, tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
-    angle, R = turn_of(T), T[:3, :3]
+    angle, R = mechanism.turn_of(T), T[:3, :3]
     if angle > np.pi - 1e-4:  # the skew part has no digits left
         outer = 0.5 * (R + np.eye(3))
         axis = outer[:, int(np.argmax(np.diag(outer)))]
@@ -317,13 +306,13 @@ def _placement(T: Reals, tolerances: Tolerances) -> PlacementLayer:
         axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     size = float(np.linalg.norm(axis))
     u, v, w = (axis / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])).tolist()
-    return PlacementLayer(is_identity(T, tolerances), (x, y, z), Turn(math.degrees(angle), (u, v, w)))
+    return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), Turn(math.degrees(angle), (u, v, w)))
 
 
 # Joints ---------------------------------------------------------------------------------------------------------------
 
 
-def _joints_paired(robot_a: Robot, robot_b: Robot, found: Match) -> tuple[Reals, CouplingLayer]:
+def _joints_paired(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tuple[Reals, CouplingLayer]:
     """+1 or -1 for each joint (n,), -1 where B's pendant counts the other way, and whether couplings agree."""
     rows = np.where(found.reverses, -1.0, 1.0)
     if robot_a.coupling is None and robot_b.coupling is None:
@@ -338,7 +327,7 @@ def _joints_paired(robot_a: Robot, robot_b: Robot, found: Match) -> tuple[Reals,
     return signs, CouplingLayer(not wrong.size, tuple((wrong + 1).tolist()))
 
 
-def _joint_zeros(robot: Robot, found: Match) -> Reals:
+def _joint_zeros(robot: Robot, found: mechanism.Match) -> Reals:
     """What A's joints (n,) show, rad or m, where B's show 0."""
     rows = found.zeros * robot.direction
     if robot.coupling is None:
@@ -352,7 +341,7 @@ def _known(robot: Robot, group: str) -> bool:
     return source is None or source.grade != "inferred"
 
 
-def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, tolerances: Tolerances) -> RangeLayer:
+def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, tolerances: mechanism.Tolerances) -> RangeLayer:
     if not (_known(robot_a, "limits") and _known(robot_b, "limits")):
         return RangeLayer(None)
     lower, upper = _limits_of_b(robot_b, signs, zeros)
@@ -392,7 +381,7 @@ def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
 # How far the flange is off --------------------------------------------------------------------------------------------
 
 
-def _distances(robot_a: Robot, robot_b: Robot, found: Match) -> tuple[float, float]:
+def _distances(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tuple[float, float]:
     """Largest distances (m) of the flanges that were found, as printed and aligned: sampled, then climbed."""
     a, b = robot_a.without_tool(), robot_b.without_tool()
     signs, zeros = np.where(found.reverses, -1.0, 1.0), found.zeros * a.direction
@@ -429,13 +418,15 @@ def _largest(distance: Callable[[Reals], Reals], robot: Robot) -> float:
 # Causes ---------------------------------------------------------------------------------------------------------------
 
 
-def _causes(robot_a: Robot, robot_b: Robot, found: Match, tolerances: Tolerances) -> Iterator[Cause]:
+def _causes(
+    robot_a: Robot, robot_b: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances
+) -> Iterator[Cause]:
     """What explains all differences at once; else which single entries have the wrong sign."""
     several = len(found.differences) > 1 or found.unexplained > 0
     for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)) if several else ():
-        there = mechanism_of(other, ends=False)
+        there = mechanism.mechanism_of(other, ends=False)
         for code, amount, unit, columns in _repaired(table, other):
-            if is_same_mechanism(mechanism_of(table, ends=False, **columns), there, tolerances):
+            if mechanism.is_same_mechanism(mechanism.mechanism_of(table, ends=False, **columns), there, tolerances):
                 yield Cause(code, side, (), amount, unit)  # type: ignore[arg-type]
                 return
     for each in found.differences:
@@ -453,7 +444,7 @@ def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | N
     yield "a_and_d_swapped", None, "", {"a": d, "d": a}
     yield "other_convention", None, "", {"convention": "modified" if robot.convention == "standard" else "standard"}
     yield "all_alphas_negated", None, "", {"alpha": -alpha}
-    arms = [mechanism_of(each, ends=False) for each in (robot, other)]
+    arms = [mechanism.mechanism_of(each, ends=False) for each in (robot, other)]
     of_a, of_d = ([float(np.abs(getattr(each, column)).sum()) for each in arms] for column in "ad")
     for sizes, columns in (
         ([x + y for x, y in zip(of_a, of_d)], {"a": a, "d": d}),
@@ -473,7 +464,7 @@ def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | N
         yield "rows_shifted", float(rows), ", ".join(names), {key: np.roll(getattr(robot, key), rows) for key in names}
 
 
-def _ratios(one: Mechanism, other: Mechanism) -> list[float]:
+def _ratios(one: mechanism.Mechanism, other: mechanism.Mechanism) -> list[float]:
     """The factor between the longest lengths of two tables, if it is not about 1."""
     longest = [max(np.abs(each.a).max(initial=0.0), np.abs(each.d).max(initial=0.0)) for each in (one, other)]
     if min(longest) <= 0:
@@ -482,7 +473,9 @@ def _ratios(one: Mechanism, other: Mechanism) -> list[float]:
     return [ratio] if abs(math.log(ratio)) > 0.005 else []
 
 
-def _causes_of_zeros(robot: Robot, b: Mechanism, found: Match, tolerances: Tolerances) -> Iterator[Cause]:
+def _causes_of_zeros(
+    robot: Robot, b: mechanism.Mechanism, found: mechanism.Match, tolerances: mechanism.Tolerances
+) -> Iterator[Cause]:
     """The one slip in the first table that explains why zeros or directions differ, where geometry agrees."""
     offset, zeros = robot.offset, np.where(robot.sliding, 0.0, found.zeros)
     inner = [k for k in range(1, robot.rows - 1) if not robot.sliding[k]]
@@ -501,21 +494,21 @@ def _causes_of_zeros(robot: Robot, b: Mechanism, found: Match, tolerances: Toler
     rows = [k for k in range(robot.rows) if abs(math.sin(robot.alpha[k])) > tolerances.angle]
     for negated in (*([k] for k in rows), rows):
         alpha = np.where(np.isin(np.arange(robot.rows), negated), -robot.alpha, robot.alpha)
-        if joints_agree(mechanism_of(robot, alpha=alpha), b, tolerances, ends):
+        if mechanism.joints_agree(mechanism.mechanism_of(robot, alpha=alpha), b, tolerances, ends):
             names = tuple(f"alpha{k + 1}" for k in negated)
             yield Cause("one_alpha_negated", "a", names) if len(names) == 1 else Cause("all_alphas_negated", "a")
             return
 
 
-def _swapped_in_a_row(robot: Robot, other: Robot, tolerances: Tolerances) -> tuple[str, ...]:
+def _swapped_in_a_row(robot: Robot, other: Robot, tolerances: mechanism.Tolerances) -> tuple[str, ...]:
     """The row in which a and d are swapped, if that explains all."""
-    there = mechanism_of(other, ends=False)
+    there = mechanism.mechanism_of(other, ends=False)
     for k in range(robot.rows):
         if abs(robot.a[k] - robot.d[k]) <= tolerances.length:
             continue
         a, d = np.array(robot.a), np.array(robot.d)
         a[k], d[k] = d[k], a[k]
-        if is_same_mechanism(mechanism_of(robot, ends=False, a=a, d=d), there, tolerances):
+        if mechanism.is_same_mechanism(mechanism.mechanism_of(robot, ends=False, a=a, d=d), there, tolerances):
             return f"a{k + 1}", f"d{k + 1}"
     return ()
 
@@ -526,8 +519,8 @@ def _swapped_in_a_row(robot: Robot, other: Robot, tolerances: Tolerances) -> tup
 def _corrected(
     robot_a: Robot,
     robot_b: Robot,
-    found: Match,
-    tolerances: Tolerances,
+    found: mechanism.Match,
+    tolerances: mechanism.Tolerances,
     limits: RangeLayer,
     *,
     signs: Reals,
@@ -547,13 +540,13 @@ def _corrected(
         columns[column][k] = _rounded(columns[column][k] + found.zeros[k], column == "offset")
     first, last = 0, robot_a.rows - 1
     base, flange = robot_a.base, robot_a.flange
-    if not is_identity(found.base, tolerances):
+    if not mechanism.is_identity(found.base, tolerances):
         before = np.linalg.inv(robot_a.base) @ np.linalg.inv(found.base) @ robot_a.base
         if robot_a.convention == "standard" and _about_z(before):
             _put_on_axis(columns, first, before)
         else:
             base = _rounded_pose(np.linalg.inv(found.base) @ robot_a.base)
-    if not is_identity(found.flange, tolerances):
+    if not mechanism.is_identity(found.flange, tolerances):
         behind = robot_a.flange @ found.flange @ np.linalg.inv(robot_a.flange)
         folded = robot_a.convention == "standard" and bool(columns["a"][last] or np.sin(columns["alpha"][last]))
         if not folded and _about_z(behind) and last > 0:

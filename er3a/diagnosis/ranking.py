@@ -29,23 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.by_value import Displayed, Sheet
+from er3a.diagnosis import fitting
 from er3a.diagnosis.faults import Fault, Faults, Repair, entry_of, place_of, repairs_of, rounded
-from er3a.diagnosis.fitting import (
-    COARSE,
-    DENSE,
-    FINE,
-    MEETS,
-    PAIRED,
-    Fits,
-    FreeNumber,
-    Search,
-    arm_lengths,
-    descend,
-    free_numbers,
-    meet,
-    moved,
-    scanned,
-)
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -89,7 +74,7 @@ class Pool:
 
     def explains(self, uncertainty: Reals) -> Flags:
         """Whether each hypothesis meets all references, (H,)."""
-        met: Flags = np.all(np.abs(self.difference) <= uncertainty * MEETS, axis=1)
+        met: Flags = np.all(np.abs(self.difference) <= uncertainty * fitting.MEETS, axis=1)
         return met
 
 
@@ -114,9 +99,9 @@ class Case:
         return expected_of(self.references)[1]
 
     @cached_property
-    def numbers(self) -> tuple[FreeNumber, ...]:
+    def numbers(self) -> tuple[fitting.FreeNumber, ...]:
         """The free numbers of the table; none if no reference is about the arm's shape."""
-        return free_numbers(self.given.a.shape[-1]) if self._about_shape.any() else ()
+        return fitting.free_numbers(self.given.a.shape[-1]) if self._about_shape.any() else ()
 
     @cached_property
     def repairs(self) -> list[Repair]:
@@ -131,9 +116,9 @@ class Case:
     def _about_shape(self) -> Flags:
         return np.array([not isinstance(each.quantity, Limit | PoseOutside) for each in self.references])
 
-    def search(self, starts: Tables) -> Search:
+    def search(self, starts: Tables) -> fitting.Search:
         """A search from start tables; what is said about limits depends on no free number and is left out."""
-        return Search(starts, self.numbers, self._residual)
+        return fitting.Search(starts, self.numbers, self._residual)
 
     def pool(self, tables: Tables, faults: list[Faults], cost: Reals) -> Pool:
         """Hypotheses with what is left."""
@@ -146,8 +131,8 @@ def single_faults(case: Case) -> Pool:
     pools = [case.pool(join([repair.apply(case.given) for repair in repairs]), *_named([(each,) for each in repairs]))]
     if case.numbers:
         search = case.search(case.given)
-        fits = scanned(search, [(place,) for place in range(len(case.numbers))], FINE)
-        pools.append(_fitted(case, case.given, [()], meet(search, descend(search, fits, MANY_PASSES))))
+        fits = fitting.scanned(search, [(place,) for place in range(len(case.numbers))], fitting.FINE)
+        pools.append(_fitted(case, case.given, [()], fitting.meet(search, fitting.descend(search, fits, MANY_PASSES))))
     return joined_pools(pools)
 
 
@@ -199,28 +184,32 @@ def _repair_and_number(case: Case, thorough: bool = False) -> Pool:
     starts = join([repair.apply(case.given) for repair in case.repairs])
     first, group = _same_shape(starts)
     search = case.search(starts[first])
-    fits = scanned(search, [(place,) for place in range(len(case.numbers))], FINE if thorough else COARSE)
+    fits = fitting.scanned(
+        search, [(place,) for place in range(len(case.numbers))], fitting.FINE if thorough else fitting.COARSE
+    )
     fits = _refined(search, fits, thorough)
     rows = [np.flatnonzero(fits.start == shape) for shape in group]
     start = np.repeat(np.arange(len(starts)), [len(own) for own in rows])
     every = fits[np.concatenate(rows)]
-    return _fitted(case, starts, [(r,) for r in case.repairs], Fits(start, every.which, every.amounts, every.left))
+    return _fitted(
+        case, starts, [(r,) for r in case.repairs], fitting.Fits(start, every.which, every.amounts, every.left)
+    )
 
 
 def _two_numbers(case: Case, thorough: bool = False) -> Pool:
     search = case.search(case.given)
     pairs = list(combinations(range(len(case.numbers)), 2))
-    fits = _refined(search, scanned(search, pairs, DENSE if thorough else PAIRED), thorough)
+    fits = _refined(search, fitting.scanned(search, pairs, fitting.DENSE if thorough else fitting.PAIRED), thorough)
     return _fitted(case, case.given, [()], fits)
 
 
-def _refined(search: Search, fits: Fits, thorough: bool) -> Fits:
+def _refined(search: fitting.Search, fits: fitting.Fits, thorough: bool) -> fitting.Fits:
     """Fits from a scan brought to their bottoms: of the most promising, or of all."""
     if thorough:
-        return meet(search, descend(search, fits, ALL_PASSES))
-    fits = descend(search, fits, FEW_PASSES)
+        return fitting.meet(search, fitting.descend(search, fits, ALL_PASSES))
+    fits = fitting.descend(search, fits, FEW_PASSES)
     best = np.sort(np.argsort(fits.squares, kind="stable")[:MOST_PROMISING])
-    return meet(search, fits.with_rows(best, descend(search, fits[best], MANY_PASSES)))
+    return fitting.meet(search, fits.with_rows(best, fitting.descend(search, fits[best], MANY_PASSES)))
 
 
 def _same_shape(tables: Tables) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -238,10 +227,10 @@ def _named(chosen: Sequence[tuple[Repair, ...]]) -> tuple[list[Faults], Reals]:
     return [tuple(repair.fault for repair in repairs) for repairs in chosen], np.array(cost)
 
 
-def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fits: Fits) -> Pool:
+def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fits: fitting.Fits) -> Pool:
     """Hypotheses of fitted numbers that change something, none twice."""
     fits = _distinct(case, starts, fits)
-    tables = moved(starts[fits.start], case.numbers, fits.which, fits.amounts)
+    tables = fitting.moved(starts[fits.start], case.numbers, fits.which, fits.amounts)
     repaired, cost = _named(chosen)
     given = np.stack([number.value(starts) for number in case.numbers], axis=1)
     fitted = np.stack([number.value(tables) for number in case.numbers], axis=1)
@@ -256,7 +245,7 @@ def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fi
     return case.pool(tables, faults, cost[fits.start] + FREE_NUMBER * fits.which.shape[1])
 
 
-def _distinct(case: Case, starts: Tables, fits: Fits) -> Fits:
+def _distinct(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
     """Fits with angles within half a turn, without those that change nothing or say the same as a better one."""
     is_angle = np.array([number.is_angle for number in case.numbers])[fits.which]
     values = np.stack([number.value(starts) for number in case.numbers], axis=1)[fits.start[:, None], fits.which]
@@ -264,11 +253,11 @@ def _distinct(case: Case, starts: Tables, fits: Fits) -> Fits:
     changes: Flags = np.all(np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED, axis=1)
     is_scale = np.array([number.column is None for number in case.numbers])[fits.which]
     changes &= ~(is_scale & (1 + amounts < LEAST_SCALE)).any(axis=1)
-    fits = Fits(fits.start, fits.which, amounts, fits.left)
+    fits = fitting.Fits(fits.start, fits.which, amounts, fits.left)
     order = np.lexsort((fits.greatest, *fits.which.T[::-1], fits.start))
     fits, is_angle, kept = fits[order], is_angle[order], changes[order]
-    tolerance = np.where(is_angle, SAME_ANGLE, SAME_LENGTH * arm_lengths(starts)[fits.start, None])
-    for back in range(1, DENSE.basins):
+    tolerance = np.where(is_angle, SAME_ANGLE, SAME_LENGTH * fitting.arm_lengths(starts)[fits.start, None])
+    for back in range(1, fitting.DENSE.basins):
         same = (fits.start[back:] == fits.start[:-back]) & (fits.which[back:] == fits.which[:-back]).all(axis=1)
         apart = fits.amounts[back:] - fits.amounts[:-back]
         apart = np.abs(np.where(is_angle[back:], wrap_to_pi(apart), apart))
@@ -320,7 +309,7 @@ def rank_case(case: Case) -> Ranking | None:
     """Rank all hypotheses about a table; None if there is nothing to explain."""
     stated = case.references
     before = case.difference(case.given)[0]
-    if (np.abs(before) <= case.uncertainty * MEETS).all():
+    if (np.abs(before) <= case.uncertainty * fitting.MEETS).all():
         return None
     pool = single_faults(case)
     if not pool.explains(case.uncertainty).any():
@@ -455,4 +444,4 @@ class _Groups:
         lengths = max(float(np.ptp(getattr(tables, name), axis=0).max()) for name in ("a", "d"))
         angles = (getattr(tables, name) for name in ("alpha", "offset", "lower", "upper"))
         turned = max(float(np.abs(wrap_to_pi(angle[1] - angle[0])).max()) for angle in angles)
-        return lengths < SAME_LENGTH * arm_lengths(tables).max() and turned < SAME_ANGLE
+        return lengths < SAME_LENGTH * fitting.arm_lengths(tables).max() and turned < SAME_ANGLE

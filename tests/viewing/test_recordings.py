@@ -19,7 +19,7 @@ from er3a.collision.scene import Scene, Sphere
 from er3a.pipeline.player.motions import Mark, PlayedEvent
 from er3a.pipeline.results import check_checksum
 from er3a.pipeline.study import STAGES
-from er3a.pipeline.viewing import preview
+from er3a.pipeline.viewing import viewer
 from er3a.pipeline.viewing.arm import LABEL, TIMELINE
 from er3a.pipeline.viewing.palette import JOINTS, legible, rgb
 from er3a.pipeline.viewing.recording import Recorded, Run, write_recording
@@ -133,7 +133,7 @@ def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, r
 
 def test_a_preview_drawn_again_is_the_same_to_the_byte(small_study, vulkan, tmp_path):
     recording = small_study.folder / f"reports/{ROBOT}/inverse.rrd"
-    assert preview.draw_preview(recording, tmp_path / "again.webp") is None
+    assert viewer.draw_preview(recording, tmp_path / "again.webp") is None
     assert (tmp_path / "again.webp").read_bytes() == recording.with_suffix(".webp").read_bytes()
 
 
@@ -141,7 +141,7 @@ def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(small_study
     for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
         monkeypatch.setenv(name, "/nowhere")
     monkeypatch.setenv("LIBGL_DRIVERS_PATH", "/nowhere")
-    told = preview.draw_preview(small_study.folder / f"reports/{ROBOT}/inverse.rrd", tmp_path / "inverse.webp")
+    told = viewer.draw_preview(small_study.folder / f"reports/{ROBOT}/inverse.rrd", tmp_path / "inverse.webp")
     assert re.fullmatch("the Rerun viewer .+", told)
     assert (tmp_path / "inverse.webp").read_bytes() == b""
 

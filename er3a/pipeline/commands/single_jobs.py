@@ -66,7 +66,7 @@ def record(
     """
     from er3a.pipeline.results import write_checksum
     from er3a.pipeline.stages import run
-    from er3a.pipeline.viewing.preview import draw_preview, write_empty
+    from er3a.pipeline.viewing.viewer import draw_preview, write_empty
 
     loaded, folder = _folder(study, results, robot, stage)
     recording = reports / robot / f"{stage}.rrd"

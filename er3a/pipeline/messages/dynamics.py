@@ -13,22 +13,11 @@ from er3a.pipeline.messages.language import N_
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
 from er3a.pipeline.results import Summary
-from er3a.pipeline.stages.dynamics.model import (
-    AllWithin,
-    Compared,
-    DataOpen,
-    DynamicsSummary,
-    Marginal,
-    Need,
-    NoData,
-    NoLimits,
-    Quantity,
-    Use,
-)
+from er3a.pipeline.stages.dynamics import model
 from er3a.robots.masses import NoBody
 from er3a.robots.robot import Grade, Robot
 
-QUANTITIES: dict[Quantity, str] = {
+QUANTITIES: dict[model.Quantity, str] = {
     "peak": N_("peak torque"),
     "rms": N_("RMS torque"),
     "holding": N_("holding torque"),
@@ -36,7 +25,7 @@ QUANTITIES: dict[Quantity, str] = {
     "moment": N_("wrist moment"),
     "inertia": N_("wrist inertia"),
 }
-NEEDS: dict[Need, str] = {
+NEEDS: dict[model.Need, str] = {
     "masses": N_("mass, centre of mass and inertia of the links"),
     "peak": N_("peak torques of the drives"),
     "rated": N_("rated torques of the drives"),
@@ -172,7 +161,7 @@ def payload_text(summary: Summary | None, robot: Robot) -> str:
 
     ``summary`` is the stage's; None where it was not computed.
     """
-    paths = summary.paths if isinstance(summary, DynamicsSummary) else ()
+    paths = summary.paths if isinstance(summary, model.DynamicsSummary) else ()
     bounds = [
         (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
     ]
@@ -191,17 +180,17 @@ def payload_text(summary: Summary | None, robot: Robot) -> str:
     return joined([known, rated], " ")
 
 
-def need_word(need: Need) -> str:
+def need_word(need: model.Need) -> str:
     """What is asked for."""
     return word("dynamics.need", NEEDS, need)
 
 
-def quantity_word(quantity: Quantity) -> str:
+def quantity_word(quantity: model.Quantity) -> str:
     """What is compared."""
     return word("dynamics.quantity", QUANTITIES, quantity)
 
 
-def use_text(use: Use) -> str:
+def use_text(use: model.Use) -> str:
     """What is asked for and allowed, where."""
     parts = {
         "what": quantity_word(use.quantity),
@@ -220,13 +209,13 @@ def use_text(use: Use) -> str:
 
 
 @say.register
-def _(found: NoData) -> str:
-    needs: list[Need] = [each.what for each in found.needs if each.what in ("masses", "peak", "load")]
+def _(found: model.NoData) -> str:
+    needs: list[model.Need] = [each.what for each in found.needs if each.what in ("masses", "peak", "load")]
     return say_as(found, needs=joined(map(need_word, needs), ", "))
 
 
 @say.register
-def _(found: NoLimits) -> str:
+def _(found: model.NoLimits) -> str:
     parts = {"joint": found.joint, "torque": found.torque, "tolerance": found.tolerance, "unit": found.unit}
     greatest = say_as(found, "path" if found.path else "holding", **parts)
     held = say_as(found, "at_rest", **vars(found.held) | {"torque": abs(found.held.torque)}) if found.held else ""
@@ -234,11 +223,11 @@ def _(found: NoLimits) -> str:
 
 
 @say.register
-def _(found: Compared) -> str:
+def _(found: model.Compared) -> str:
     tightest = use_text(found.tightest)
-    if isinstance(found, AllWithin):
+    if isinstance(found, model.AllWithin):
         verdict = sentence("dynamics.fits", use=tightest)
-    elif isinstance(found, Marginal):
+    elif isinstance(found, model.Marginal):
         masses = found.unsettled or found.doubts or found.grade == "inferred"
         verdict = sentence("dynamics.marginal" if masses else "dynamics.marginal#open", use=tightest)
     else:
@@ -251,7 +240,7 @@ def _(found: Compared) -> str:
     return joined([verdict, open_, not_run, *_reservations(found)], " ")
 
 
-def _reservations(found: Compared | NoLimits) -> list[str]:
+def _reservations(found: model.Compared | model.NoLimits) -> list[str]:
     missing = ", ".join(map(str, found.missing_links))
     return [
         sentence("dynamics.massless", count=len(found.missing_links), links=missing) if missing else "",
@@ -269,7 +258,7 @@ def _graded(grade: Grade | None) -> str:
 
 
 @say.register
-def _(found: DataOpen) -> str:
+def _(found: model.DataOpen) -> str:
     if not found.numbers:
         return need_word(found.what)
     parts = {"what": need_word(found.what), "numbers": ", ".join(map(str, found.numbers))}

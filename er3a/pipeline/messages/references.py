@@ -7,19 +7,8 @@ from er3a.identifiability.proposals import LookAtMotion, MeasureAngle, MeasureLe
 from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
 from er3a.pipeline.messages.language import N_, as_text, own_title, tr
 from er3a.pipeline.messages.say import by, joined, say, say_as, sentence, texts, word
+from er3a.references import subjects
 from er3a.references.rows import GROUPS, check_complete
-from er3a.references.subjects import (
-    AxisPosition,
-    DrawingCorner,
-    EntryOfTable,
-    MotionOfJoint,
-    OrientationAtPose,
-    PointAtPose,
-    PoseExcess,
-    Reach,
-    SegmentInclination,
-    Subject,
-)
 
 GROUP_WORDS = {
     "zero_pose": N_("zero pose"),
@@ -162,36 +151,36 @@ TEXTS = texts(
 )
 
 
-def quoted(subject: Subject) -> str:
+def quoted(subject: subjects.Subject) -> str:
     """A subject within a sentence: the pose behind what is seen there."""
-    if isinstance(subject, PointAtPose | OrientationAtPose | PoseExcess):
+    if isinstance(subject, subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess):
         return sentence("at_pose#quoted", seen=_seen(subject), own_pose=own_title(subject.pose))
     return say(subject)
 
 
 @say.register
-def _(found: AxisPosition) -> str:
+def _(found: subjects.AxisPosition) -> str:
     return _with_coordinate(say_as(found), found.coordinate)
 
 
 @say.register
-def _(found: PointAtPose | OrientationAtPose | PoseExcess) -> str:
+def _(found: subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess) -> str:
     return sentence("at_pose#row", own_pose=own_title(found.pose), seen=_seen(found))
 
 
 @say.register
-def _(found: SegmentInclination) -> str:
+def _(found: subjects.SegmentInclination) -> str:
     return word(found.code, SEGMENT_WORDS, found.segment)
 
 
 @say.register
-def _(found: DrawingCorner) -> str:
+def _(found: subjects.DrawingCorner) -> str:
     corner = say_as(found)
     return _with_coordinate(corner, found.coordinate)
 
 
 @say.register
-def _(found: Reach) -> str:
+def _(found: subjects.Reach) -> str:
     point = word("point", POINT_WORDS, found.point)
     if found.extreme == "greatest":
         return say_as(found, "greatest", point=point)
@@ -199,24 +188,24 @@ def _(found: Reach) -> str:
 
 
 @say.register
-def _(found: MotionOfJoint) -> str:
+def _(found: subjects.MotionOfJoint) -> str:
     return say_as(found, motion=motion_seen(found))
 
 
 @say.register
-def _(found: EntryOfTable) -> str:
+def _(found: subjects.EntryOfTable) -> str:
     return say_as(found, own_entry=f"{found.column}{found.joint}")
 
 
-def motion_seen(found: MotionOfJoint) -> str:
+def motion_seen(found: subjects.MotionOfJoint) -> str:
     """What is seen, as a clause."""
     return sentence(f"motion#{found.seen}", point=word("point", POINT_WORDS, found.point))
 
 
-def _seen(subject: PointAtPose | OrientationAtPose | PoseExcess) -> str:
-    if isinstance(subject, OrientationAtPose):
+def _seen(subject: subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess) -> str:
+    if isinstance(subject, subjects.OrientationAtPose):
         return _with_coordinate(say_as(subject), subject.coordinate)
-    if isinstance(subject, PoseExcess):
+    if isinstance(subject, subjects.PoseExcess):
         return say_as(subject)
     return _with_coordinate(word("point", POINT_WORDS, subject.point), subject.coordinate)
 
@@ -237,7 +226,7 @@ def _(found: PartEvidence) -> str:
 
 @say.register
 def _(found: LookAtMotion) -> str:
-    motion = motion_seen(MotionOfJoint(found.joint, found.point, found.seen))
+    motion = motion_seen(subjects.MotionOfJoint(found.joint, found.point, found.seen))
     if not any(found.pose_deg):
         return say_as(found, motion=motion)
     pose = joined([as_text(angle, "g") for angle in found.pose_deg], ", ")

@@ -14,18 +14,7 @@ from er3a.pipeline.messages.language import N_, with_unit
 from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, sentence, texts, word
-from er3a.pipeline.stages.trajectory.model import (
-    BodiesOverlap,
-    Jump,
-    LimitsUsed,
-    PathCounts,
-    PathKind,
-    PathSummary,
-    Singularity,
-    StrategyMotion,
-    Stretch,
-    TriedStrategy,
-)
+from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
 
@@ -40,7 +29,7 @@ FIGURES = {
     "velocity_check": N_("Velocity check, greatest error"),
     "characteristic_length": N_("Characteristic length of the Jacobian"),
 }
-KINDS: dict[PathKind, str] = {
+KINDS: dict[model.PathKind, str] = {
     "joint": N_("joint move"),
     "joint_sequence": N_("joint moves in sequence"),
     "line": N_("straight line"),
@@ -169,7 +158,7 @@ TEXTS = texts(
 
 
 @say.register
-def _(found: PathCounts) -> str:
+def _(found: model.PathCounts) -> str:
     unsafe: dict[PathVerdict, tuple[str, ...]] = {
         "unreachable": found.unreachable,
         "none found": found.none_found,
@@ -193,19 +182,19 @@ def _(found: PathCounts) -> str:
     return sentence("finding", finding=joined(sentences))
 
 
-def kind_word(kind: PathKind) -> str:
+def kind_word(kind: model.PathKind) -> str:
     """What kind of path it is."""
     return word("trajectory.kind", KINDS, kind)
 
 
-def event_word(event: Singularity) -> str:
+def event_word(event: model.Singularity) -> str:
     """A singularity's type, or the axes that become dependent where the field has no name for it."""
     if event.type != "dependent_axes":
         return singularity_word(event.type)
     return sentence("dependent_axes", axes=", ".join(map(str, event.axes)))
 
 
-def event_distance(event: Singularity) -> str:
+def event_distance(event: model.Singularity) -> str:
     """How far from the singular set a pass is, with its unit."""
     if event.distance_deg is not None:
         return with_unit(f"{event.distance_deg:.3g}", "deg")
@@ -222,7 +211,7 @@ def strategy_word(name: StrategyName) -> str:
     return word("trajectory.strategy", STRATEGIES, name)
 
 
-def path_text(path: PathSummary) -> str:
+def path_text(path: model.PathSummary) -> str:
     """Where a path is singular or has faults, or that it has none."""
     if not path.collisions:
         return _apart_from_collisions(path)
@@ -237,7 +226,7 @@ def path_text(path: PathSummary) -> str:
     return joined(both[::-1] if path.collisions[0].t0_s < first else both)
 
 
-def _apart_from_collisions(path: PathSummary) -> str:
+def _apart_from_collisions(path: model.PathSummary) -> str:
     if path.no_way:
         shown = sentence("path.shown")
         return joined([say(path.no_way), shown])
@@ -259,16 +248,16 @@ def _apart_from_collisions(path: PathSummary) -> str:
     return sentence("path.safe")
 
 
-def _first_and_worst(stretches: tuple[Stretch[RateCause], ...]) -> list[Stretch[RateCause]]:
+def _first_and_worst(stretches: tuple[model.Stretch[RateCause], ...]) -> list[model.Stretch[RateCause]]:
     """Of each kind of limit the stretch that exceeds it first and, if it is another, the one that exceeds it most."""
-    found: list[Stretch[RateCause]] = []
+    found: list[model.Stretch[RateCause]] = []
     for code in dict.fromkeys(part.cause.code for part in stretches):
         alike = [part for part in stretches if part.cause.code == code]
         found += [min(alike, key=lambda part: part.t0_s), max(alike, key=lambda part: part.cause.ratio)]
     return sorted(dict.fromkeys(found), key=lambda part: part.t0_s)
 
 
-def _at_another_pace(path: PathSummary) -> str:
+def _at_another_pace(path: model.PathSummary) -> str:
     """What the shortest time of a path that is too fast means; empty where its pace is not its only fault."""
     if path.fastest_s is None or not _only_too_fast(path):
         return ""
@@ -277,7 +266,7 @@ def _at_another_pace(path: PathSummary) -> str:
     return sentence("path.pace#profile", fastest=path.fastest_s, programmed=path.duration_s)
 
 
-def _only_too_fast(path: PathSummary) -> bool:
+def _only_too_fast(path: model.PathSummary) -> bool:
     """Whether speed and acceleration are all that is wrong with a path."""
     other = path.unreachable or path.out_of_limits or path.collisions or path.jumps
     return bool(path.too_fast) and not other and not any(isinstance(e.cause, JerkTooGreat) for e in path.too_fast)
@@ -290,7 +279,7 @@ def _speeds(bounded: bool) -> str:
 
 
 @say.register
-def _(event: Singularity) -> str:
+def _(event: model.Singularity) -> str:
     when = f"{event.t_s:.4g}" if event.t_s == event.until_s else f"{event.t_s:.4g} – {event.until_s:.4g}"
     parts = {"type": event_word(event), "when": when, "distance": event_distance(event)}
     if event.type == "dependent_axes":
@@ -303,29 +292,29 @@ def _(event: Singularity) -> str:
 
 
 @say.register
-def _(jump: Jump) -> str:
+def _(jump: model.Jump) -> str:
     parts = {"t": jump.t_s, "joint": jump.joint}
     return sentence("path.jump", **parts)
 
 
 @say.register
-def _(stretch: Stretch) -> str:  # type: ignore[type-arg]  # singledispatch takes no parametrised class
+def _(stretch: model.Stretch) -> str:  # type: ignore[type-arg]  # singledispatch takes no parametrised class
     return sentence("path.stretch", when=_when(stretch), cause=say(stretch.cause))
 
 
-def _when(stretch: Stretch) -> str:  # type: ignore[type-arg]
+def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]
     return sentence("path.when", start=stretch.t0_s, end=stretch.t1_s)
 
 
 @say.register
-def _(found: BodiesOverlap) -> str:
+def _(found: model.BodiesOverlap) -> str:
     touches = joined(listed(found.touches[:MOST_PAIRS]))
     if len(found.touches) > MOST_PAIRS:
         return sentence("bodies_overlap.more", touches=touches)
     return touches
 
 
-def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-arg]
+def cause_text(path: model.PathSummary, part: model.Stretch) -> str:  # type: ignore[type-arg]
     """Why a stretch of a path is listed; what is undecided is no open question where something else decides."""
     cause = say(part.cause)
     if part in path.undecided and path.verdict != "undecided":
@@ -333,11 +322,11 @@ def cause_text(path: PathSummary, part: Stretch) -> str:  # type: ignore[type-ar
     return cause
 
 
-def first_faults(path: PathSummary) -> list[tuple[float, str]]:
+def first_faults(path: model.PathSummary) -> list[tuple[float, str]]:
     """When (s) a path is wrong first, and how; then where it leaves reach or limits or collides, or else its gravest
     fault. What is undecided counts only where it comes before all that is not."""
     fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
-    grave: list[Sequence[Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
+    grave: list[Sequence[model.Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
     firsts = [min(each, key=lambda part: part.t0_s) for each in (*grave, *fast) if each]
     found = [(part.t0_s, _until_when(part) if part in path.too_fast else say_first(part.cause)) for part in firsts]
     edge = min((part.t0_s for part in path.unreachable), default=math.inf) - AT_EDGE
@@ -350,14 +339,16 @@ def first_faults(path: PathSummary) -> list[tuple[float, str]]:
     return sorted({*found[: max(1, sum(map(bool, grave)))], *sorted(found)[:1]})
 
 
-def _until_when(part: Stretch[RateCause]) -> str:
+def _until_when(part: model.Stretch[RateCause]) -> str:
     """What is too fast, and until when where that is not but a moment: its figure is the greatest of the stretch."""
     lasts = part.t1_s - part.t0_s >= MOMENT
     return sentence("path.too_fast_until", cause=say(part.cause), end=part.t1_s) if lasts else say(part.cause)
 
 
 def advice(
-    path: PathSummary, sound: tuple[float, tuple[float, ...]] | None = None, limits: LimitsUsed | None = None
+    path: model.PathSummary,
+    sound: tuple[float, tuple[float, ...]] | None = None,
+    limits: model.LimitsUsed | None = None,
 ) -> str | None:
     """What to do about a path; None where nothing is to be done. ``sound``: time (s) and place (mm) of the last point
     before anything is wrong; ``limits``: of the joints, whose assumed ones are named."""
@@ -383,14 +374,14 @@ def advice(
     return joined([none, _until(path, sound)], ". ")
 
 
-def _until(path: PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> str:
+def _until(path: model.PathSummary, sound: tuple[float, tuple[float, ...]] | None) -> str:
     """Up to where a path may be run: to the last point with the margin, unless something else is wrong before."""
     if sound and not (path.clear_until and sound[0] >= path.clear_until.t_s):
         return sentence("advice.sound", t=sound[0], xyz=_numbers(sound[1], 1))
     return _clear(path)
 
 
-def end_text(path: PathSummary, xyz_mm: tuple[float, ...], assumed: ShapesAssumed | None) -> str:
+def end_text(path: model.PathSummary, xyz_mm: tuple[float, ...], assumed: ShapesAssumed | None) -> str:
     """That a path may be run to a point of it (mm), and by how much it is clear up to there, if that was measured; of
     ``assumed`` shapes by how much these may be wrong."""
     if path.clear_until:
@@ -402,7 +393,7 @@ def end_text(path: PathSummary, xyz_mm: tuple[float, ...], assumed: ShapesAssume
     return sentence("advice.end", xyz=_numbers(xyz_mm, 1))
 
 
-def _slower_throughout(path: PathSummary) -> str:
+def _slower_throughout(path: model.PathSummary) -> str:
     """The pace at which the whole path keeps the limits, and the setting that gives it; empty where none does."""
     speed, acceleration = path.max_joint_speed_ratio, path.max_joint_acceleration_ratio
     if speed is None or acceleration is None or not _only_too_fast(path):
@@ -411,7 +402,7 @@ def _slower_throughout(path: PathSummary) -> str:
     return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer)
 
 
-def _within_reach(path: PathSummary) -> str:
+def _within_reach(path: model.PathSummary) -> str:
     """How far a path that leaves the reach could be used; empty for others."""
     part = min(path.unreachable, key=lambda part: part.t0_s, default=None)
     if part is None or part.s0_m <= 0:
@@ -421,7 +412,7 @@ def _within_reach(path: PathSummary) -> str:
     return sentence(form, t=part.t0_s, far=part.s0_m * 1000, first=first, what=what)
 
 
-def _clear(path: PathSummary) -> str:
+def _clear(path: model.PathSummary) -> str:
     """How far a path that collides could be used; empty for others."""
     last = path.clear_until
     if last is None or path.unreachable:
@@ -442,12 +433,12 @@ def _numbers(values: tuple[float, ...], digits: int) -> str:
     return ", ".join(f"{value + 0.0:.{digits}f}" for value in values)
 
 
-def reasons(tried: TriedStrategy) -> str:
+def reasons(tried: model.TriedStrategy) -> str:
     """Why a strategy is not possible or not usable; empty where it is."""
     return joined(listed(tried.reasons))
 
 
-def repair_text(path: PathSummary, limits: LimitsUsed | None = None) -> str:
+def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None) -> str:
     """What the strategy that was chosen does, what it costs, and what of ``limits`` that are assumed it takes."""
     tried = path.chosen
     if tried is None or tried.motion is None:
@@ -477,7 +468,7 @@ def repair_text(path: PathSummary, limits: LimitsUsed | None = None) -> str:
     return joined([first, chosen, slowly, near, _of_limits(motion, limits) if limits else "", full], ". ")
 
 
-def _of_limits(motion: StrategyMotion, limits: LimitsUsed) -> str:
+def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:
     """What of assumed limits a motion takes; empty where none is assumed."""
     speeds, speed, acceleration = any(limits.speed_assumed), limits.speed_deg_s, limits.acceleration_assumed
     if not speeds and not acceleration:

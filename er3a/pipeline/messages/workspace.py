@@ -9,19 +9,7 @@ from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.language import N_, as_text, tr, with_unit
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
 from er3a.pipeline.results import Summary
-from er3a.pipeline.stages.workspace.model import (
-    CapabilityMissing,
-    NoVoid,
-    OnSurface,
-    PlacementSummary,
-    StandSummary,
-    ToolPointsElsewhere,
-    VoidAtShoulder,
-    VoidSummary,
-    VoidUncertain,
-    VoidUnexpected,
-    WorkspaceSummary,
-)
+from er3a.pipeline.stages.workspace import model
 from er3a.workspace.causes import (
     Disappears,
     Geometry,
@@ -211,7 +199,7 @@ TEXTS = texts(
 
 
 @say.register
-def _(found: OnSurface) -> str:
+def _(found: model.OnSurface) -> str:
     surface = found.surface
     lower, upper = surface.lower, surface.upper
     if upper is None:
@@ -224,7 +212,7 @@ def _(found: OnSurface) -> str:
 
 
 @say.register
-def _(found: VoidUnexpected) -> str:
+def _(found: model.VoidUnexpected) -> str:
     where = say_as(found, **_place(found))
     return joined([where, _advice(found.cause), _changes(found)], " ")
 
@@ -234,7 +222,7 @@ CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
 NAMED_CHANGES = 4
 
 
-def _changes(found: VoidUnexpected) -> str:
+def _changes(found: model.VoidUnexpected) -> str:
     """The single changes of the table that take the void away; empty where none was tried or none does."""
     decided = [(change, change.left_litres[1]) for change in found.single_changes if change.left_litres]
     least = [change for change, litres in decided if litres < 0.1 * found.litres]
@@ -259,12 +247,12 @@ def entry_word(change: SingleChange) -> str:
 
 
 @say.register
-def _(found: VoidUncertain | VoidAtShoulder) -> str:
+def _(found: model.VoidUncertain | model.VoidAtShoulder) -> str:
     return say_as(found, **_place(found))
 
 
 @say.register
-def _(found: NoVoid) -> str:
+def _(found: model.NoVoid) -> str:
     if found.undecided_percent is not None:
         return say_as(found, "undecided")
     if found.proven:
@@ -279,7 +267,7 @@ def _advice(cause: VoidCause) -> str:
     return sentence("void_advice#cause", cause=say(cause))
 
 
-def _place(found: VoidUnexpected | VoidUncertain | VoidAtShoulder) -> dict[str, float | str]:
+def _place(found: model.VoidUnexpected | model.VoidUncertain | model.VoidAtShoulder) -> dict[str, float | str]:
     shown = {"x": found.x_mm, "y": found.y_mm, "z": found.z_mm}
     return {"litres": found.litres} | {key: str(round(value)).replace("-", "−") for key, value in shown.items()}
 
@@ -343,12 +331,12 @@ def _sum_extended(limit: Relaxed, shown: dict[str, int | str]) -> str:
 
 
 @say.register
-def _(found: CapabilityMissing) -> str:
+def _(found: model.CapabilityMissing) -> str:
     return say(found.lacks)
 
 
 @say.register
-def _(found: ToolPointsElsewhere) -> str:
+def _(found: model.ToolPointsElsewhere) -> str:
     x, y, z = found.direction
     return say_as(found, x=x, y=y, z=z)
 
@@ -359,7 +347,7 @@ def box_text(summary: Summary) -> str:
     if placement is None:
         return ""
     asked = " × ".join(as_text(value, "g") for value in placement.task.box_mm)
-    if not isinstance(placement, PlacementSummary):
+    if not isinstance(placement, model.PlacementSummary):
         return sentence("box.unknown", box=asked, why=say(placement))
     if not placement.named_places:
         return sentence("box.nowhere", box=asked)
@@ -387,9 +375,11 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> str:
     """The void that the verdict tells of, with its bounds, place and cause, and a larger open pocket; empty where voids
     were not judged. ``confirmed``: whether independent documents settle the joints' limits."""
     finding = summary.verdict.finding
-    if isinstance(finding, NoVoid | VoidUncertain):
+    if isinstance(finding, model.NoVoid | model.VoidUncertain):
         return say(finding)
-    if not isinstance(summary, WorkspaceSummary) or not isinstance(finding, VoidAtShoulder | VoidUnexpected):
+    if not isinstance(summary, model.WorkspaceSummary) or not isinstance(
+        finding, model.VoidAtShoulder | model.VoidUnexpected
+    ):
         return ""
     voids = summary.enclosed_voids
     unexpected = (void for void in voids if void.status == "proven_empty" and not void.holds_shoulder)
@@ -397,7 +387,7 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> str:
     where = sentence("void.shoulder" if judged.holds_shoulder else "void.away", **_void_parts(judged))
     cause = sentence("void.cause#it" if is_predicate(judged.cause) else "void.cause#noun", cause=say(judged.cause))
     expected = ""
-    if isinstance(finding, VoidAtShoulder):
+    if isinstance(finding, model.VoidAtShoulder):
         bare = any(each.subject == "tool" for each in summary.not_examined)
         rests = "" if confirmed else _resting_on(judged.cause)
         expected = joined([sentence("void.expected"), rests, sentence("void.no_tool") if bare else ""], " ")
@@ -423,7 +413,7 @@ def _resting_on(cause: VoidCause) -> str:
     return sentence("void.rests", limits=joined(said, ", "))
 
 
-def _void_parts(void: VoidSummary) -> dict[str, float | str]:
+def _void_parts(void: model.VoidSummary) -> dict[str, float | str]:
     bounds = void.volume_m3
     extent = millimetres(void.extent_m).replace(", ", " × ")
     litres = {"lower": 1000 * bounds.lower, "upper": 1000 * bounds.upper}
@@ -435,7 +425,7 @@ def millimetres(values: Sequence[float]) -> str:
     return ", ".join(as_text(round(1000 * value) + 0, "d") for value in values)
 
 
-def stand_text(stand: StandSummary, placement: PlacementSummary) -> str:
+def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> str:
     """Whether the box can stand on a surface; if not why, and how high what would have to stand between them is."""
     named = {"name": stand.name, "height": millimetres([stand.height_m])}
     if stand.place and stand.served_from_m is not None:

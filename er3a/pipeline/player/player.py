@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+import json
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,12 @@ from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion
-from er3a.pipeline.teach.scripts import TEACH, import_map
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, link_colour
 from er3a.robots.joint_limits import shown, size_of, theta_limits
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
+TEACH = _HERE.with_name("teach")
 MOST_FRAMES, FRAMES_IN_ALL, FEWEST_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 MOST_FACES, FEWEST_CORNERS = 2000, 12  # of an arm, and of a convex piece
 BALL = 24  # corners of each end of a capsule
@@ -254,3 +255,16 @@ def _shown(motion: PlayedMotion, most: int) -> np.ndarray:
     rows = np.unique(np.clip(np.concatenate([even, events, [0, len(motion.t) - 1]]), 0, len(motion.t) - 1))
     _, first = np.unique(np.round(motion.t[rows], 4), return_index=True)
     return rows[first].astype(int)
+
+
+def import_map(files: Iterable[Path]) -> Markup:
+    """A page's import map: each ES module as ``er3a/NAME``. It stands before the page's first module.
+
+    The scripts are data addresses, because a page opened from a disk may not import other files.
+    """
+    addresses = {f"er3a/{file.stem}": _address(file) for file in files}
+    return Markup(f'<script type="importmap">{json.dumps({"imports": addresses})}</script>')
+
+
+def _address(file: Path) -> str:
+    return "data:text/javascript;base64," + base64.b64encode(file.read_bytes()).decode("ascii")

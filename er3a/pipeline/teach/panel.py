@@ -22,12 +22,11 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.language import N_, tr
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, scene_data, table_data
+from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, import_map, scene_data, table_data
 from er3a.pipeline.results import SUMMARY, Provenance, input_records, read_status
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
-from er3a.pipeline.teach.scripts import import_map
 from er3a.pipeline.viewing.page import render, run_command
 from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
 from er3a.robots.joint_limits import joint_names

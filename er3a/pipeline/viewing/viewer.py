@@ -1,6 +1,7 @@
 """Starts the Rerun viewer on the loopback address only and without usage statistics.
 
-Shows recordings in a browser on this machine if there is no desktop.
+Shows recordings in a browser on this machine if there is no desktop, and draws the preview of a recording, also without
+a display.
 
 With Rerun's own web server the viewer in the browser would send usage statistics, ask for updates and fetch fonts, and
 recordings would lose their blueprints. So the viewer's files are taken from it once and served from here, together with
@@ -9,6 +10,7 @@ the recordings, under a policy that lets the browser connect to no other address
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -26,7 +28,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import urlencode
 
+from PIL import Image
+
 from er3a.errors import Er3aError
+from er3a.files.kept_files import write_atomically
 
 LOOPBACK = "127.0.0.1"
 LONGEST_S = 120
@@ -171,3 +176,90 @@ def _fetched(url: str) -> tuple[str, bytes]:
         kind, content = answer.headers["Content-Type"], answer.read()
     # No policy keeps a browser from connecting ahead of a font that it may not load then.
     return kind, re.sub(rb"<link\b[^>]*https://[^>]*>", b"", content) if kind.startswith("text/html") else content
+
+
+WINDOW = (1200, 780)  # pixels
+TITLE_BAR = 36
+TIME_BAR = 34  # left out: it fills as loading goes
+QUALITY = 75
+PATIENCE_S = 60
+
+
+def draw_preview(recording: Path, output: Path) -> str | None:
+    """Draw a recording as a WebP picture.
+
+    Returns
+    -------
+    why it could not be drawn, None if it was; what could not be drawn becomes an empty file
+    """
+    try:
+        picture = _picture(recording)
+    except Er3aError as error:
+        write_empty(output)
+        return str(error)
+    write_atomically(output, lambda file: file.write_bytes(picture))
+    return None
+
+
+def write_empty(output: Path) -> None:
+    """Write the picture of a recording that is not drawn."""
+    write_atomically(output, lambda file: file.write_bytes(b""))
+
+
+def _picture(recording: Path) -> bytes:
+    with TemporaryDirectory(prefix="er3a-preview-") as folder:
+        shot, messages, port = Path(folder) / "shot.png", Path(folder) / "messages", free_port()
+        size = "x".join(map(str, WINDOW))
+        words = ("--headless", "--port", str(port), "--window-size", size, "--hide-welcome-screen")
+        with viewer_running([recording], *words, messages=messages) as viewer:
+            try:
+                _shoot(port, viewer, shot)
+            except EOFError:
+                raise Er3aError(_why(messages.read_text(errors="replace"))) from None
+        image = Image.open(shot).convert("RGB")
+        views = image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR))
+        encoded = io.BytesIO()
+        views.save(encoded, "WEBP", quality=QUALITY, method=6)
+        return encoded.getvalue()
+
+
+def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path) -> None:
+    """Have the viewer save pictures until one is like the one before: everything is loaded then.
+
+    Raises
+    ------
+    EOFError
+        if the viewer ends
+    Er3aError
+        if that takes longer than PATIENCE_S
+    """
+    from rerun.experimental import ViewerClient  # takes long to import, and `er3a view` needs none
+
+    client, bare, before = None, False, b""
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        if viewer.poll() is not None:
+            raise EOFError
+        try:
+            client = client or ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy")
+            state = client.get_state()
+            if not state.active_recording or state.loading:
+                time.sleep(0.05)
+                continue
+            if not bare:
+                client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
+                bare = True
+            client.save_screenshot(str(shot))
+        except (ConnectionError, RuntimeError):
+            time.sleep(0.05)
+            continue
+        if shot.read_bytes() == before:
+            return
+        before = shot.read_bytes()
+    raise Er3aError(f"the viewer drew no steady picture in {PATIENCE_S} s")
+
+
+def _why(messages: str) -> str:
+    panic = re.search(r"panicked at '(.+?)'\n", messages, flags=re.DOTALL)
+    said = panic[1] if panic else (messages.strip().splitlines() or ["without a word"])[-1]
+    return f"the Rerun viewer ended: {said} (docs/recordings.md tells what it needs)"

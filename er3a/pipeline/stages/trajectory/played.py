@@ -23,17 +23,7 @@ from er3a.pipeline.messages.trajectory import (
     repair_text,
 )
 from er3a.pipeline.player.motions import Fault, Mark, PlayedEvent, PlayedMotion, Weight, address_of
-from er3a.pipeline.stages.trajectory.model import (
-    BodiesOverlap,
-    LimitsUsed,
-    PathChecks,
-    PathSummary,
-    Singularity,
-    Stretch,
-    TrajectoryResults,
-    TrajectorySummary,
-    is_safe,
-)
+from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing.numbers import fixed
 from er3a.planning.names import PathVerdict
 from er3a.program_check.program_check_findings import ClearOfAssumed
@@ -54,7 +44,7 @@ WEIGHTS: dict[PathVerdict, Weight] = {
 }
 
 
-def motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
+def motions(robot: Robot, results: model.TrajectoryResults) -> list[PlayedMotion]:
     """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it."""
     checks, avoidance, motions = results.checks, results.avoidance, []
     for path in worst_first(results.summary.paths):
@@ -69,18 +59,18 @@ def motions(robot: Robot, results: TrajectoryResults) -> list[PlayedMotion]:
     return motions
 
 
-def worst_first(paths: Sequence[PathSummary]) -> list[PathSummary]:
+def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
     """Those that fail first, of them those that were not expected to."""
     ranks = ("fail", "caution", "plain")
     return sorted(paths, key=lambda path: (ranks.index(WEIGHTS[path.verdict]), path.expect == path.verdict))
 
 
-def faults(results: TrajectoryResults) -> list[Fault]:
+def faults(results: model.TrajectoryResults) -> list[Fault]:
     """The paths that may not be run as they are, the worst first."""
     found = []
     for path in worst_first(results.summary.paths):
         near = near_assumed(path, results.summary)
-        if is_safe(path, results.summary.verdict.shapes):
+        if model.is_safe(path, results.summary.verdict.shapes):
             continue
         clearance = path.clearance if path.verdict == "safe" else None
         what, t = (say(near), clearance.t_s) if clearance else _first_fault(path)
@@ -103,7 +93,7 @@ def faults(results: TrajectoryResults) -> list[Fault]:
     return found
 
 
-def _first_fault(path: PathSummary) -> tuple[str, float | None]:
+def _first_fault(path: model.PathSummary) -> tuple[str, float | None]:
     """What is wrong first with a path that is not safe, and when (s), if it has a time; then what is wrong later."""
     found = [] if path.no_way else first_faults(path)
     if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
@@ -113,18 +103,20 @@ def _first_fault(path: PathSummary) -> tuple[str, float | None]:
     return joined([found[0][1], *later]), found[0][0]
 
 
-def _singular_times(path: PathSummary) -> list[float]:
+def _singular_times(path: model.PathSummary) -> list[float]:
     """When (s) a path of the tool crosses singular poses, or the arm jumps."""
     crossed = [] if path.in_joint_space else [event.t_s for event in path.singularities if event.crossing]
     return [*crossed, *(jump.t_s for jump in path.jumps)]
 
 
-def _assumed(part: Stretch[Any]) -> bool:
+def _assumed(part: model.Stretch[Any]) -> bool:
     """Whether what a stretch exceeds is an assumed limit."""
     return bool(part.cause.code.endswith(IF_ASSUMED))
 
 
-def _to_do(path: PathSummary, rows: PathChecks, summary: TrajectorySummary) -> tuple[str, tuple[str, str] | None]:
+def _to_do(
+    path: model.PathSummary, rows: model.PathChecks, summary: model.TrajectorySummary
+) -> tuple[str, tuple[str, str] | None]:
     """What to do instead of running a path as it is, and the motion that may be run with its address."""
     if path.chosen:
         name = repaired(path)
@@ -141,7 +133,7 @@ def _to_do(path: PathSummary, rows: PathChecks, summary: TrajectorySummary) -> t
     return end, (name, address_of("trajectory", path.name, last[0], path.name, last[0]))
 
 
-def advised(path: PathSummary, rows: PathChecks, limits: LimitsUsed | None = None) -> str | None:
+def advised(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed | None = None) -> str | None:
     """What to do about a path; None where nothing is to be done. ``rows``, ``limits``: of the path, of the joints."""
     sound = last_sound(path, rows)
     text = advice(path if sound else replace(path, clear_until=None), sound, limits)
@@ -153,12 +145,12 @@ def advised(path: PathSummary, rows: PathChecks, limits: LimitsUsed | None = Non
     return joined([text, sentence("advice.no_part")], ". ") if no_part else text
 
 
-def repaired(path: PathSummary) -> str:
+def repaired(path: model.PathSummary) -> str:
     """The name of the motion that repairs a path."""
     return tr("{path}, repaired", path=path.name)
 
 
-def last_sound(path: PathSummary, rows: PathChecks) -> tuple[float, tuple[float, ...]] | None:
+def last_sound(path: model.PathSummary, rows: model.PathChecks) -> tuple[float, tuple[float, ...]] | None:
     """Time (s) and place (mm) of the last point (of ``rows``, or where the margin is kept) before anything is wrong, or
     a path of the tool is near-singular.
 
@@ -176,7 +168,7 @@ def last_sound(path: PathSummary, rows: PathChecks) -> tuple[float, tuple[float,
     return (float(sound.t_s[-1]), tuple(sound.xyz_mm[-1].tolist())) if len(sound) else None
 
 
-def shown_verdict(path: PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
+def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
@@ -184,7 +176,7 @@ def shown_verdict(path: PathSummary, near: ClearOfAssumed | None) -> tuple[Weigh
     return WEIGHTS[path.verdict], joined([outcome_word(path.verdict), collides], ", ")
 
 
-def near_assumed(path: PathSummary, summary: TrajectorySummary) -> ClearOfAssumed | None:
+def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> ClearOfAssumed | None:
     """That a path is clear of assumed shapes by less than these may be wrong by."""
     shapes = summary.verdict.shapes
     if shapes is None or path.name not in shapes.near or path.clearance is None:
@@ -192,7 +184,7 @@ def near_assumed(path: PathSummary, summary: TrajectorySummary) -> ClearOfAssume
     return ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm)
 
 
-def events(path: PathSummary) -> list[PlayedEvent]:
+def events(path: model.PathSummary) -> list[PlayedEvent]:
     """Singular poses and faults of a path."""
     passes = [PlayedEvent(e.t_s, e.until_s, _singular(e), "caution") for e in path.singularities]
     faults = [(kind, stretch) for kind, stretches in kinds(path) for stretch in stretches]
@@ -208,11 +200,11 @@ def events(path: PathSummary) -> list[PlayedEvent]:
     ]
 
 
-def _weight(path: PathSummary, part: Stretch[Any]) -> Weight:
+def _weight(path: model.PathSummary, part: model.Stretch[Any]) -> Weight:
     return "caution" if _assumed(part) or part in path.undecided else "fail"
 
 
-def contact(path: PathSummary) -> list[Mark]:
+def contact(path: model.PathSummary) -> list[Mark]:
     """Where bodies first touch, while they do."""
     if path.clear_until is None:
         return []
@@ -221,16 +213,16 @@ def contact(path: PathSummary) -> list[Mark]:
 
 
 def _touching(cause: object) -> tuple[str, ...]:
-    pairs = cause.pairs if isinstance(cause, BodiesOverlap) else ()
+    pairs = cause.pairs if isinstance(cause, model.BodiesOverlap) else ()
     return tuple(dict.fromkeys(name for pair in pairs for name in pair.names))
 
 
-def _singular(event: Singularity) -> str:
+def _singular(event: model.Singularity) -> str:
     word = event_word(event)
     return tr("singular: {type}", type=word) if event.crossing else tr("near-singular: {type}", type=word)
 
 
-def kinds(path: PathSummary) -> tuple[tuple[str, tuple[Stretch[Any], ...]], ...]:
+def kinds(path: model.PathSummary) -> tuple[tuple[str, tuple[model.Stretch[Any], ...]], ...]:
     """The stretches of each kind of fault, with its name."""
     return (
         (tr("not reachable"), path.unreachable),

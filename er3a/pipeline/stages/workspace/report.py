@@ -13,17 +13,8 @@ from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
 from er3a.pipeline.messages.workspace import VOID_KINDS, VOID_STATUS, entry_word
 from er3a.pipeline.player.player import drawing_head
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.workspace import model
+from er3a.pipeline.stages.workspace import model, workspace_figures
 from er3a.pipeline.stages.workspace.capability_section import capability_context
-from er3a.pipeline.stages.workspace.workspace_figures import (
-    arc_rows,
-    convergence,
-    in_space,
-    sections,
-    side_view,
-    slices,
-    top_view,
-)
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.numbers import fixed, number
 from er3a.pipeline.viewing.page import Picture, render_stage
@@ -45,11 +36,11 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         stored,
         output,
         side=_side(robot, results),
-        arc_rows=arc_rows(results.border),
+        arc_rows=workspace_figures.arc_rows(results.border),
         method=say(summary.proof.method),
         rule=_rule(summary.enclosed_voids),
         pocket_mm=3000 * summary.pocket_block_m,
-        turning=in_space(robot, results, scene),
+        turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids[:LISTED], start=1)],
         voids_more=max(0, len(summary.voids) - LISTED),
@@ -65,20 +56,22 @@ def _context(robot: Robot, results: model.WorkspaceResults, scene: Scene | None)
     summary = results.summary
     return capability_context(robot, results, scene) | {
         "section": Picture(
-            sections(robot, results),
+            workspace_figures.sections(robot, results),
             tr("Sections across the slide of joint 1: density of the samples, and proven cells")
             if summary.proof.bars
             else tr("Side sections about axis 1: density of the samples, and proven cells with the exact border"),
             _section_caption(summary, len(results.drawing) > 0),
         ),
         "top": Picture(
-            top_view(robot, results),
+            workspace_figures.top_view(robot, results),
             tr("The cloud from above with the limits of joint 1"),
             _top_caption(robot),
         ),
-        "slices": Picture(slices(results), tr("Three level slices of the proof"), _slices_caption(summary)),
+        "slices": Picture(
+            workspace_figures.slices(results), tr("Three level slices of the proof"), _slices_caption(summary)
+        ),
         "convergence": Picture(
-            convergence(results),
+            workspace_figures.convergence(results),
             tr(
                 "Volume of the sampled cells over the number of samples for three cell sizes, with the proven "
                 "bounds and the estimate"
@@ -100,7 +93,7 @@ def _side(robot: Robot, results: model.WorkspaceResults) -> Picture | None:
     else:
         labels = tr("There is no drawing of this arm's envelope to compare with.")
     return Picture(
-        side_view(results, not np.array_equal(robot.tool, np.eye(4))),
+        workspace_figures.side_view(results, not np.array_equal(robot.tool, np.eye(4))),
         tr("Side views of wrist centre and flange in the arm's plane, with exact borders"),
         joined([exact, labels], " "),
     )
