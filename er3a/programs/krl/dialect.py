@@ -428,7 +428,7 @@ SORI_TYPE SCIRC_TYPE
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions behind WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
-$ACCU_STATE $ACT_BASE $ACT_TOOL $ADVANCE $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
+$ACCU_STATE $ADVANCE $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
 $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB
 $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER
 $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $WBOXDISABLE $WORKSPACE
@@ -469,6 +469,22 @@ class KrlDialect(Dialect):
     setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
 
+    def __init__(self, program: syntax.Program) -> None:
+        """Numbers of tool and base count as followed where every routine that sets one sets the frame too."""
+        routines = [
+            {
+                each.target.name
+                for each in routine.code
+                if isinstance(each, syntax.Assign) and isinstance(each.target, syntax.Variable)
+            }
+            for routine in program.routines.values()
+        ]
+        self.numbers_only = {
+            f"$ACT_{name}"
+            for name in ("TOOL", "BASE")
+            if any(f"$ACT_{name}" in each and f"${name}" not in each for each in routines)
+        }
+
     def is_signal(self, name: str) -> bool:
         """Outputs."""
         return name.startswith(("$OUT[", "$ANOUT["))
@@ -479,6 +495,8 @@ class KrlDialect(Dialect):
             return value in ORIENTATION_TYPES[name]
         if name in CONTROLLER:
             return value == CONTROLLER[name]
+        if name in ("$ACT_TOOL", "$ACT_BASE"):
+            return name not in self.numbers_only
         return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
 
     def named(self, name: str) -> bool:
