@@ -905,6 +905,8 @@ def test_gravity_is_held_against_how_the_robot_file_mounts_the_arm(tmp_path, ang
 def test_a_number_of_a_tool_or_base_that_sets_no_frame_is_named(tmp_path, name):
     lines = f"$VEL_AXIS[1]=10\n$ACT_{name}=2\nPTP {axes(NEAR)}"
     assert codes(check(tmp_path, krl(lines), "a.src")).get("program_not_understood") == [3]
+    far = f"${name}=$NULLFRAME\n" + "$OV_PRO=50\n" * 4 + lines
+    assert "program_not_understood" in codes(check(tmp_path, krl(far), "a.src"))
     lines = lines.replace("PTP", f"${name}=$NULLFRAME\nPTP")
     assert "program_not_understood" not in codes(check(tmp_path, krl(lines), "a.src"))
 

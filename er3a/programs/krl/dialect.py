@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
+from er3a.programs.code_builder import variable_of
 from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
 from er3a.robots.masses import MassBody, moved
 
@@ -451,6 +452,9 @@ HERE = ("$POS_ACT", "$POS_FOR", "$POS_INT", "$POS_ACT_MES")
 HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_INT", "$AXIS_ACT_MEAS")
 
 
+BESIDE = 3  # operations
+
+
 class Settings(NamedTuple):
     """What is set when a motion begins."""
 
@@ -462,6 +466,14 @@ class Settings(NamedTuple):
     load: MassBody | str | None
 
 
+def _set_alone(code: tuple[syntax.Operation, ...], number: str, frame: str) -> bool:
+    """Whether somewhere a variable is set and another is not, right before or behind it."""
+    names = [variable_of(each.target) if isinstance(each, syntax.Assign) else "" for each in code]
+    return any(
+        name == number and frame not in names[max(i - BESIDE, 0) : i + BESIDE + 1] for i, name in enumerate(names)
+    )
+
+
 class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
@@ -470,19 +482,12 @@ class KrlDialect(Dialect):
     whole_division = True
 
     def __init__(self, program: syntax.Program) -> None:
-        """Numbers of tool and base count as followed where every routine that sets one sets the frame too."""
-        routines = [
-            {
-                each.target.name
-                for each in routine.code
-                if isinstance(each, syntax.Assign) and isinstance(each.target, syntax.Variable)
-            }
-            for routine in program.routines.values()
-        ]
+        """Numbers of tool and base count as followed where the frame is set beside each."""
         self.numbers_only = {
             f"$ACT_{name}"
             for name in ("TOOL", "BASE")
-            if any(f"$ACT_{name}" in each and f"${name}" not in each for each in routines)
+            for routine in program.routines.values()
+            if _set_alone(routine.code, f"$ACT_{name}", f"${name}")
         }
 
     def is_signal(self, name: str) -> bool:
