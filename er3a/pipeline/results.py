@@ -143,6 +143,7 @@ LeftOutSubject = Literal[
     "left_out_samples",
     "copied_samples",
     "joint_zeros",
+    "small_joint_zeros",
     "touched_points",
     "detections",
     "gripped_parts",

@@ -38,6 +38,7 @@ class Cell(ByValue):
     joints : n, how many the arm has
     frames : poses (4, 4) of tools and bases by the program's names for them
     tool, base : (4, 4), for motions whose program sets none; None if no arm is given
+    up : (3,), where up is in the frame of the robot's base, by how the robot file mounts it
     """
 
     flange: Flange | None = None
@@ -46,6 +47,7 @@ class Cell(ByValue):
     frames: Mapping[str, Reals] = field(default_factory=dict)
     tool: Reals | None = None
     base: Reals | None = None
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

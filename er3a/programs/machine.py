@@ -863,7 +863,8 @@ def execute(
     known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}
     cell = Cell(flange, start, frames=known)
     if robot is not None:
-        cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4))
+        x, y, z = robot.base[2, :3].tolist()
+        cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4), up=(x, y, z))
     return Machine(program, LANGUAGES[program.language].dialect(program), cell, limits or RunLimits(), keep_on).run()
 
 

@@ -148,7 +148,7 @@ LEAST_ZERO = np.radians(0.5)
 ZERO_STEP = 1e-5
 
 
-def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...]]:
+def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...], float]:
     """A calibration whose warnings name the joint with a wrong zero, if one explains all that speaks against it.
 
     A zero is named if its value is more than chance, and nothing grave speaks against the samples with it.
@@ -157,20 +157,24 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...]]
     -------
     found, unseen : names of joints whose zero the samples don't tell from the two poses: all where no joint values are
         recorded, those that slide, and mostly the first and the last
+    least : deg, at least, of a wrong zero of the others that would be named; 0 if there are no others
     """
     names, q = joint_names(robot), found.samples.q
     if q is None:
-        return found, names
+        return found, names, 0.0
     samples = found.samples.take(found.used)
     squares = float(((found.residual[found.used] / np.repeat(found.deviations, 3)) ** 2).sum())
     free = 6 * len(samples) - likelihood.UNKNOWNS - 1
     best, unseen = (1.0, 0, 0.0, 0.0, np.inf), []
+    least, sure = 0.0, (1 + SURE) / 2
+    widths = float(scipy.special.stdtrit(free, 1 - ZERO_CHANCE / len(names) / 2) / scipy.special.stdtrit(free, sure))
     for k, name in enumerate(names):
         turn = _Turned(robot, samples, k)
         if robot.slides[k] or not turn.seen(found.X, found.Y):
             unseen.append(name)
             continue
         value, half_width, raw = with_one_more(turn.at, (found.X, found.Y), found.deviations)
+        least = max(least, round(float(np.degrees(max(LEAST_ZERO, widths * half_width))), 2))
         left = float(((raw / np.repeat(found.deviations, 3)) ** 2).sum())
         chance = float(scipy.special.fdtrc(1, free, max(squares - left, 0.0) / (left / free))) * len(names)
         rms = float(1000 * np.sqrt((raw[:, :3] ** 2).mean()))
@@ -179,18 +183,18 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...]]
     tried = found if len(unseen) == len(names) else replace(found, warnings=tuple(map(_zeros_too, found.warnings)))
     explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
     if chance > ZERO_CHANCE or abs(value) < LEAST_ZERO or not explained:
-        return tried, tuple(unseen)
+        return tried, tuple(unseen), least
     mended = _Turned(robot, found.samples, k).flange(value)
     try:
         again = calibrate_hand_eye(replace(found.samples, flange=mended))
     except HandEyeError:
-        return tried, tuple(unseen)
+        return tried, tuple(unseen), least
     if grave_warnings(again.warnings):
-        return tried, tuple(unseen)
+        return tried, tuple(unseen), least
     given = float(1000 * np.sqrt((found.residual[found.used, :3] ** 2).mean()))
     zero = JointZero(k + 1, float(np.degrees(value)), float(np.degrees(half_width)), given, rms)
     others = tuple(each for each in found.warnings if each.code not in EXPLAINED_BY_A_ZERO)
-    return replace(found, warnings=(zero, *others)), tuple(unseen)
+    return replace(found, warnings=(zero, *others)), tuple(unseen), least
 
 
 EXPLAINED_BY_A_ZERO = {"board_scale", "unexplained_residuals", "moved_between", "more_scatter"}

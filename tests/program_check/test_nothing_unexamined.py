@@ -889,3 +889,35 @@ def test_what_no_source_tells_of_rpl_is_no_pass(tmp_path, line):
     assert not worse & set(codes(plain))
     assert worse & set(codes(found))
     assert found.level in ("caution", "fail")
+
+
+@pytest.mark.parametrize(("angle", "said", "same"), [(0, 0, True), (90, 90, True), (90, 0, False), (180, -90, False)])
+def test_gravity_is_held_against_how_the_robot_file_mounts_the_arm(tmp_path, angle, said, same):
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_euler("x", angle, degrees=True).as_matrix()
+    up = [0.0, *(9.82 * each for each in (float(np.sin(np.radians(said))), float(np.cos(np.radians(said)))))]
+    program = written(tmp_path, f"set_gravity({up})\nmovej({NEAR_TEXT})\n")
+    found = check_program(program, ROBOT.replace(base=base), CheckOptions(start=HOME, measures=False))
+    assert codes(found) == ({} if same else {"program_not_understood": [1]})
+
+
+@pytest.mark.parametrize("name", ["TOOL", "BASE"])
+def test_a_number_of_a_tool_or_base_that_sets_no_frame_is_named(tmp_path, name):
+    lines = f"$VEL_AXIS[1]=10\n$ACT_{name}=2\nPTP {axes(NEAR)}"
+    assert codes(check(tmp_path, krl(lines), "a.src")).get("program_not_understood") == [3]
+    far = f"${name}=$NULLFRAME\n" + "$OV_PRO=50\n" * 4 + lines
+    assert "program_not_understood" in codes(check(tmp_path, krl(far), "a.src"))
+    lines = lines.replace("PTP", f"${name}=$NULLFRAME\nPTP")
+    assert "program_not_understood" not in codes(check(tmp_path, krl(lines), "a.src"))
+
+
+def test_whether_a_nested_function_shares_a_variable_of_a_routine_that_the_file_calls_is_not_settled(tmp_path):
+    """The manual: on the first level of a program variables are global; a file's own level is no routine's."""
+    nested = f"def Main():\n  y = {NEAR_TEXT}\n  def other():\n    y = {FAR_TEXT}\n  end\n  other()\n  movej(y)\nend\n"
+    found = check(tmp_path, nested + "Main()\n")
+    assert codes(found) == {"program_not_understood": [4]}
+    assert found.level == "caution"
+    for settled in (nested, f"y = {HOME_TEXT}\n{nested}Main()\n", nested.replace("    y", "    local y") + "Main()\n"):
+        assert codes(check(tmp_path, settled)) == {}
+    (motion,) = motions(tmp_path, nested)
+    np.testing.assert_allclose(motion.target.joints, FAR, atol=1e-8)

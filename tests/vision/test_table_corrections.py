@@ -67,8 +67,9 @@ def test_what_can_not_be_told_apart_is_named(setup, base, flange):
 def test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_examined(setup):
     for joint, deg in ((3, 5.0), (6, 5.0), (3, 0.0)):
         samples = a_set(setup, 5, {f"offset{joint}": ROBOT.direction[joint - 1] * np.radians(deg)}, 12, stated=False)
-        found, unseen = zeros_tried(calibrate_hand_eye(samples), ROBOT)
+        found, unseen, least = zeros_tried(calibrate_hand_eye(samples), ROBOT)
         assert unseen == ("J1", "J6")
+        assert 0.5 <= least < (6.0 if deg else 2.0)
         if joint in (1, 6) or not deg:
             assert found.warnings == ()
             continue
@@ -82,10 +83,18 @@ def test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_e
     assert zeros_tried(calibrate_hand_eye(poses), ROBOT)[1] == ("J1", "J2", "J3", "J4", "J5", "J6")
 
 
+def test_a_joint_zero_below_the_size_that_is_stated_goes_unnamed():
+    for share, named in ((0.5, False), (1.5, True)):
+        least = zeros_tried(calibrate_hand_eye(a_set("eye_to_hand", 5, {}, 12, stated=False)), ROBOT)[2]
+        off = {"offset3": ROBOT.direction[2] * np.radians(share * least)}
+        found, *_ = zeros_tried(calibrate_hand_eye(a_set("eye_to_hand", 5, off, 12, stated=False)), ROBOT)
+        assert ("joint_zero" in {each.code for each in found.warnings}) == named
+
+
 def test_a_moved_camera_is_no_joint_zero():
     samples = a_set("eye_to_hand", 6, {}, 14, stated=False)
     samples.target[7:, :3, 3] += [0.02, 0, 0]
-    found, _ = zeros_tried(calibrate_hand_eye(samples), ROBOT)
+    found, *_ = zeros_tried(calibrate_hand_eye(samples), ROBOT)
     assert "moved_between" in {each.code for each in found.warnings}
 
 

@@ -266,8 +266,10 @@ def hand_eye(
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
+    from er3a.pipeline.messages.left_out import left_out_text
     from er3a.pipeline.messages.say import say
     from er3a.pipeline.messages.vision import correction_lines, hand_eye_lines, hand_eye_record
+    from er3a.pipeline.results import LeftOut
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye
     from er3a.vision.table_corrections import correct_table, zeros_tried
@@ -280,7 +282,7 @@ def hand_eye(
         at(f"{file}: estimating the camera's pose")
         try:
             found = calibrate_hand_eye(samples)
-            found = zeros_tried(found, arm)[0] if arm else found
+            found, unseen, least_zero = zeros_tried(found, arm) if arm else (found, (), 0.0)
         except HandEyeError as error:
             raise Er3aError(f"{file}: {say(error.finding)}") from None
         at(f"{file}: estimating corrections of the table")
@@ -290,6 +292,11 @@ def hand_eye(
         options.print_json(hand_eye_record(found, offset, table, boardless, open_tilts))
     else:
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
+        missed = (
+            *([LeftOut("joint_zeros", unseen)] if unseen else []),
+            LeftOut("small_joint_zeros", amount=least_zero),
+        )
+        sample_lines += [f"not examined: {left_out_text(each)}" for each in missed if each.names or each.amount]
         print(
             "\n".join(
                 [hand_eye_lines(found, offset, boardless), *sample_lines, *(correction_lines(table) if table else [])]

@@ -84,6 +84,9 @@ TEXTS = texts(
             "whether the zeros of these joints are right: the samples hold no joint angles, or a wrong zero acts on "
             "them as another pose of camera or board would"
         ),
+        "left_out.small_joint_zeros": (
+            "wrong joint zeros below {amount:g} deg: the samples do not tell them from noise, or they are not named"
+        ),
         "left_out.touched_points": "where the arm really touches what the camera sees: no touched points are given",
         "left_out.detections": "whether detected objects are where the detector says, within the deviations stated",
         "left_out.gripped_parts": "collisions of the objects themselves and of a part in the gripper",

@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
+from er3a.programs.code_builder import variable_of
 from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, root
 from er3a.robots.masses import MassBody, moved
 
@@ -428,7 +429,7 @@ SORI_TYPE SCIRC_TYPE
 OF_SETTINGS = frozenset(OF_SETTINGS_TEXT.split())
 """Functions behind WITH, which :func:`keep_setting` reads."""
 HARMLESS_VARIABLES_TEXT = """
-$ACCU_STATE $ACT_BASE $ACT_TOOL $ADVANCE $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
+$ACCU_STATE $ADVANCE $AXWORKSPACE $CMD $CP_STATMON $CP_VEL_TYPE $CYCFLAG $CYCLE $DATE
 $ECO_LEVEL $ERR $EXT $FLAG $GEAR_JERK $H_POS $I_O_ACT $JERK $LOOP_MSG $MSG_T $OUT_NODRIVE $OV_APPL $OV_PRO $OV_ROB
 $PERI_RDY $PRO_ACT $PRO_MODE $PRO_STATE $RED_VEL $SOFT_PLCBOOL $SOFT_PLCINT $SOFT_PLCREAL $STOPNOAPROX $TIMER
 $TIMER_FLAG $TIMER_STOP $TORQMON $TORQMON_COM $TORQMON_DEF $TRACE $WBOXDISABLE $WORKSPACE
@@ -451,6 +452,9 @@ HERE = ("$POS_ACT", "$POS_FOR", "$POS_INT", "$POS_ACT_MES")
 HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_INT", "$AXIS_ACT_MEAS")
 
 
+BESIDE = 3  # operations
+
+
 class Settings(NamedTuple):
     """What is set when a motion begins."""
 
@@ -462,12 +466,29 @@ class Settings(NamedTuple):
     load: MassBody | str | None
 
 
+def _set_alone(code: tuple[syntax.Operation, ...], number: str, frame: str) -> bool:
+    """Whether somewhere a variable is set and another is not, right before or behind it."""
+    names = [variable_of(each.target) if isinstance(each, syntax.Assign) else "" for each in code]
+    return any(
+        name == number and frame not in names[max(i - BESIDE, 0) : i + BESIDE + 1] for i, name in enumerate(names)
+    )
+
+
 class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
     modal = frozenset((*MODAL, *MODAL_DATA))
     setters = frozenset(("BAS", "PULSE", "%SPLINE", "%ENDSPLINE"))
     whole_division = True
+
+    def __init__(self, program: syntax.Program) -> None:
+        """Numbers of tool and base count as followed where the frame is set beside each."""
+        self.numbers_only = {
+            f"$ACT_{name}"
+            for name in ("TOOL", "BASE")
+            for routine in program.routines.values()
+            if _set_alone(routine.code, f"$ACT_{name}", f"${name}")
+        }
 
     def is_signal(self, name: str) -> bool:
         """Outputs."""
@@ -479,6 +500,8 @@ class KrlDialect(Dialect):
             return value in ORIENTATION_TYPES[name]
         if name in CONTROLLER:
             return value == CONTROLLER[name]
+        if name in ("$ACT_TOOL", "$ACT_BASE"):
+            return name not in self.numbers_only
         return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
 
     def named(self, name: str) -> bool:

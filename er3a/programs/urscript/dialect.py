@@ -30,7 +30,7 @@ PASSING = "%passing"  # whether the program goes on while the arm still moves to
 READING = ("get_actual_", "get_target_", "get_forward_kin")  # beginnings of functions that read where the arm is
 NAME = re.compile(r"[A-Za-z_][\w.]*(\[[^]]*\])?")
 SAME_TURN = 1e-9
-UPRIGHT = 0.02  # tangent of the angle within which gravity is straight down
+MOUNTED = 0.02  # rad, within which two mountings are one
 HALF_A_TURN = math.pi - 1e-6
 HARMLESS_TEXT = """
 assert binary_list_to_integer conveyor_pulse_decode enable_external_ft_sensor encoder_enable_pulse_decode
@@ -250,10 +250,9 @@ class UrScriptDialect(Dialect):
                 return instructions.Unknown(doing.text)
             memory.write("%tcp", given["pose"])
             return None
-        if call.function == "set_gravity":  # other than upright it says that the arm hangs on a wall or a ceiling
-            up = syntax.numbers(values[0]) if len(values) == 1 and isinstance(values[0], tuple) else None
-            upright = up is not None and len(up) == 3 and up[2] > 0 and np.hypot(up[0], up[1]) < UPRIGHT * up[2]
-            return instructions.Aside(doing.text) if upright else instructions.Unknown(doing.text, may_move=False)
+        if call.function == "set_gravity":
+            given = _placed(("d",), values, keywords)
+            return _mounted(memory, None if given is None else given.get("d"), doing.text)
         if call.function in LOADS:
             loaded = _placed(LOADS[call.function], values, keywords)
             memory.write(
@@ -283,6 +282,20 @@ def _placed(
         return None
     placed = {name: each for name, each in zip(names, values) if each is not None}
     return None if placed.keys() & keywords.keys() else placed | keywords
+
+
+def _mounted(memory: ProgramMemory, up: syntax.Value | None, text: str) -> instructions.Instruction:
+    """Gravity tells how the arm is mounted: where up is in the frame of its base; otherwise than in the robot file, the
+    cell's shapes are elsewhere."""
+    given = syntax.numbers(up) if isinstance(up, tuple) else None
+    if given is None or len(given) != 3 or not syntax.finite(given) or not any(given):
+        return instructions.Unknown(text, may_move=False)
+    said, known = np.array(given) / math.hypot(*given), np.array(memory.cell.up)
+    angle = float(2 * np.arctan2(np.linalg.norm(said - known), np.linalg.norm(said + known)))
+    if angle < MOUNTED:
+        return instructions.Aside(text)
+    turned = f"{text}: mounted {math.degrees(angle):.0f} deg otherwise than in the robot file"
+    return instructions.Unknown(turned, may_move=False)
 
 
 def _tool_value(memory: ProgramMemory) -> syntax.Value | None:

@@ -11,9 +11,10 @@ from collections.abc import Iterator
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, linked
+from er3a.programs.code_builder import CodeBuilder, fault, linked, variable_of
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, as_number
+from er3a.programs.program_findings import NotUnderstood
 
 UR = Lexicon(
     re.compile(
@@ -118,7 +119,7 @@ def read_urscript(source: ProgramText) -> syntax.Program:
         source.path,
         by_name,
         "",
-        findings=(*source.findings, *findings),
+        findings=(*source.findings, *findings, *reader.shared_or_not()),
         lines=source.lines,
     )
 
@@ -128,6 +129,7 @@ class _UrReader:
         self.source = source
         self.routines: list[syntax.Routine] = []
         self.outermost: list[str] = []
+        self.within: list[tuple[syntax.Routine, CodeBuilder]] = []  # nested routines, with those around them
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
         self.unread: Place | None = None  # the head of the block that is not understood, while within one
         self.within_unread = 0  # blocks open within it that begin no further in than it does
@@ -158,6 +160,33 @@ class _UrReader:
             if starts:
                 top.add(syntax.Call(starts[0].place, starts[0].name, (), (), starts[0].name, syntax.START))
         return [*self.routines, top.routine(place)]
+
+    def shared_or_not(self) -> Iterator[NotUnderstood]:
+        """Assignments of nested routines to what may be their own, or a variable of the routine around them.
+
+        Variables on the first level of a program are global, and of others only those that say so [1]_. Which level is
+        the first is not known of a file whose own statements call its routines.
+
+        References
+        ----------
+        .. [1] Universal Robots, *Script manual*, section Scoping rules.
+        """
+        top = self.open[0].code
+        if any(isinstance(each, syntax.Call) and each.result == syntax.START for each in top):
+            return
+        every = [*top, *(each for routine in self.routines for each in routine.code)]
+        shared = {variable_of(each.target) for each in top if isinstance(each, syntax.Assign)}
+        shared |= {
+            variable_of(each.target) for each in every if isinstance(each, syntax.Assign) and each.type_name == "global"
+        }
+        for routine, around in self.within:
+            own = {each.name for each in routine.parameters} | {
+                variable_of(each.target) for each in routine.code if isinstance(each, syntax.Assign) and each.local
+            }
+            outer = {variable_of(each.target) for each in around.code if isinstance(each, syntax.Assign)} - own - shared
+            for each in routine.code:
+                if isinstance(each, syntax.Assign) and variable_of(each.target) in outer:
+                    yield NotUnderstood(each.text, each.place)
 
     def _statements(self) -> Iterator[tuple[Place, str, str]]:
         """Statements with their first line: lines are joined while a bracket is open, or behind an operator."""
@@ -267,6 +296,7 @@ class _UrReader:
             raise fault(place, "an end without a beginning", "Remove it")
         self.routines.append(builder.routine(place))
         self.open.pop()
+        self.within += [(self.routines[-1], each) for each in self.open[1:]]
         if len(self.open) == 1:
             self.outermost.append(builder.name)
 

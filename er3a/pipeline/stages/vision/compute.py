@@ -341,7 +341,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
     try:
-        found, unseen_zeros = zeros_tried(calibrate_hand_eye(samples), robot)
+        found, unseen_zeros, least_zero = zeros_tried(calibrate_hand_eye(samples), robot)
     except HandEyeError as error:
         verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
         return _without_calibration(
@@ -376,7 +376,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         calibration=calibration,
         objects=objects,
         not_examined=(
-            *_left_out(calibration, task_file, unseen_zeros),
+            *_left_out(calibration, task_file, unseen_zeros, least_zero),
             *left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH),
             *left_out_of_rates(np.isfinite(robot.speed), motions.jerk_deg_s3 is not None),
             LeftOut("torques"),
@@ -421,7 +421,9 @@ def _without_calibration(summary: model.VisionSummary) -> model.VisionResults:
     )
 
 
-def _left_out(found: model.CalibrationResult, file: VisionFile, zeros: tuple[str, ...]) -> Iterator[LeftOut]:
+def _left_out(
+    found: model.CalibrationResult, file: VisionFile, zeros: tuple[str, ...], least_zero: float
+) -> Iterator[LeftOut]:
     """What the calibration does not rest on, what nothing checks it against, and what grasps leave open."""
     places = np.array([each.pose()[:3, 3] for each in file.objects])
     seen = in_sight(file.view.view(NO_BOARD), places)
@@ -439,6 +441,8 @@ def _left_out(found: model.CalibrationResult, file: VisionFile, zeros: tuple[str
         yield LeftOut("copied_samples", found.copies)
     if zeros:
         yield LeftOut("joint_zeros", zeros)
+    if least_zero:
+        yield LeftOut("small_joint_zeros", amount=least_zero)
     if found.touch is None:
         yield LeftOut("touched_points")
     yield LeftOut("detections")
