@@ -112,7 +112,7 @@ def _linked(robot: Robot, chain: ChainSolver, uncouple: Reals) -> ChainSolver:
 
 
 def to_joints(robot: Robot, x: Reals) -> Reals:
-    """The manufacturer's values (..., n) for the rows' motion; angles in (-pi, pi], with a coupling those of the rows."""
+    """The manufacturer's values (..., n) for the rows' motion; angles in (-pi, pi], those of the rows if coupled."""
     uncouple = arm_solver(robot).uncouple
     u = robot.direction * (x - joint_starts(robot))
     return unwound(robot, u if uncouple is None else u @ uncouple.T)

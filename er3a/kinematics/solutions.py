@@ -238,7 +238,7 @@ class Solutions(ByValue, Displayed):
     families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest; of arms with more
         than six joints traced when they are first read
     turn_range : (..., 6, 2) int8, smallest and largest number of whole turns that can be added to each joint within its
-        limits (smallest above largest: none); None unless ``inverse_batch`` was called with ``whole_turns``
+        limits (smallest above largest: none); None unless ``inverse_batch`` was called with ``turns``
     position_error, rotation_error : (...,), m and rad, of the degrees of freedom in the ``mask`` of ``solve``
     starts : (...,) int, starts that ``solve`` used; 0 where none succeeded
     certain : of ``inverse_batch`` for other classes (N,): whether the solver left no doubt that these are all

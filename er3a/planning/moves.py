@@ -3,8 +3,8 @@
 Joint moves run on a quintic; lines on a quintic or a trapezoid, from rest to rest. The orientation turns
 about one fixed axis at a rate proportional to the position's (slerp [1]_), in the shorter direction.
 
-A rotation by exactly half a turn is equally short in both directions. It is then taken counter-clockwise as seen from above:
-of the two opposite axes, the one that points up (+Z of the base), if level the one towards +Y, if that is 0 too
+A rotation by exactly half a turn is equally short in both directions. It is then taken counter-clockwise as seen from
+above: of the two opposite axes, the one that points up (+Z of the base), if level the one towards +Y, if that is 0 too
 towards +X. A path may choose the other one by naming an axis.
 
 ``jtraj``, ``ctraj`` and ``rpy`` have the names of the Robotics Toolbox [2]_. Times are in seconds.
