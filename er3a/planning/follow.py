@@ -4,8 +4,8 @@ On the grid of :mod:`er3a.planning.follow`, dynamic programming [1]_ finds for e
 continuation to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time), shortest
 time outside the limits, of joints and of sums of joints, least joint travel, and among equals the largest distance from
 the limits. Whole turns are no states of the search: along a continuous sequence the first angle fixes them, so each
-joint's turn is chosen once per stretch, by shortest time outside the limits, then nearest to the joints before. The best
-sequence over all branches at the start is taken; given start joints allow only the branches that they lie on
+joint's turn is chosen once per stretch, by shortest time outside the limits, then nearest to the joints before. The
+best sequence over all branches at the start is taken; given start joints allow only the branches that they lie on
 (several, if the start is singular).
 
 An unreachable pose interrupts the sequence; the stretch after it is solved separately.
