@@ -335,7 +335,7 @@ class Clearance:
 
 @lru_cache(maxsize=8)
 def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
-    """The bodies of an arm and a scene, kept while only few others are used."""
+    """The bodies of an arm and a scene; the eight used last are kept."""
     return Bodies(robot, scene)
 
 

@@ -277,7 +277,7 @@ def _above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near:
 def pair_distance(
     w: Reals, shape: tuple[Integers, Integers, Reals, Reals], a: int, b: int, room: Reals, near: Reals
 ) -> tuple[float, bool]:
-    """Distance of two bodies, and whether their cores overlap, so that the depth is at least the value returned.
+    """Distance of two bodies, and whether their cores overlap; then the depth is at least the one returned.
 
     ``w`` (P, 3) are placed points, ``shape`` is start, kind, radius and disc, ``room`` (ROOM, 3) scratch; ``near``
     (2, 3) gets the closest points of the cores. The second body may be a half-space.

@@ -212,7 +212,7 @@ def try_poses(
     ----------
     middles : (n, 2), m, radius and height about axis 1; places : their sectors' middles (n,) and width, rad or m
     tries : poses in each; free : which arms count as clear
-    asked : the required orientations; unless these are directions, they are evenly spaced
+    asked : the required orientations; unless these are directions, the orientations tried are even among them
     """
     frame = cell_frame(robot)
     reached, clear = (np.zeros(len(middles), np.int64) for _ in range(2))

@@ -168,7 +168,7 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
 
 
 def _tilt_plane(robot: Robot, joints: int) -> TiltPlane | None:
-    """The plane of an arm whose first joints tilt its tool within one plane; None if they do not."""
+    """The plane in which an arm's first ``joints`` joints tilt its tool; None if they do not tilt it in a plane."""
     axes, _, T = axes_at_zero_theta(robot)
     behind, sliding = axes[1:joints], robot.sliding[1:joints]
     if robot.sliding[0] or len(behind) < _LEAST_PLANAR or sliding.all():
