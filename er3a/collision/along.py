@@ -7,8 +7,8 @@ at both ends of an interval add up to more than M, the pair overlaps in the whol
 until M is twice the requested ``depth``. So no overlap deeper than that is missed, however small or thin the obstacle,
 and the smallest clearance is found to within it.
 
-M is the longer way of a capsule's two ends (its other points move no farther), in space for a solid, in the frame of
-the other link for two links. The way is bounded on a grid of the motion so fine that no end moves by more than
+M is the longer path of a capsule's two ends (its other points move no farther), in space for a solid, in the frame of
+the other link for two links. The path is bounded on a grid of the motion so fine that no end moves by more than
 twice the depth from point to point: a chord over a time h, plus A h^2 / 3, where A bounds the end's acceleration.
 With levers of at most L, revolute rows with speeds v and accelerations a, and prismatic rows with w and b,
 ``A = L (sum |a| + (sum |v|)^2) + sum |b| + 2 sum |v| sum |w|``: these are bounds over the whole interval. The caller
@@ -121,7 +121,7 @@ class _Motion:
         solid = np.flatnonzero(bodies.second < 0)
         moving, track = np.unique(bodies.first[solid], return_inverse=True)
         self._own, self._moving = own, moving
-        self.track = np.empty(len(bodies.pairs), dtype=int)  # of a pair: which tracked capsule's way counts
+        self.track = np.empty(len(bodies.pairs), dtype=int)  # of a pair: which tracked capsule's path counts
         self.track[own], self.track[solid] = np.arange(len(own)), len(own) + track
 
     @cached_property
@@ -179,7 +179,7 @@ def clearance_along(
         infinite where there are none
     joints : values (N, n) in rad or m at times (N,) in s; NaN where the motion is unknown
     t : (N,), s, rising: where the motion is known or not; refined as needed
-    shown : times (K,) of ``t`` at which the clearance is wanted
+    shown : times (K,) of ``t`` at which the clearance is returned
     depth : m; see the module's text
     """
     motion = _Motion(bodies, joints, rates)
@@ -208,9 +208,9 @@ def clearance_along(
 
 
 def _fine(motion: _Motion, t: Reals, step: float) -> tuple[Reals, Reals, Reals]:
-    """Times so near to one another that no tracked end moves by more than ``step``, joints, and the way so far.
+    """Times so near to one another that no tracked end moves by more than ``step``, joints, and the path length so far.
 
-    The way is (N, tracks), that of the end that moves more, summed up; infinite steps where it is unknown.
+    The path length is (N, tracks), of the end that moves more, summed up; infinite steps where it is unknown.
     """
     times, q = t, motion.joints(t)
     while True:
@@ -303,7 +303,7 @@ def _contacts(motion: _Motion, times: Reals, q: Reals, near: float) -> list[Cont
 def _touch(
     motion: _Motion, k: int, times: Reals, distances: Reals, apart: Callable[[float], float], near: float
 ) -> Touch:
-    """When a pair first touches, and where it is deepest, near the least of its distances (n,) at times (n,)."""
+    """When a pair first touches, and where it is deepest, near the minimum of its distances (n,) at times (n,)."""
     first, deepest = int(np.argmax(distances <= 0)), int(np.argmin(distances))
     start, at = float(times[first]), float(times[deepest])
     if first > 0:
@@ -335,7 +335,7 @@ class Clearance:
 
 @lru_cache(maxsize=8)
 def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
-    """The bodies of an arm and a scene, kept for as long as few others are asked for."""
+    """The bodies of an arm and a scene; the eight used last are kept."""
     return Bodies(robot, scene)
 
 

@@ -11,7 +11,7 @@ the radius of its disc) or a half-space (a normal, and how far along it the soli
 that of their cores less both radii. Two lines are measured in closed form [1]_, all else by the Gilbert-Johnson-Keerthi
 iteration [2]_, whose closest points of a simplex are found region by region [1]_. How deep two cores overlap is the
 smallest shift that parts them: their Minkowski difference holds the origin while they overlap, and its nearest face is
-the nearest way out [3]_.
+the shortest separating translation [3]_.
 
 References
 ----------
@@ -34,10 +34,10 @@ from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
 from er3a.numerics.jit import inner_kernel, kernel
 
 HULL, CYLINDER, HALF_SPACE = 0, 1, 2
-EXACT = 1e-11  # m, to which the iteration goes on
+EXACT = 1e-11  # m, at which the iteration stops
 TOUCHING = 1e-9  # m; cores that are nearer overlap
 ROUNDS = 64
-# rows of scratch memory behind the simplex and its points on either core
+# rows of scratch memory after the simplex and its points on either core
 _V, _WEIGHT, _NEAR, ROOM = 12, 13, 17, 19
 
 
@@ -92,7 +92,7 @@ def _lines(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) -> float:
 
 @inner_kernel
 def _support(w: Reals, first: int, last: int, disc: float, room: Reals, sign: float, row: int) -> None:
-    """The point of a core that is farthest along ``sign`` times the row V of ``room``, into a row of it."""
+    """The support point of a core along ``sign`` times the row V of ``room``, into a row of it."""
     x, y, z = sign * room[_V, 0], sign * room[_V, 1], sign * room[_V, 2]
     best, at = -np.inf, first
     for p in range(first, last):
@@ -277,7 +277,7 @@ def _above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near:
 def pair_distance(
     w: Reals, shape: tuple[Integers, Integers, Reals, Reals], a: int, b: int, room: Reals, near: Reals
 ) -> tuple[float, bool]:
-    """Distance of two bodies, and whether their cores overlap, so that the depth is at least what is given.
+    """Distance of two bodies, and whether their cores overlap; then the depth is at least the one returned.
 
     ``w`` (P, 3) are placed points, ``shape`` is start, kind, radius and disc, ``room`` (ROOM, 3) scratch; ``near``
     (2, 3) gets the closest points of the cores. The second body may be a half-space.
@@ -320,7 +320,7 @@ def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
         found[n] = _cores(w, (0, 1, 1, len(w)), 0.0, 0.0, room, near)
 
 
-WORLD = -1  # link of what stands around the arm
+WORLD = -1  # link of the bodies around the arm
 DEEPEST = 512  # boxes that wait at one time
 FREE, MEETS, UNDECIDED = 0, 1, 2
 NARROW = 1e-6  # m; a box in which bodies move by less is not halved
@@ -453,10 +453,10 @@ def some_distances(layout: Layout, w: Reals, pairs: Integers, found: Reals, deep
 
 @kernel
 def measure(layout: Layout, q: Reals, found: Reals, least: Reals, pair: Integers, deep: Flags) -> None:
-    """Distances of all pairs in arms (N, n); of overlapping cores the least depth that is known.
+    """Distances of all pairs in arms (N, n); of overlapping cores the smallest known depth.
 
     ``found`` (N, K) gets them all; if it has no columns, only ``least`` (N,) and its number ``pair`` (N,) are worked
-    out, and pairs that can't be the least are left out. Joined pairs are the least only where they overlap. ``deep``
+    out, without pairs that can't be the nearest. Joined pairs count as nearest only where they overlap. ``deep``
     (N,) says whether cores overlapped.
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
@@ -641,7 +641,7 @@ def search_boxes(
 ) -> tuple[int, int, float]:
     """Whether a pair is apart (or, by ``aim``, overlaps) in all joint vectors of a box (2, n), by halving it.
 
-    ``aim`` says whether overlap is to be shown, and of how much (m, 0 or more); what comes to less is not decided.
+    ``aim`` says whether overlap is to be shown, and of how much (m, 0 or more); less is not decided.
 
     Returns
     -------
@@ -703,7 +703,7 @@ def search_boxes(
     return outcome, looked, least
 
 
-RIM = 96  # points that stand for a cylinder's rim, on a circle that lies around it
+RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it
 STARTS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 EXACT_SHARE = 1e-12  # parts of the cores' size
 MOST_POINTS = 1000
@@ -731,7 +731,7 @@ def overlap_depth(first: Reals, second: Reals) -> float:
 
 
 def _farthest(first: Reals, second: Reals, directions: Reals) -> Reals:
-    """The points (k, 3) of the difference that lie farthest in the directions (k, 3)."""
+    """The support points (k, 3) of the difference in the directions (k, 3)."""
     return np.asarray(first[(directions @ first.T).argmax(axis=1)] - second[(directions @ second.T).argmin(axis=1)])
 
 

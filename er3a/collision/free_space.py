@@ -59,7 +59,7 @@ class Share:
 
 @dataclass(frozen=True, eq=False)
 class JointSpace:
-    """What random joint vectors came to.
+    """Counts of random joint vectors.
 
     Attributes
     ----------

@@ -12,7 +12,7 @@ proven harmless:
   joint is left out, within the girth of both bodies: for hulls, measured from the point that is proven to belong to
   both; for lines, from where they are nearest in the pose in which they are farthest apart. The rest is classified
   again, so that an arm that folds onto itself is seen. A default shape that slides in a thicker one is joined to it in
-  the same way: only the part of the guide along the sliding axis is left out, and nothing of the sliding shape. In
+  likewise: only the part of the guide along the sliding axis is left out, and nothing of the sliding shape. In
   links with several bodies, those beside two joined bodies are joined too, if the rest without that joint's region
   comes apart. So are all bodies of two links that always overlap only as a whole;
 - *overlaps*: they overlap in all joint vectors drawn, the boxes show none in which they don't, and no joint explains
@@ -51,7 +51,7 @@ SHORTEST = 1e-6  # m
 
 
 def girth(body: Body, centre: Reals, within: float = np.inf) -> float:
-    """How far a body stands out from the line that leads from ``centre`` (3,) through its middle, m.
+    """How far a body extends from the line that leads from ``centre`` (3,) through its middle, m.
 
     Of a hull only what is nearer than ``within`` (m) in the direction of its middle counts.
     """
@@ -245,7 +245,7 @@ def _without_poor_guesses(robot: Robot, matrix: CollisionMatrix) -> CollisionMat
 def matrix_of(
     robot: Robot, pairs: Sequence[tuple[Body, Body]], rules: Sequence[PairRule], boxes: int = BOXES
 ) -> CollisionMatrix:
-    """Judge pairs of bodies, of which those of one link are left out."""
+    """Judge pairs of bodies of different links."""
     by_names: dict[tuple[str, str], list[tuple[Body, Body]]] = {}
     for first, second in pairs:
         if first.link != second.link:
@@ -341,7 +341,7 @@ def _beside(
     """Judgements of all bodies of two links; of those that no joint explains, the ones beside bodies that one holds.
 
     Housings are often drawn as several bodies, which overlap in the joint's region too. Nothing beyond the region of
-    those that are held is left out for them. ``apart``: (K, n), joint vectors that hold each pair farthest apart.
+    those that are held is left out for them. ``apart``: (K, n), joint vectors with the largest distance of each pair.
     """
     held = [each for each in found if each.state == "joined" and each.hub is not None]
     for k, pair in enumerate(pairs):
@@ -552,7 +552,7 @@ class BaseContact:
 
 
 def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
-    """Solids that the base overlaps or stands on, the deepest contact with each."""
+    """Solids that the base overlaps or rests on, the deepest contact with each."""
     base = [body for body in arm_bodies(robot) if body.link == BASE]
     solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
     bodies = [*base, *map(_middle, base), *solids]

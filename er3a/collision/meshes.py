@@ -37,7 +37,7 @@ LINK_SEARCH: dict[str, Any] = {
 }
 """coacd's settings for a link: seconds of work, and few pieces, because all pairs of them are judged."""
 MOST_CORNERS = 64  # of a piece
-AGREE = 2e-5  # m, to which the bound of what stands out is brought down
+AGREE = 2e-5  # m, tolerance of the bound of what extends beyond
 CUTS = 12
 FINEST = 4_000_000  # triangles looked at in all
 SURFACE_POINTS = 20_000
@@ -100,7 +100,7 @@ def link_pieces(vertices: Reals, faces: Integers, closed: bool, seed: int) -> Co
 
 
 def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Integers]:
-    """Vertices and faces of a mesh with at most so many triangles: edges collapse where the surface bends least [1]_.
+    """Vertices and faces of a mesh with at most so many triangles: edges collapse where the surface is flattest [1]_.
 
     Of triangles with both sides (two with the same corners) one is kept: edges of more than two don't collapse.
 
@@ -141,7 +141,7 @@ def _split(vertices: Reals, faces: Integers, seed: int, **settings: Any) -> tupl
 
 
 def hull_of(points: Reals) -> ConvexPieces:
-    """The hull of points (n, 3), m, with at most ``MOST_CORNERS`` of its corners: those that lie farthest out.
+    """The hull of points (n, 3), m, with at most ``MOST_CORNERS`` of its corners: the outermost ones.
 
     What the corners left out stand out by is the margin; the excess is not that of a mesh, but 0: corners are points.
     """

@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 
 from er3a.by_value import Finding
 
-BASE = 0  # number of the link that stands still
+BASE = 0  # number of the fixed link
 TRIED = 1024  # joint vectors, spread over the limits, in which each pair is tried
-PENETRATION_TOLERANCE = 0.001  # m; no overlap deeper than this goes unnoticed, where nothing else is asked
-ASSUMED_MARGIN = 0.02  # m, within which of assumed shapes nothing is settled, where nothing else is asked
+PENETRATION_TOLERANCE = 0.001  # m; no deeper overlap goes unnoticed, unless set otherwise
+ASSUMED_MARGIN = 0.02  # m, within this distance of assumed shapes nothing is settled, unless set otherwise
 
 
 class TwoBodies(ABC):

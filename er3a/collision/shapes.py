@@ -31,8 +31,8 @@ from er3a.robots.robot import ConvexPiece, Envelope, Grade, Robot, derived
 
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
 SHORTEST = 1e-6
-LINE_POINTS, TOUCH = 25, 1e-3  # points along a piece of a link, and m, by which they may stand out
-VISIBLE = 0.02  # m, by which what a link looks like may stand out: covers and cables do
+LINE_POINTS, TOUCH = 25, 1e-3  # points along a piece of a link, and m, by which they may protrude
+VISIBLE = 0.02  # m, by which a link's visible mesh may protrude: covers and cables do
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class ArmShapes:
 
 @derived
 def arm_shapes(robot: Robot) -> ArmShapes:
-    """The shapes that an arm has, for whatever asks for its shapes (see the module's text)."""
+    """The shapes of an arm (see the module's text)."""
     capsules, pieces, given = robot.envelopes, robot.hulls, bool(robot.envelopes or robot.hulls)
     if not given:
         capsules = default_envelopes(robot)
@@ -132,7 +132,7 @@ def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float |
     Parameters
     ----------
     margin : m, within which of assumed shapes nothing is settled
-    clearances : m, least ones by name; None or negative for what is not known, or overlaps
+    clearances : m, smallest ones by name; None where unknown, negative for overlaps
     """
     shapes = arm_shapes(robot)
     if not shapes.assumed:
@@ -186,7 +186,7 @@ class Body:
     Attributes
     ----------
     name : ``base``, ``link_3``, or that of the solid or of what is carried
-    link : 0 for the base, k for the link that row k moves, ``WORLD`` for what stands around
+    link : 0 for the base, k for the link that row k moves, ``WORLD`` for bodies around the arm
     points : (k, 3), m, in the link's frame; a half-space has its normal and, in the second row, its offset first
     kind, radius, disc : see :mod:`er3a.collision.distances`
     """

@@ -116,7 +116,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class PlacementLayer:
-    """Where B's base (flange) stands in A's base (flange) frame once joint axes agree."""
+    """Pose of B's base (flange) in A's base (flange) frame once joint axes agree."""
 
     same: bool
     shift_mm: tuple[float, float, float]
@@ -313,7 +313,7 @@ def _placement(T: Reals, tolerances: mechanism.Tolerances) -> PlacementLayer:
 
 
 def _joints_paired(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tuple[Reals, CouplingLayer]:
-    """+1 or -1 for each joint (n,), -1 where B's pendant counts the other way, and whether couplings agree."""
+    """+1 or -1 for each joint (n,), -1 where B's pendant counts in the other direction, and whether couplings agree."""
     rows = np.where(found.reverses, -1.0, 1.0)
     if robot_a.coupling is None and robot_b.coupling is None:
         return rows, CouplingLayer(True)
@@ -554,7 +554,7 @@ def _corrected(
             _put_on_axis(columns, last, np.linalg.inv(behind) if turned_over else behind)
         else:
             flange = _rounded_pose(robot_a.flange @ found.flange)
-    # Mended zeros and directions make A's joint values those of B.
+    # Corrected zeros and directions make A's joint values those of B.
     ends = np.sort(np.stack([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)]), axis=0)
     lower, upper, continuous = ends[0], ends[1], robot_a.continuous
     if limits.same is False or (_known(robot_b, "limits") and not _known(robot_a, "limits")):

@@ -99,7 +99,7 @@ def mechanism_of(robot: Robot, *, ends: bool = True, **otherwise: Reals | str) -
     table = {key: otherwise.get(key, getattr(robot, key)) for key in (*_COLUMNS, "convention")}
     a, alpha, beta, d, offset = (np.array(table[column], float) for column in _COLUMNS)
     base, flange, last = robot.base, robot.flange, len(d) - 1
-    if table["convention"] == "modified":  # what follows an axis stands one row later
+    if table["convention"] == "modified":  # what follows an axis is one row later
         before, (a, alpha, beta) = (a[0], alpha[0], beta[0]), (np.append(each[1:], 0.0) for each in (a, alpha, beta))
         if ends:
             base = base @ _across(*before)
@@ -210,7 +210,7 @@ def with_senses(mechanism: Mechanism, senses: Reals, normals: Reals) -> Mechanis
     )
 
 
-# Which way axes and normals point -------------------------------------------------------------------------------------
+# Senses of axes and normals -------------------------------------------------------------------------------------------
 
 
 def _likely_senses(
@@ -338,8 +338,8 @@ class Match:
     ----------
     differences : of geometry, the fewest that explain the other arm; worst_length, worst_angle : m and rad
     invariants : how many numbers were compared; unexplained : m, what no entries explain
-    senses : (m,), -1 where an axis of the other table points the other way
-    reverses : (m,) bool, rows that the other arm moves the other way
+    senses : (m,), -1 where an axis of the other table has the other sense
+    reverses : (m,) bool, rows that the other arm moves in the other direction
     zeros : (m,), rad or m, other's ``offset`` less the first's once the other is brought there; 0 of the ends
     base : (4, 4), the other's base in the first's base; flange : (4, 4), other's flange in the first's flange
     """
@@ -395,7 +395,7 @@ def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances, most_
 
 
 def _links_differ(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
-    """Whether some link's length or twist differs whichever way axes and normals point."""
+    """Whether some link's length or twist differs for all senses of axes and normals."""
     if one.beta.any() or other.beta.any():
         return False
     angles = np.stack([one.between, other.between])

@@ -31,7 +31,7 @@ class LimitDecides(Finding):
 
 
 class NothingDecides(Finding):
-    """Hypotheses are the same arm written in different ways."""
+    """Hypotheses are different descriptions of the same arm."""
 
 
 class OrientationDecides(Finding):

@@ -170,7 +170,7 @@ def _conventions(
         return None
     if found.unexplained or sum(_gross(each) for each in found.differences) > MOST_WRONG:
         return None
-    later = int(robot.convention == "modified")  # rows of a and alpha are those of the joint behind
+    later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
     wrong = [(each.column, each.link + later * (each.column != "d")) for each in found.differences]
     start = _moved(robot, found)
     for (column, row), each in zip(wrong, found.differences):

@@ -40,7 +40,7 @@ TRIED_M = 0.001, 0.01, 0.1, 0.5
 
 def deciding_measurement(tables: Tables, robot: Robot) -> conclusions.NextMeasurement | None:
     """The pose, out of single joints turned and all turned together, at which the flange positions that the tables
-    predict are farthest apart; else the limits in which they differ.
+    predict differ most; else the limits in which they differ.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def deciding_measurement(tables: Tables, robot: Robot) -> conclusions.NextMeasur
 
 
 def _candidates(robot: Robot) -> Reals:
-    """Poses (P, n) in deg within the limits: one joint turned either way, pairs, and all."""
+    """Poses (P, n) in deg within the limits: one joint turned in either direction, pairs, and all."""
     joints = len(robot.lower)
     turned = [np.zeros(joints)]
     for j in range(joints):
@@ -109,7 +109,7 @@ def resolution_of(case: Case) -> conclusions.Resolution:
 
 
 def unseen_of(case: Case) -> tuple[str, ...]:
-    """Entries that no reference reacts to, whatever their value, and joints that could be reversed."""
+    """Entries that no reference reacts to at any value, and joints that could be reversed."""
     before = case.difference(case.given)[0]
     entries = [number for number in case.numbers if number.column]
     if not entries:
@@ -147,7 +147,7 @@ def distinguishability(case: Case, ranking: Ranking) -> float | None:
     """How many times larger the disagreement would have to be for the references to tell the first set apart.
 
     Each member but the first is refitted to what the first predicts, to first order; what then stays grows with the
-    disagreement. Members that predict the same whatever the size don't count.
+    disagreement. Members that predict the same at any size don't count.
 
     Of a set without end the first members are compared.
 
@@ -279,13 +279,13 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Hy
 
     Parameters
     ----------
-    robot : the table as given, tool not considered (references speak of the flange)
+    robot : the table as given, tool not considered (references concern the flange)
     references : official, CAD and export data count, if there are any, else claims do
 
     Returns
     -------
     ranked : at most 10, those that explain first; empty if the references are met, or if no one or two faults do better
-        than the table as it is. What it could not look at stands in ``not_examined``, and extremes over the limits that
+        than the table as it is. What it could not examine is in ``not_examined``, and extremes over the limits that
         the table misses in ``missed``
     """
     stated = usable(references)
@@ -413,7 +413,7 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
 
 
 def _best_left(ranking: Ranking, unit: Unit) -> float:
-    """The least that any hypothesis leaves of the largest difference in a unit."""
+    """The minimum over hypotheses of the largest difference that remains in a unit."""
     left, _, units = residuals(ranking, ranking.pool.difference)
     return float(left[:, [each == unit for each in units]].max(axis=1).min())
 

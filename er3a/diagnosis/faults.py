@@ -82,7 +82,7 @@ class WrongOffset(Finding):
 
 
 class ReversedDirection(Finding):
-    """A joint turns the other way."""
+    """A joint turns in the other direction."""
 
     joint: int
 
@@ -125,14 +125,14 @@ class WrongScale(Finding):
 
 
 class BaseElsewhere(Finding):
-    """The references' base stands elsewhere: ``shift_mm`` and ``turn_deg`` are the arm's in the base's frame."""
+    """The references' base is elsewhere: ``shift_mm`` and ``turn_deg`` are the arm's in the base's frame."""
 
     shift_mm: tuple[float, float, float]
     turn_deg: float
 
 
 class FlangeElsewhere(Finding):
-    """The references' flange stands elsewhere than the table's: ``shift_mm`` and ``turn_deg`` in the flange's frame."""
+    """The references' flange is elsewhere than the table's: ``shift_mm`` and ``turn_deg`` in the flange's frame."""
 
     shift_mm: tuple[float, float, float]
     turn_deg: float = 0.0

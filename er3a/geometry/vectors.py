@@ -90,7 +90,7 @@ TURN = 2 * np.pi
 
 
 def max_joint_move(q: Reals, q_ref: Reals) -> Reals:
-    """How far (...,), rad, the joint turns that turns farthest from joint angles ``q_ref`` to ``q`` (..., 6).
+    """The largest turn (...,), rad, of a joint from joint angles ``q_ref`` to ``q`` (..., 6).
 
     By this the arm's next joint angles are *near* wherever solutions are ranked or ordered.
     """

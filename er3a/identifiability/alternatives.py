@@ -198,7 +198,7 @@ def with_readings(table: Tables, robot: Robot, readings: Sequence[Alternative]) 
 
 def alternatives_to(table: Tables, asked: Asked, tool: ToolRange) -> list[Alternative]:
     """Minimal alternatives to a table (a batch of one) that requirements allow: all that the table meets are met, and
-    none is missed by more; those that move no tool are left out."""
+    none is missed by more; without those that move no tool."""
     flips = flips_of(asked.robot, [each.quantity for each in asked.requirements])
     search = _AlternativeSearch(table, asked, tool, flips)
     for chosen in sets_of(flips):
@@ -237,7 +237,7 @@ class _AlternativeSearch:
                 self._keep(part[i], tables[[int(i)]], bool(barred[i]))
 
     def _plain_allowed(self, tables: Tables) -> tuple[Flags, Flags]:
-        """Which tables (H,) meet what is asked of the arm, and which of these miss an entry measured by itself."""
+        """Which tables (H,) meet the requirements on the arm, and which of these miss an entry measured by itself."""
         if not self.asked.plain:
             return np.ones(len(tables), dtype=bool), np.zeros(len(tables), dtype=bool)
         violation = self.asked.plain_violation(tables)

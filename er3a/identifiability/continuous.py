@@ -156,7 +156,7 @@ def _x_turned(tables: Tables, joint: int, row: int) -> Tables:
 
 
 def _z_turned(tables: Tables, joint: int, row: int) -> Tables:
-    """The z axis of a joint turned round, with the rows before and behind it."""
+    """The z axis of a joint reversed, with the rows before and after it."""
     for name in ("direction", "offset", "d"):
         tables = tables.with_column(name, [joint], -getattr(tables, name)[:, [joint]])
     return tables.with_column("alpha", [row, row + 1], tables.alpha[:, [row, row + 1]] + np.pi)
@@ -164,19 +164,19 @@ def _z_turned(tables: Tables, joint: int, row: int) -> Tables:
 
 SPREAD, CHALLENGE_WIDTHS = 192, (0.02, 0.1, 0.3, 1.0)
 REVERSED, TURNED = 0.2, 0.15  # shares of joints reversed and angles turned round, in every second spread start
-PUSHES = 1.1, 1.7, 3.0, 8.0  # of the least step that matters
+PUSHES = 1.1, 1.7, 3.0, 8.0  # of the smallest step that matters
 ROUNDS, PUSHED_FROM, MOST_KEPT = 3, 3, 40
 PASSES, STEP, DAMPING, STALLED, FLOOR, NOTHING = 40, 1e-3, 1e-2, 1e-3, 1e-8, 1e-12
 CHUNK, SEED = 48, 20261121
 
 
 def challenges_to(region: Region, start: OpenTable, matters: Mapping[int, float]) -> list[Elsewhere]:
-    """Open tables that lie farther than others along some entry, either way.
+    """Open tables that are extreme along some entry, in either direction.
 
     Parameters
     ----------
     region : its entries are those that may change; start : an open table of it
-    matters : places of entries that are held some way off, with the least step (in their scales) that matters
+    matters : places of entries that are held some way off, with the smallest step (in their scales) that matters
     """
     search = _ManyStarts(region, start, matters)
     search.try_from(*_spread(region, start))
@@ -226,7 +226,7 @@ class _ManyStarts:
     ----------
     reach : (2, k), how far entries were found above and below the start, in their scales
     best : for each of these the directions (n,) and amounts (k,) of the table that lies there
-    reversed : by joint (from 0) those of a table in which it turns the other way, farthest or not
+    reversed : by joint (from 0) those of a table in which it turns the other way, extreme or not
     """
 
     def __init__(self, region: Region, start: OpenTable, watched: Collection[int]):
@@ -236,7 +236,7 @@ class _ManyStarts:
         self.reversed: dict[int, tuple[Reals, Reals]] = {}
 
     def try_from(self, direction: Reals, amounts: Reals, held: Flags) -> None:
-        """Go from starts toward what is asked for, and keep what comes farthest."""
+        """Go from starts toward the target, and keep the extremes."""
         for begun in range(0, len(amounts), CHUNK):
             own = slice(begun, begun + CHUNK)
             for row, place in zip(direction[own], self._lowered(direction[own], amounts[own], held[own])):
@@ -257,7 +257,7 @@ class _ManyStarts:
             self.reversed.setdefault(joint, place)
 
     def farthest_tables(self) -> list[tuple[Reals, Reals]]:
-        """Different tables found, those first that lie farthest along most entries."""
+        """Different tables found, the extreme ones along most entries first."""
         counted: dict[bytes, list[tuple[Reals, Reals]]] = {}
         for place in self.best.values():
             counted.setdefault(place[1].tobytes(), []).append(place)
@@ -274,7 +274,7 @@ class _ManyStarts:
         return found
 
     def _lowered(self, direction: Reals, amounts: Reals, held: Flags) -> list[Reals | None]:
-        """Amounts (k,) at which what is asked for is met, reached from each of R starts; None where it is not."""
+        """Amounts (k,) that meet the target, reached from each of R starts; None where it is not."""
         region, likely = self.region, self.region.asked.likely
         amounts = np.clip(amounts, -region.widest, region.widest)
         off = self._off(direction, amounts)
@@ -469,7 +469,7 @@ class Extents:
         return bool(found)
 
     def _step_that_matters(self, entry: TableNumber) -> float:
-        """The least change of an entry, in its scale, by which the tool is off by more than is tolerated."""
+        """The smallest change of an entry, in its scale, that moves the tool by more than the tolerance."""
         if entry.unit == "mm":
             return self.tolerance.mm / entry.in_unit / entry.scale
         one = self.tool.off(shifted(self.tool.table, [entry], np.array([[entry.scale]])))

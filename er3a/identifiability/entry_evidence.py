@@ -57,7 +57,7 @@ class EntryEvidence:
     value, unit : in the robot's file
     status : see :data:`Status`
     interval : what independent evidence leaves open for it, the others free; None for what has no number
-    by : documents that speak of it: independent ones if there are any, else its own
+    by : documents that concern it: independent ones if there are any, else its own
     alternatives : other readings of the table that concern it, and combinations with it that are the same robot
     document : that it rests on
     off : how far the tool could be off for it
@@ -125,7 +125,7 @@ class Evidence(ByValue, Displayed):
         return {each.entry: each for each in (*self.entries, *self.combinations)}
 
     def sheet(self) -> Sheet:
-        """A row for each status: how many entries have it, and which; what is most to be looked at stands first."""
+        """A row for each status: how many entries have it, and which; the most important first."""
         judged = (*self.entries, *self.combinations)
         names = {status: [each.entry for each in judged if each.status == status] for status in _SHOWN}
         kept = {"other_table": self.other.code if self.other else None, "unmet": self.unmet or None}

@@ -138,7 +138,7 @@ def evidence_of(
     ----------
     references : of all sets together; official, measured, CAD and export ones count, if there are any, else claims do
     tolerance : how far the tool may be off for what counts as settled
-    only : names of the entries that are asked for; all by default
+    only : names of the requested entries; all by default
 
     Returns
     -------

@@ -3,7 +3,7 @@
 Extents are found by sequential linear programming: each step maximises over the requirements linearised at the last
 table, within a trust region that grows while steps succeed; a step that leaves the set is brought back by Gauss-Newton
 steps on what it exceeds. Angles to a direction (cones) are bounded by eight tangents and one that follows the point.
-Standard deviations bound the likelihood: chi squared may exceed its least by 3.84, the 95 % profile interval of one
+Standard deviations bound the likelihood: chi squared may exceed its minimum by 3.84, the 95 % profile interval of one
 number [1]_; that ball is bounded by tangents, one of them across the direction that is maximised, so that the extent is
 exact if nothing else bounds it, and on the safe side otherwise. Combinations that do not move the tool are held. An
 extreme over the joint limits that is attained in several places at once has kinks, at which such steps can end too
@@ -47,7 +47,7 @@ FEW = 3
 
 @dataclass(frozen=True, eq=False)
 class OpenTable:
-    """A table that requirements leave open, or, if none was found, that exceeds them least.
+    """A table that meets the requirements, or, if none was found, that exceeds them least.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class OpenTable:
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """How far a search came: a value, whether it came to its end, and the amounts (k,) of an open table there."""
+    """Result of a search: a value, whether the search ended, and the amounts (k,) of an open table there."""
 
     value: float
     finished: bool
@@ -80,7 +80,7 @@ class Reached:
 
 
 def largest_length(table: Tables) -> float:
-    """How far in mm a length is searched for from the table's: all its lengths together, a metre at least."""
+    """Search range in mm around the table's length: all its lengths together, at least a metre."""
     return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()) * 1000.0, LEAST_MM)
 
 
@@ -208,7 +208,7 @@ class Region:
         return self._kinked
 
     def followed(self, start: OpenTable, toward: Reals, steps: int = STEPS) -> Reached:
-        """The extent along one way, as far as it goes in some steps."""
+        """The extent in one direction, as far as some steps reach."""
         amounts, off, slope = start.amounts, start.off, start.slope
         places, trust, finished = start.places, FIRST_TRUST, False
         passed = [amounts]

@@ -126,7 +126,7 @@ def _fine_enough(evidence: Evidence, entry: TableNumber, tool: ToolRange) -> flo
 
 
 def _look(evidence: Evidence, entry: TableNumber) -> LookAtMotion | None:
-    """What to look at to determine a joint's direction, whatever else is open."""
+    """What to look at to determine a joint's direction, independent of other open entries."""
     robot = evidence.robot
     others = [each for each in evidence.allowed if entry.name not in each.names]
     own = [each for each in evidence.readings if entry.name in each.names]

@@ -10,7 +10,7 @@ In this order:
 - :class:`Components`: how far many tables are from the references' values, as each quantity measures it
   (:meth:`~er3a.references.quantities.Quantity.off`), those of one kind at once;
 - :func:`climber`: kernels that climb to the largest or smallest value of a measure of one arm, from where it was
-  attained before, by Newton's method with Levenberg's damping; bounds that are in the way are held, derivatives are
+  attained before, by Newton's method with Levenberg's damping; blocking bounds are held, derivatives are
   central differences;
 - :func:`peak`: the largest value of any smooth function over a box of joint angles: from the best of given points
   Newton's method, its Hessian made definite by the absolute values of its eigenvalues. Nothing is random;
@@ -473,7 +473,7 @@ KINK_STEP, KINK = 1.0, 1.0  # of an entry's scale, and of a half-width
 
 @dataclass(frozen=True)
 class Requirement:
-    """One number that is asked for.
+    """One required number.
 
     Attributes
     ----------
@@ -694,7 +694,7 @@ class Asked:
         return np.column_stack([self.plain_off(tables), *extremes])
 
     def slope(self, table: Tables, entries: Sequence[TableNumber]) -> Reals:
-        """Derivative (m, k) with respect to entries, in their scales, at the table whose ``off`` was asked for last."""
+        """Derivative (m, k) with respect to entries, in their scales, at the table whose ``off`` was computed last."""
         k = len(entries)
         scale = np.array([entry.scale for entry in entries])
         steps = SLOPE_STEP * np.concatenate([np.eye(k), -np.eye(k)]) * scale

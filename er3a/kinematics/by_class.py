@@ -84,7 +84,7 @@ class ClassRows:
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Solutions of one pose: those that stand alone, and self-motions, nearest to the reference first."""
+    """Solutions of one pose: isolated ones, and self-motions, nearest to the reference first."""
 
     alone: Reals
     motions: tuple[SelfMotionCurve, ...] = field(default=())
@@ -92,7 +92,7 @@ class Settled:
 
 @derived
 def arm_solver(robot: Robot) -> ArmSolver:
-    """The solver that the robot's geometry asks for."""
+    """The solver for the robot's class."""
     links = constant_links(robot)
     sliding = np.ascontiguousarray(robot.sliding)
     uncouple = uncoupling(robot)
@@ -112,8 +112,7 @@ def _linked(robot: Robot, chain: ChainSolver, uncouple: Reals) -> ChainSolver:
 
 
 def to_joints(robot: Robot, x: Reals) -> Reals:
-    """The manufacturer's values (..., n) of what the rows turn or shift by; angles in (-pi, pi], behind a gear those of
-    rows."""
+    """The manufacturer's values (..., n) for the rows' motion; angles in (-pi, pi], those of the rows if coupled."""
     uncouple = arm_solver(robot).uncouple
     u = robot.direction * (x - joint_starts(robot))
     return unwound(robot, u if uncouple is None else u @ uncouple.T)
@@ -248,7 +247,7 @@ def _starts(robot: Robot, count: int) -> Reals:
 
 
 def _apart(robot: Robot, rows: Reals) -> Reals:
-    """Rows (k, n) without those that stand twice."""
+    """Rows (k, n) without duplicates."""
     kept: list[Reals] = []
     for row in rows:
         if not any(float(np.abs(shortest_move(robot, row - other)).max()) < SAME_ROW for other in kept):
@@ -406,8 +405,8 @@ def to_pendant(pendant: Pendant, x: Reals, q_ref: Reals, q: Reals, inside: Flags
 
 
 def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
-    """Rows (S, n) that stand alone in their slots; those on a self-motion give way to its member nearest to the
-    reference, and what was found besides takes free slots."""
+    """Isolated solutions, one per slot (S, n); those on a self-motion are replaced by its member nearest to the
+    reference, and further solutions fill free slots."""
     kept, left = np.full_like(rows, np.nan), []
     for row in settled.alone:
         away = shortest_move(robot, rows - row)

@@ -161,7 +161,7 @@ def axes_of(links: Reals) -> tuple[Reals, Reals]:
 
 
 def meeting_point(axes: Reals, points: Reals) -> tuple[Reals, float]:
-    """Point nearest to all lines by least squares, and its largest distance from a line (m)."""
+    """Least-squares point nearest to all lines, and its largest distance from a line (m)."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     found = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[:, :, None]).reshape(-1), rcond=None)[0]
     meeting = found.astype(float)

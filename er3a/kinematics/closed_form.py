@@ -65,7 +65,7 @@ REACHED, TOO_FAR, TOO_NEAR, OFF_AXIS, ORIENTATION = 0, 1, 2, 3, 4
 
 
 class ArmConstants(NamedTuple):
-    """What the kernel takes of an arm: its axis lines as plain numbers, with all theta at 0.
+    """An arm's constants for the kernel: its axis lines as plain numbers, with all theta at 0.
 
     ``beside_6`` is a vector across axis 6; ``_in_tool`` marks components in the tool frame. ``reach`` and ``least`` are
     the stretched and the folded arm's length, ``elbow_angle`` turns the upper arm to the forearm, ``wrist_angle`` axis

@@ -29,7 +29,7 @@ CLEAR = 5e-3  # smallest singular value that the whole move must keep
 
 @dataclass(frozen=True, eq=False)
 class CuspidalMove:
-    """Two joint solutions (6,) of one pose, rad, and the least of the smallest singular values seen between them."""
+    """Two joint solutions (6,) of one pose, rad, and the minimum of the smallest singular values between them."""
 
     start: Reals
     end: Reals

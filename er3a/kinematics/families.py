@@ -11,7 +11,7 @@ Solutions with axes 4 and 6 in one line, in which joints 4 and 6 can turn agains
 The closed form alone does not show them all. Where the arm is nearly straight, rounding moves the elbow by 1e-8 rad
 without moving the wrist centre, and with it axis 4; where the wrist centre is on axis 1 (or 2), that joint is free and
 only one of its angles may put the axes in line. So joint 5 is set to where they are in line, and joints 1, 2, 3 and 6
-make up for it by least squares.
+compensate for it by least squares.
 """
 
 from __future__ import annotations
@@ -116,9 +116,9 @@ def _turned_about(robot: Robot, T: Reals, q: Reals, joint: int, slot: int) -> li
 
 
 def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
-    """The arm with its wrist put in line and joints 1, 2, 3 and 6 moved to make up for it; None if it misses the pose.
+    """The arm with its wrist put in line and joints 1, 2, 3 and 6 moved to compensate; None if it misses the pose.
 
-    At a fold these joints move the tool in second order only, and the least squares find the way.
+    At a fold these joints move the tool in second order only, which least squares can solve.
     """
     arm = wrist_partitioned_arm(robot)
     w = [tuple(axis) for axis in arm.axes.tolist()]
@@ -164,7 +164,7 @@ class Family(ByValue, Displayed):
     Attributes
     ----------
     kind : wrist, shoulder or elbow
-    q0 : (6,), rad, the member nearest to the reference (least root of summed squares), within the limits if any is
+    q0 : (6,), rad, the member nearest to the reference (Euclidean norm), within the limits if any is
     direction : (6,), rad per rad of t
     range : (2,), rad, smallest and largest t whose members stay within the limits, all between them too; a full circle
         if no member is within them
@@ -183,7 +183,7 @@ class Family(ByValue, Displayed):
 
     @cached_property
     def dimension(self) -> int:
-        """In how many ways the joints can move at most members with the tool at rest; 2 on a surface of solutions.
+        """Degrees of freedom of the joints at most members with the tool at rest; 2 on a surface of solutions.
 
         A surface is given by its curves through q0 alone.
         """

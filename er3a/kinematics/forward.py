@@ -19,7 +19,7 @@ from er3a.robots.robot import Robot
 Row = tuple[float, float, float, float]
 
 BLOCK = 64
-_COS, _SIN = 12, 13  # rows of scratch memory behind the 3 x 4 entries of a block of poses
+_COS, _SIN = 12, 13  # rows of scratch memory after the 3 x 4 entries of a block of poses
 
 
 def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None = None) -> Reals:
@@ -56,7 +56,7 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
 
 
 def forward_of_rows(robot: Robot, u: Reals) -> Reals:
-    """Poses (N, 4, 4) of the tool point for what the rows of the table move by, u (N, m), whatever couples them."""
+    """Poses (N, 4, 4) of the tool point for the motion of the table's rows, u (N, m), before any coupling."""
     out = np.empty((len(u), 4, 4))
     _forward(for_kernel(u), robot.direction, joint_starts(robot), robot.sliding, constant_links(robot), out)
     return out
@@ -108,7 +108,7 @@ def checked_joints(robot: Robot, q: Reals, argument: str = "q") -> Reals:
 
 
 def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Flags]:
-    """What kernels take: each row's motion u (N, m), its direction, what x begins with, and whether it slides."""
+    """Kernel arguments: each row's motion u (N, m), its direction, the start value of x, and whether it slides."""
     u = for_kernel(row_values(robot, q)).reshape(-1, robot.rows)
     return u, robot.direction, joint_starts(robot), robot.sliding
 

@@ -62,7 +62,7 @@ def inverse(
     redundancy : (k,), values of the redundancy parameters (``parameters_of``): an arm angle in rad, or a joint's value;
         None means those of ``q_ref``
     self_motion_rows : for an arm with one redundancy parameter, add for each self-motion the member nearest to
-        ``q_ref`` and the one farthest from the limits as rows; always done if no row has the parameter's value
+        ``q_ref`` and the one with the largest limit margin as rows; always done if no row has the parameter's value
 
     Raises
     ------
@@ -132,7 +132,7 @@ def _by_class(
     if len(solver.parameters) == 1:
         traced = by_class.LazySelfMotions(robot, T, q_ref, values)
         motions = tuple(traced) if self_motion_rows or not filled.size else ()
-    if solver.parameters:  # where two branches meet one stands; other arms' poses of that kind are settled
+    if solver.parameters:  # keep one where two branches meet; other arms' poses of that kind are settled
         apart = np.abs(shortest_move(robot, slots[0, filled, None] - slots[0, filled])).max(axis=2, initial=0.0)
         filled = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)]
     branches: list[int] = filled.tolist()

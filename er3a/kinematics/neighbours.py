@@ -22,9 +22,9 @@ COARSE_GRID, FINE_GRID, REFINEMENTS = 25, 9, 5
 
 
 SPARE_TURNS, SPARE_SHIFTS = np.radians([1.0, 2.0, 5.0, 10.0]), np.array([5.0, 10.0, 20.0, 50.0]) / 1000
-"""By how much beyond the least one an advised turn (rad) or shift (m) goes: the first that is usable."""
+"""Margins beyond the smallest turn (rad) or shift (m) for an advised one; the first usable margin is taken."""
 SHOWN_ANGLE, SHOWN_LENGTH = np.radians(0.01), 1e-4
-"""To which advised poses are rounded, so that they can be written down."""
+"""Rounding of advised poses."""
 CHUNK = 512
 
 Usable = Callable[[Reals], Flags]
@@ -41,7 +41,7 @@ class Neighbours:
     Attributes
     ----------
     orientation_ratio : part of 4000 random tool orientations at the target's position that have a solution
-    least_turn : rad, least rotation of the tool found that has one, position kept; None if none has
+    least_turn : rad, smallest rotation of the tool found that has one, position kept; None if none has
     turned_to : (3,), rad, roll, pitch and yaw where that turn ends; None if none has
     least_shift : m, smallest shift of the tool found that has one, orientation kept; None if none has
     shifted_to : (3,), m, where that shift ends; None if none has
@@ -69,8 +69,8 @@ def neighbours(robot: Robot, T: Reals, random: np.random.Generator, usable: Usab
 
     Parameters
     ----------
-    usable : which arms count. With it poses are such as can be advised: they lie by one of ``SPARE_TURNS`` or
-        ``SPARE_SHIFTS`` further on than the least that is usable, and are so as rounded to what is shown
+    usable : which arms count. If given, the poses are fit for advice: beyond the smallest usable turn or shift by one
+        of ``SPARE_TURNS`` or ``SPARE_SHIFTS``, and usable after rounding for display
     """
     turned = np.tile(T, (RANDOM_ORIENTATIONS, 1, 1))
     turned[:, :3, :3] = scipy.spatial.transform.Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()

@@ -262,7 +262,7 @@ def _pose_error(mask: Reals, length: float, w: Reals) -> None:
         small = (sine <= 1e-8) & (cosine > 0.0)
         stretch = 1.0 if small else theta / safe
         squared = 1.0 / 12.0 if small else 1.0 / (theta * theta) - (1.0 + cosine) / (2.0 * theta * safe)
-        # Next to half a turn the axis is lost; whatever it is, the error is to be seen as half a turn.
+        # Next to half a turn the axis is undefined; the error counts as half a turn about any axis.
         half_turn = (sine <= 1e-8) & (cosine <= 0.0)
         wx, wy, wz = np.pi if half_turn else wx * stretch, wy * stretch, wz * stretch
         dx, dy, dz = px - tx, py - ty, pz - tz
@@ -534,7 +534,7 @@ def solve(
     respect_limits : keep the joint limits inside the iteration; otherwise angles are returned in (-pi, pi]
     restarts : number of random starts after ``q0`` (0 to 65535)
     position_tolerance : m; rotation_tolerance : rad
-    seed : of the random starts; equal seeds give equal results, whatever the number of threads
+    seed : of the random starts; equal seeds give equal results for any number of threads
 
     Raises
     ------

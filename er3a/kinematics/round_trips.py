@@ -26,7 +26,7 @@ NEAR_WRIST_DEG = NEAR_ELBOW_DEG = 0.5
 NEAR_SHOULDER_MM = 1.0
 NEAR = NearSingular(np.radians(NEAR_WRIST_DEG), np.radians(NEAR_ELBOW_DEG), NEAR_SHOULDER_MM / 1000)
 BLOCK = 20_000
-MOST_BY_CLASS = 500  # poses that arms without a spherical wrist are asked for in validation
+MOST_BY_CLASS = 500  # poses solved in validation for arms without a spherical wrist
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class SlotRoundTrips:
 def batch_round_trips(robot: Robot, random: np.random.Generator, poses: int) -> BatchRoundTrips:
     """Send that many joint vectors, uniform within the limits, to poses and back.
 
-    Arms with more than six joints are asked for solutions at the redundancy parameter of the joints drawn.
+    Arms with more than six joints are solved at the redundancy parameter of the joints drawn.
     """
     own = random.uniform(robot.lower, robot.upper, size=(poses, robot.joints))
     T = forward(robot, own)

@@ -28,12 +28,12 @@ class SelfMotionCurve(ByValue, Displayed):
 
     Attributes
     ----------
-    q0 : (n,), rad or m, the member nearest to the reference (least root of summed squares), within the limits if
+    q0 : (n,), rad or m, the member nearest to the reference (Euclidean norm), within the limits if
         ``within_limits``
     direction : (n,), rad or m per rad of t, at q0
     range : (2,), smallest and largest t up to which all members from q0 on are within the limits; of a curve of which
         none is, one lap
-    max_margin_member : (n,), the member found farthest from all joint limits; max_margin : its distance from them
+    max_margin_member : (n,), the member with the largest margin to all joint limits; max_margin : that margin
     dimension : 1; above it, this curve is one of many on a surface of solutions
     branches : numbers of the solutions that lie on it
     """
@@ -95,7 +95,7 @@ def self_motion_of(robot: Robot, T: Reals, chain: PoseChain, curve: TracedCurve,
     made: list[SelfMotionCurve] = []
     parts = _parts(inside, near - q, curve.closed) if inside.any() else [np.arange(len(q))]
     parts.sort(key=lambda part: float(np.linalg.norm(near[part] - q_ref, axis=1).min()))
-    if curve.dimension > 1:  # one curve of a surface: the part nearest to the reference stands for it
+    if curve.dimension > 1:  # one curve of a surface: only the part nearest to the reference
         parts = parts[:1]
     for part in parts:
         if any(_reaches(motion, lengths[part]) for motion in made):
@@ -190,7 +190,7 @@ def to_rows(robot: Robot, q: Reals) -> Reals:
 
 
 def _least(cost, lengths: Reals, best: int, closed: bool) -> float:  # type: ignore[no-untyped-def]
-    """Where the cost is least between the points beside the best one, by narrowing."""
+    """The minimum of the cost between the neighbours of the best point, by narrowing."""
     low, high = lengths[max(best - 1, 0)], lengths[min(best + 1, len(lengths) - 1)]
     if closed and best == 0:
         low = lengths[-2] - lengths[-1]

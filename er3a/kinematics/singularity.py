@@ -208,7 +208,7 @@ class RankLoss:
     ----------
     t, until : s; equal where the motion only crosses
     crossing : whether the determinant changes sign (six joints), or the value falls to rounding
-    smallest : least smallest singular value in the stretch (linear rows over the arm's length)
+    smallest : minimum of the smallest singular value in the stretch (linear rows over the arm's length)
     at : s, where that is; axes : numbers from 1 of the axes that become dependent there
     """
 
@@ -230,9 +230,9 @@ def scaled_jacobian(robot: Robot, q: Reals) -> Reals:
 
 @derived
 def change_per_joint(robot: Robot) -> Reals:
-    """B (n,): by how much, at most, the scaled Jacobian changes in Frobenius norm per rad (or arm's length) of a joint.
+    """B (n,): bound of the scaled Jacobian's change in Frobenius norm per rad (or arm's length) of a joint.
 
-    A joint turns the axes behind it, and moves their points and the tool point by at most its lever, so each column
+    A joint turns the axes after it, and moves their points and the tool point by at most its lever, so each column
     changes by at most ``sqrt(1 + (2 R / length)^2)`` where R is the longest stretched distance along the arm.
     """
     points, T = axes_at_zero_theta(robot)[1:]
@@ -374,7 +374,7 @@ LEAST_SINGULAR_VALUE = 0.02
 class NearSingular:
     """Distance from each singular set below which a pose is near-singular.
 
-    ``smallest`` is the smallest singular value (:mod:`er3a.kinematics.singularity`) for arms without those sets.
+    ``smallest`` is the smallest singular value (:mod:`er3a.kinematics.singularity`) for arms without singular sets.
     """
 
     wrist_rad: float
@@ -402,7 +402,7 @@ class NearSingular:
         return near
 
     def margin(self, robot: Robot, q: Reals) -> Reals:
-        """Least of the ratios (N,) at joint angles (N, 6) in rad; -1 where they are NaN, for unreachable poses."""
+        """Minimum of the ratios (N,) at joint angles (N, 6) in rad; -1 where they are NaN, for unreachable poses."""
         if not has_branches(robot):
             smallest = np.linalg.svd(scaled_jacobian(robot, q), compute_uv=False)[..., -1]
             return np.asarray(np.nan_to_num(smallest / self.smallest, nan=-1.0))

@@ -99,9 +99,9 @@ class ClosedForm(Finding):
 
 
 class DependentJoints(Finding):
-    """The joints move the tool in fewer ways than there are joints (six at most), such as two parallel slides.
+    """The arm has fewer degrees of freedom than joints (six at most), for example two parallel slides.
 
-    Each pose that they reach, they reach in infinitely many ways.
+    Each pose within reach has infinitely many solutions.
     """
 
 
@@ -119,7 +119,7 @@ class ByClass(Finding):
     ----------
     certain : whether the solver left no doubt that these are all
     named : whether signs of factors separate the solutions, so that branches have names; else they are numbered
-    cuspidal : whether :mod:`er3a.kinematics.cuspidal` was asked and joined two solutions without a singularity
+    cuspidal : whether :mod:`er3a.kinematics.cuspidal` was run and joined two solutions without a singularity
     """
 
     arm_class: ArmClassCode
@@ -238,8 +238,8 @@ class Solutions(ByValue, Displayed):
     families : of ``inverse``: continua of solutions, where a joint can turn with the tool at rest; of arms with more
         than six joints traced when they are first read
     turn_range : (..., 6, 2) int8, smallest and largest number of whole turns that can be added to each joint within its
-        limits (smallest above largest: none); None unless ``inverse_batch`` was asked for it
-    position_error, rotation_error : (...,), m and rad, of the degrees of freedom that ``solve`` was asked for
+        limits (smallest above largest: none); None unless ``inverse_batch`` was called with ``turns``
+    position_error, rotation_error : (...,), m and rad, of the degrees of freedom in the ``mask`` of ``solve``
     starts : (...,) int, starts that ``solve`` used; 0 where none succeeded
     certain : of ``inverse_batch`` for other classes (N,): whether the solver left no doubt that these are all
     """
@@ -347,10 +347,10 @@ class Solutions(ByValue, Displayed):
 
 
 MANY_TARGETS = 1000
-"""Of more targets than these stages keep of each arm the turn that is nearest to the reference, and no others."""
+"""Beyond this number of targets a stage keeps of each solution only the whole turn nearest to the reference."""
 
 TargetOutcome = Literal["reached", "unreachable", "leaves limits", "collides"]
-"""Whether an admissible solution exists, or what stands against it."""
+"""Whether an admissible solution exists, or what rules it out."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

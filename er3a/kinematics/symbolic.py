@@ -52,7 +52,7 @@ def arm_transform(robot: Robot) -> SymbolicTransform:
     """From the tool to the base frame, base and tool included."""
     links = constant_links(robot)
     whole = _constant(links[0])
-    group: tuple[int, ...] = ()  # rows that turn about parallel axes, whose rotation still stands to the right of whole
+    group: tuple[int, ...] = ()  # rows that turn about parallel axes, whose rotation still follows whole on the right
     for k in range(robot.rows):
         if robot.sliding[k]:  # along the group's axes: the order of the two does not matter
             whole = _product(whole, _motion(robot, k))

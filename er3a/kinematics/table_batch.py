@@ -80,7 +80,7 @@ def frames_of(tables: Tables, robot: Robot, q: Reals) -> Reals:
 
 
 def kernel_columns(tables: Tables) -> tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]:
-    """What kernels take of tables: a, alpha, beta and d (H, m + 1) of the link after each joint, the base's first, then
+    """Kernel arguments of tables: a, alpha, beta and d (H, m + 1) of the link after each joint, the base's first, then
     direction, offset and sliding (H, m)."""
     count, joints = tables.d.shape
     a, alpha, beta, d = np.zeros((4, count, joints + 1))

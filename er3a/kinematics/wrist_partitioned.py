@@ -169,7 +169,7 @@ def recognised(axes: Reals, points: Reals, T_base_tool: Reals) -> WristPartition
 
 
 def _couples_the_arm_alone(coupling: Reals) -> bool:
-    """Whether a coupling (6, 6) leaves the wrist alone, and takes whole turns to whole turns both ways."""
+    """Whether a coupling (6, 6) leaves the wrist alone, and maps whole turns to whole turns in both directions."""
     rest = coupling.copy()
     rest[:3, :3] = np.eye(3)
     whole = np.array_equal(coupling, np.round(coupling)) and round(abs(float(np.linalg.det(coupling)))) == 1

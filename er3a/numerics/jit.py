@@ -1,4 +1,4 @@
-"""The one way this package compiles kernels, and shares the rows of a batch out to threads.
+"""How this package compiles kernels, and divides the rows of a batch among threads.
 
 numba does not notice when a kernel in one file calls one in another file that changed, so a plain ``cache=True`` can
 serve stale machine code. Each kernel is therefore kept in a folder named by a digest of its file and of all files with

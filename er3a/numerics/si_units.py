@@ -100,9 +100,9 @@ def filled(kind: Any, found: object, given: Mapping[str, Any]) -> dict[str, Any]
 
 
 def in_si(kind: type[KindT], entry: object, /, **given: Any) -> KindT:
-    """A dataclass of the library, filled with what a file says in its own units: the way back from :func:`stated`.
+    """A dataclass of the library from a file's values in the file's units: the inverse of :func:`stated`.
 
-    What is given stands in place of what the entry says. Fields that neither fills keep their defaults.
+    Given values replace those of the entry. Fields that neither fills keep their defaults.
     """
     said = {split_unit(name): value for name, value in vars(entry).items()}
     found = {stem: plain(to_si(unit, value)) for (stem, unit), value in said.items()} | given

@@ -12,10 +12,10 @@ References
 
 The arm angle of a seven-joint arm along a tool path: the one that keeps the most distance from the limits.
 
-The arm angle is a polynomial of degree 2 in the share of the path, given by its values at the start, half way and at
+The arm angle is a polynomial of degree 2 in the share of the path, given by its values at the start, halfway and at
 the end. The margins of all eight solutions on a grid of path positions and arm angles show which of many such
 polynomials is best; it is improved by smaller and smaller changes. If none keeps the limits, polynomials of higher
-degree are fitted to a way through the grid: the smoothest of those that keep half of the greatest possible margin. The
+degree are fitted to a path through the grid: the smoothest of those that keep half of the largest possible margin. The
 choice proves nothing: the joint motion is checked exactly, like every other motion, and another law might follow a path
 that this one can't.
 """
@@ -47,7 +47,7 @@ from er3a.robots.whole_turns import shortest_move, take_turns_off, turns_inward,
 
 ANGLES = 72  # of the grid, over a turn
 BEGUN_AT, FEW_CHANGES = 24, 13  # arm angles at the start where none is given; then changes from it
-CHANGES = 25  # from the start to half way and to the end, up to half a turn
+CHANGES = 25  # from the start to halfway and to the end, up to half a turn
 LEAP = 0.6  # rad, m, that a joint may move between two of the poses; a turn more, or a singularity, would be more
 SLOPE_PRICE = 1e-3  # rad of margin that a change by 1 rad has to gain
 ROUNDS, FIRST_STEP = 7, np.radians(7.5)
@@ -56,8 +56,8 @@ DEGREES, STEPS = (4, 6, 8, 10, 12), np.arange(-3, 4)  # of bent laws; steps of t
 
 @dataclass(frozen=True, eq=False)
 class ArmAngleLaw:
-    """An arm angle along a path: values (3,), rad, at the start, half way and at the end, or Chebyshev series (k,) of a
-    ``bent`` one over the way.
+    """An arm angle along a path: values (3,), rad, at the start, halfway and at the end, or Chebyshev series (k,) of a
+    ``bent`` one over the path.
 
     ``slot`` is the solution that keeps the smallest distance ``margin`` (rad, m) from the joint limits.
     """
@@ -68,7 +68,7 @@ class ArmAngleLaw:
     bent: bool = False
 
     def at(self, share: Reals) -> Reals:
-        """Arm angles (N, 1) at shares (N,) of the way."""
+        """Arm angles (N, 1) at shares (N,) of the path."""
         if self.bent:
             return np.asarray(chebyshev.chebval(2 * share - 1, self.values), dtype=float)[:, None]
         return _quadratic(self.values, share)[:, None]
@@ -77,11 +77,11 @@ class ArmAngleLaw:
 def laws_with_most_margin(
     robot: Robot, T: Reals, share: Reals, start: tuple[float, Reals] | None, slots: Integers
 ) -> list[ArmAngleLaw]:
-    """The best law of each slot, most margin first; slots that don't reach all poses are left out.
+    """The best law of each slot, largest margin first; without slots that miss a pose.
 
     Parameters
     ----------
-    T : (K, 4, 4), poses of the tool, m, at shares (K,) of the way
+    T : (K, 4, 4), poses of the tool, m, at shares (K,) of the path
     start : the arm angle at the start, rad, and the joints (n,), rad; None leaves them open, whole turns too
     slots : (s,), those that may be taken
     """
@@ -136,7 +136,7 @@ def _margins_alone(robot: Robot, q: Reals) -> Reals:
 
 
 def _smooth_angles(robot: Robot, margins: Reals, q: Reals) -> Reals | None:
-    """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the way with the smallest sum of
+    """Steps of the grid (K,) from its first angle, not taken modulo a turn, along the path with the smallest sum of
     squared steps that keeps half of the margin that one can keep; None if none keeps the limits.
 
     Parameters
@@ -195,7 +195,7 @@ class _LawSearch:
 
     def _margins(self, q: Reals, place: Integers) -> Reals:
         """Smallest distances (L, s) from the limits, rad, of motions through rows (K, A, s, n) at places (K, L) in A:
-        by turns that hold on the whole way. Less than nothing where a joint leaps, -inf where a pose is not reached."""
+        by turns that hold on the whole path. Negative where a joint jumps, -inf where a pose is not reached."""
         robot, count = self.robot, self.robot.joints
         turns = whole_turns(robot)
         near = np.zeros(count) if self.start is None else self.start
@@ -298,7 +298,7 @@ def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) 
     Parameters
     ----------
     q_start : (n,), rad or m, joints whose tool meets the path's first pose; None for those of the closed form that keep
-        the limits longest, then farthest from them
+        the limits longest, then with the largest margin
 
     Raises
     ------

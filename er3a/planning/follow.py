@@ -1,12 +1,12 @@
 """Joint angles along a tool path: the best sequence of closed-form branches as a whole.
 
-On the grid of :mod:`er3a.planning.follow`, dynamic programming [1]_ finds for each branch at the start the best way to
-continue to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time), least time
-outside the limits, of joints and of sums of joints, least joint travel, and among equals the largest distance from the
-limits. Whole turns need no states of their own: along a continuous sequence the first angle fixes them, so each joint's
-turn is chosen once per stretch, by least time outside the limits, then nearest to the joints before. The best whole
-sequence over all branches at the start is taken; given start joints allow only the branches that they lie on (several,
-if the start is singular).
+On the grid of :mod:`er3a.planning.follow`, dynamic programming [1]_ finds for each branch at the start the best
+continuation to the end. Best means, in this order: fewest jumps (a joint would have to move far in no time), shortest
+time outside the limits, of joints and of sums of joints, least joint travel, and among equals the largest distance from
+the limits. Whole turns are no states of the search: along a continuous sequence the first angle fixes them, so each
+joint's turn is chosen once per stretch, by shortest time outside the limits, then nearest to the joints before. The
+best sequence over all branches at the start is taken; given start joints allow only the branches that they lie on
+(several, if the start is singular).
 
 An unreachable pose interrupts the sequence; the stretch after it is solved separately.
 
@@ -62,7 +62,7 @@ class Branches:
 
     Attributes
     ----------
-    t : (N,), s, rising; progress : (N,), share of the way
+    t : (N,), s, rising; progress : (N,), share of the path
     q : (N, 8, 6), rad in (-pi, pi], NaN where a branch has no solution
     free_wrist : (N, 8) bool, whether joints 4 and 6 can turn against each other with the tool at rest (of arms with
         parallel axes 2, 3 and 4: those with joint 6)
@@ -235,7 +235,7 @@ def _kept(values: Reals, unknown: Flags) -> Reals:
 
 
 REGULAR = 1e-6  # smallest singular value (scaled) down to which the Jacobian is solved
-BESIDE = (1e-4, 1e-3)  # shares of the way to step aside from a singular point
+BESIDE = (1e-4, 1e-3)  # shares of the path to step aside from a singular point
 AGREE = 1e-2  # relative, between the two sides of a singular point
 JACOBIAN_STEP = 1e-6
 
@@ -246,7 +246,7 @@ class BranchJump(ByValue):
 
     Attributes
     ----------
-    t : s; joint : 1..6, the one that would have to move farthest; angle : rad
+    t : s; joint : 1..6, the one with the largest jump; angle : rad
     """
 
     t: float
@@ -256,13 +256,13 @@ class BranchJump(ByValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Followed(ByValue, Displayed):
-    """Joint angles along a line, at more times than asked for where its branches come near to each other.
+    """Joint angles along a line, with additional times where its branches come near to each other.
 
     :meth:`joints` solves the line at any times: ``er3a.follow(robot, line, t).joints(t)`` has a row for each of ``t``.
 
     Attributes
     ----------
-    t : (N,), s, rising; progress : (N,), share of the way (0..1)
+    t : (N,), s, rising; progress : (N,), share of the path (0..1)
     q : (N, 6), rad, manufacturer's angles, continuous but for ``jumps``; NaN where no branch reaches the pose
     slot : (N,) int, closed-form branch; -1 where none
     start_turn : (6,), rad, turn at rest from the given start joints to the beginning; not 0 only at a singular start
@@ -296,7 +296,7 @@ class Followed(ByValue, Displayed):
         return self.joints_at(self.line.progress(t)[0])
 
     def joints_at(self, progress: Reals) -> Reals:
-        """Joint angles (..., 6) in rad at shares of the way (...,); NaN where unreachable."""
+        """Joint angles (..., 6) in rad at shares of the path (...,); NaN where unreachable."""
         progress = np.asarray(progress, float)
         return self._solve(progress.reshape(-1)).reshape(*progress.shape, 6)
 
@@ -341,7 +341,7 @@ class Followed(ByValue, Displayed):
         return nearest
 
     def derivatives(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
-        """Joint angles and their first and second derivative by progress, at shares of the way (n,) [2]_.
+        """Joint angles and their first and second derivative by progress, at shares of the path (n,) [2]_.
 
         With the tool's twist per unit of progress, J q' = twist and J q'' = twist' - J' q'. Where the Jacobian is
         singular, the derivatives are those just beside, if both sides agree; else NaN: no finite joint speed follows
@@ -371,7 +371,7 @@ class Followed(ByValue, Displayed):
         return self.line.length / characteristic_length(self.robot) + self.line.turned
 
     def _beside(self, progress: Reals, aside: float) -> tuple[Reals, Reals]:
-        """Derivatives on both sides of points of the way, averaged where they agree; NaN elsewhere."""
+        """Derivatives on both sides of points of the path, averaged where they agree; NaN elsewhere."""
         before = np.where(progress < aside, progress + aside, progress - aside)
         after = np.where(progress > 1 - aside, progress - aside, progress + aside)
         sides = [self.through_jacobian(self.joints_at(side), side) for side in (before, after)]
@@ -410,7 +410,7 @@ EQUAL = 6  # digits of rad to which travel and margin count
 
 @dataclass(frozen=True, eq=False)
 class _Sequence:
-    """One way through a stretch: angles (n, 6) in rad, slots (n,), jumps after points (n - 1,), and its cost."""
+    """One sequence through a stretch: angles (n, 6) in rad, slots (n,), jumps after points (n - 1,), and its cost."""
 
     q: Reals
     slot: Integers
@@ -488,8 +488,8 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: Integers, before: R
 
 
 def _with_turns(robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None) -> _Sequence:
-    """Make angles continuous and choose each joint's whole turns: those that leave its limits, and those of sums of
-    joints, for the least part of the time, then the nearest."""
+    """Make angles continuous and choose each joint's whole turns: those with the shortest time outside the limits of
+    joints and of sums of joints, then the nearest."""
     steps = turned_difference(q[:-1], q[1:])
     unwound = q[0] + np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
     reference = np.zeros(6) if before is None else before
@@ -519,11 +519,11 @@ def _cheapest(
 ) -> tuple[float, Reals]:
     """For what part of the time a motion q (N, 6) leaves limits, each counted, and the turns (6,) of its joints.
 
-    Joints that sums are limited of are chosen together, the others each by itself.
+    Joints whose sum is limited are chosen together, the others one by one.
 
     Parameters
     ----------
-    share : (N,), part of the time that each point stands for
+    share : (N,), fraction of the time that each point represents
     priced : for each joint, its turns, for what part of the time it leaves its limits, and how far it is at first
     """
     choice = [min(each) for each in priced]

@@ -2,7 +2,7 @@
 
 Of any motion: the determinant's factors (:func:`er3a.kinematics.singularity.determinant_factors`) are signed distances
 from the three singular sets. A change of sign is a crossing, refined by Brent's method [1]_ on the motion; a local
-minimum of the distance is the root of its slope, found the same way. A limit is left where a sampled function changes
+minimum of the distance is the root of its slope, found likewise. A limit is left where a sampled function changes
 its sign, or peaks between samples.
 
 For motions that are polynomials in time the checks are exact, for arms with a spherical wrist and parallel axes 2 and
@@ -310,7 +310,7 @@ class RateLimit:
     order : 1 for speed, 2 for acceleration, 3 for jerk
     most : (n,), rad/s, rad/s^2 or rad/s^3; NaN where there is none
     assumed : (n,) bool, whether it is assumed
-    step_allowed : (n,), rad/s^2, by which an acceleration may step all the same; for jerk
+    step_allowed : (n,), rad/s^2, by which an acceleration may step without a fault; for jerk
     sliding : (n,) bool, whether the joint is prismatic: m instead of rad; None for no joint
     """
 
@@ -479,8 +479,8 @@ def _where_positive(t: Reals, values: Reals, function: Callable[[float], float])
 def _peaks_between(t: Reals, values: Reals, function: Callable[[float], float]) -> list[tuple[float, float, float]]:
     """Stretches of positive values about a peak between grid points that are not positive themselves.
 
-    A peak is searched for where the parabola through a highest point and its neighbours rises half way to zero at
-    least.
+    A peak is searched for where the parabola through a highest point and its neighbours rises at least halfway to
+    zero.
     """
     inner = values[1:-1]
     tops = 1 + np.flatnonzero((inner <= 0) & (inner > values[:-2]) & (inner >= values[2:]))

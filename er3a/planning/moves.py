@@ -1,10 +1,10 @@
 """Moves between two points: in joint space, and along a straight line of the tool.
 
 Joint moves run on a quintic; lines on a quintic or a trapezoid, from rest to rest. The orientation turns
-about one fixed axis at a rate proportional to the position's (slerp [1]_), the shorter way round.
+about one fixed axis at a rate proportional to the position's (slerp [1]_), in the shorter direction.
 
-A rotation by exactly half a turn is equally short both ways. It is then taken counter-clockwise as seen from above:
-of the two opposite axes, the one that points up (+Z of the base), if level the one towards +Y, if that is 0 too
+A rotation by exactly half a turn is equally short in both directions. It is then taken counter-clockwise as seen from
+above: of the two opposite axes, the one that points up (+Z of the base), if level the one towards +Y, if that is 0 too
 towards +X. A path may choose the other one by naming an axis.
 
 ``jtraj``, ``ctraj`` and ``rpy`` have the names of the Robotics Toolbox [2]_. Times are in seconds.
@@ -54,23 +54,23 @@ class ToolPath(Protocol):
     def turned(self) -> float: ...
 
     def progress(self, t: Reals) -> Rates:
-        """Share of the way done (0..1, never falling) at times (...,) in s, with first and second derivative."""
+        """Share of the path done (0..1, never falling) at times (...,) in s, with first and second derivative."""
 
     def poses(self, progress: Reals) -> Reals:
-        """T_base_tool (..., 4, 4) at shares of the way (...,)."""
+        """T_base_tool (..., 4, 4) at shares of the path (...,)."""
 
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
         """Velocity of the tool per unit of progress, and its derivative by progress: (..., 6), m then rad, base."""
 
     def arc_length(self, progress: Reals) -> Reals:
-        """Length of the tool point's path so far, m, at shares of the way (...,)."""
+        """Length of the tool point's path so far, m, at shares of the path (...,)."""
 
     @property
     def law(self) -> TimeLaw: ...
 
     @property
     def edges(self) -> Reals:
-        """Shares of the way (m,), from 0 to 1, between which the twist and its derivative are continuous."""
+        """Shares of the path (m,), from 0 to 1, between which the twist and its derivative are continuous."""
 
     def twist_bounds(self, start: Reals, end: Reals) -> Reals:
         """Bounds (k, 4, 2) of the sizes of twist and of its first three derivatives by progress.
@@ -137,7 +137,7 @@ class Segment(ByValue, ABC):
 
     @abstractmethod
     def points(self, progress: Reals) -> Reals:
-        """The tool point (..., 3), m, at shares of the way (...,)."""
+        """The tool point (..., 3), m, at shares of the path (...,)."""
 
     @abstractmethod
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
@@ -242,7 +242,7 @@ def line(
 
 
 def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None = None) -> tuple[Reals, bool]:
-    """Rotation vector (3,) in rad in the base frame, the shorter way round, and whether it is half a turn.
+    """Rotation vector (3,) in rad in the base frame, in the shorter direction, and whether it is half a turn.
 
     Raises
     ------

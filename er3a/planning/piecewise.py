@@ -81,7 +81,7 @@ class Pieces:
 
         Parameters
         ----------
-        found : those of the pieces before, which are gone on with
+        found : those of the pieces before, which are continued
         """
         found = [] if found is None else found
         for i in np.flatnonzero(self.range[1] > level).tolist():
@@ -213,12 +213,12 @@ class PiecewiseMotion(ByValue):
         return _sizes(self.velocity), _sizes(self.acceleration)
 
     def scaled(self, factor: float) -> PiecewiseMotion:
-        """The same way in ``factor`` times the time."""
+        """The same path in ``factor`` times the time."""
         return PiecewiseMotion(self.times * factor, self.angle, self.velocity / factor, self.acceleration / factor**2)
 
 
 class MotionInParts:
-    """A motion of so many polynomials that they are made part by part, whenever they are wanted.
+    """A motion of so many polynomials that they are made part by part, on demand.
 
     Attributes
     ----------
@@ -290,7 +290,7 @@ def _joined(series: list[Reals]) -> Reals:
 
 def chebyshev_times(times: Reals, degree: int) -> tuple[Reals, Reals]:
     """Of pieces with ends (m + 1,): their ``degree + 1`` Chebyshev points (m, d + 1), and points between and at the
-    ends (m, d + 2), where a polynomial through the former is farthest from what it interpolates."""
+    ends (m, d + 2), where a polynomial through the former has its largest interpolation error."""
     k, spans = np.arange(degree + 2), np.diff(times)[:, None]
     nodes, between = (np.cos(np.pi * part / (degree + 1)) for part in (k[:-1] + 0.5, k))
     first, second = (times[:-1, None] + spans * (x + 1) / 2 for x in (nodes, between))

@@ -32,7 +32,7 @@ class Times:
     Attributes
     ----------
     times : (m,), s, rising from 0
-    corner : (m,) int, not falling, from 0 to the last; one that stands twice is a halt there
+    corner : (m,) int, not falling, from 0 to the last; a repeated corner is a halt there
     """
 
     times: Reals
@@ -100,7 +100,7 @@ def trapezoid(t: Reals, duration: float, ramp: float) -> Rates:
 
 
 class TimeLaw(Protocol):
-    """Share of the way done (0..1) at times (...,) in s, with its first and second derivative by time;
+    """Share of the path done (0..1) at times (...,) in s, with its first and second derivative by time;
     :class:`er3a.Er3aError` beyond start and end.
 
     Attributes
@@ -124,7 +124,7 @@ class FromRestToRest:
 
     Attributes
     ----------
-    times, progress : (k,), s and shares of the way, of the halts, start and end among them; both rise
+    times, progress : (k,), s and shares of the path, of the halts, start and end among them; both rise
     ramp : share of the time of each ramp of a trapezoid
     """
 
@@ -159,11 +159,11 @@ class FromRestToRest:
 
 
 class Timetable:
-    """Through given shares of the way at given times: cubic between them, never backwards [3]_, at rest at both ends.
+    """Through given shares of the path at given times: cubic between them, never backwards [3]_, at rest at both ends.
 
     Parameters
     ----------
-    times, progress : (k,), s (rising) and shares of the way from 0 to 1 (not falling)
+    times, progress : (k,), s (rising) and shares of the path from 0 to 1 (not falling)
     halts : (k,) bool, where the motion has to stop besides
     """
 

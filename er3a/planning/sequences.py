@@ -242,7 +242,7 @@ class SegmentPath(ByValue):
     ----------
     duration : s
     law : when the tool is where
-    curve : position and rotation vector (k = 6) over the share of the way
+    curve : position and rotation vector (k = 6) over the share of the path
     origins : (n, 3, 3), the orientation that each piece's rotation vectors start from
     arcs : per piece the arc that it is a part of, else None
     arc_shares : (n, 2), where on its arc a piece starts and ends
@@ -326,7 +326,7 @@ class SegmentPath(ByValue):
         return self.turns
 
     def _lengths(self, start: Reals, end: Reals) -> Reals:
-        """Length of the tool point's path (...,) between shares (...,) of the way, both on one piece."""
+        """Length of the tool point's path (...,) between shares (...,) of the path, both on one piece."""
         half = (end - start) / 2
         at = start[..., None] + half[..., None] * (1 + GAUSS_POINTS)
         speeds: Reals = np.linalg.norm(self._values(at)[1][..., :3], axis=-1)
@@ -356,7 +356,7 @@ class JointSequence:
     ----------
     duration : s
     law : when the arm is where
-    curve : joint angles (k = 6), rad, over the share of the way
+    curve : joint angles (k = 6), rad, over the share of the path
     """
 
     duration: float
@@ -402,15 +402,15 @@ def segment_path(
 
     Parameters
     ----------
-    segments : each starting where the one before ends, none without way; their durations are of no account
+    segments : each starting where the one before ends, none of length 0; their durations are ignored
     blends : (n - 1,), m, over which length on either side each corner is rounded; 0 for a corner to stop at
-    timing : s, shared between halts by the way; or the times of the corners
+    timing : s, divided between halts by path length; or the times of the corners
     ramp : share of the time of each ramp of a trapezoid between halts; None for the quintic
 
     Raises
     ------
     PathError
-        for a segment without way, or a rounding longer than half of a side
+        for a segment of length 0, or a rounding longer than half of a side
     """
     sizes = np.array([max(part.length, part.turned * TURN_LENGTH) for part in segments])
     _check(sizes, blends, 1000.0, "mm")
@@ -486,7 +486,7 @@ def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
 
 
 def _beside(part: Segment, share: float, size: float, turn: float) -> tuple[Reals, Reals, Reals]:
-    """Position and rotation vector (6,) of a segment beside a corner, with derivatives by its way."""
+    """Position and rotation vector (6,) of a segment beside a corner, with derivatives by its path length."""
     first, second = part.twists(np.array(share))
     value = np.concatenate([part.points(np.array(share)), turn * part.rotation])
     return value, first / size, second / size**2

@@ -40,7 +40,7 @@ SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
 class MustStandStill(Finding):
-    """The arm would have to stand still on the path."""
+    """The arm would have to stop on the path."""
 
 
 class NoTimeLawFound(Finding):
@@ -228,7 +228,7 @@ def path_through(q: Reals, s: Reals) -> tuple[Integers, Reals, scipy.interpolate
 
     Returns
     -------
-    kept : which nodes are left; s : (k,), where they stand, or more places on a path of two; spline
+    kept : which nodes are left; s : (k,), their places, or more places on a path of two; spline
     """
     kept = np.flatnonzero(np.concatenate([[True], np.diff(s) > SAME_NODE]))
     if len(kept) < 2:

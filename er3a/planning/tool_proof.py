@@ -1,13 +1,13 @@
 """Proven bounds of an arm's motion between the solved points of a tool path.
 
-With q(s) the joints along the share s of the way, J q' = v, where v is the tool's twist per unit of s (its linear part
+With q(s) the joints along the share s of the path, J q' = v, where v is the tool's twist per unit of s (its linear part
 divided by a characteristic length). From one solved pose the motion is continued by bounds alone: as long as the joints
 have turned by little, the inverse of J has grown by little, so that::
 
     |q''| <= B (|v'| + C V^2),   |q'''| <= B (|v''| + 3 C V A + C V^3),   B = b / (1 - b sqrt(n) C h V),
     |q''''| <= B (|v'''| + C (4 V Z + 3 A^2 + 6 V^2 A + V^4)),
 
-with b the norm of the inverse at the pose solved, h the way from there, V, A, Z sums over the joints of the sizes of
+with b the norm of the inverse at the pose solved, h the path from there, V, A, Z sums over the joints of the sizes of
 q', q'', q''', and C the largest length of a column of J (turning an earlier joint turns a column, turning a later one
 turns its lever: no derivative of a column is longer). Under a coupling u = c q, V is the sum of the rows' rates, C is
 of the rows' columns, and the norm of c goes with sqrt(n). Where the bound on q'' that is put in comes out no greater,
@@ -459,7 +459,7 @@ def _rate_bounds(
 
 
 def _mean_thirds(followed: Followed, start: Reals, end: Reals) -> tuple[Reals, Reals, Reals]:
-    """Mean jerk (k, n) over intervals, mean third derivative by the share of the way, and the shares' differences (k,).
+    """Mean jerk (k, n) over intervals, mean third derivative by share of the path, and the shares' differences (k,).
 
     There is a time in each interval at which a joint's jerk is the mean one; likewise its third derivative.
     """

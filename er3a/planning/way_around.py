@@ -3,7 +3,7 @@
 RRT-Connect [1]_ of OMPL [2]_ connects the ends by straight moves in joint space. A move is tried by conservative
 advancement: if the arm has clearance d, no body can be touched before the joints' turns, each times the longest lever
 that it swings, add up to d. Random short cuts follow, then corners are rounded as far as they stay clear, and the
-rounded way is timed. The result is proven on the timed curve itself: its smallest clearance, found to within a depth
+rounded path is timed. The result is proven on the timed curve itself: its smallest clearance, found to within a depth
 (:mod:`er3a.collision.along`), exceeds that depth, so that nothing touches at any time.
 
 The search ends after a number of rounds, not of seconds, and draws from its own seed alone: equal tasks, equal motions.
@@ -85,7 +85,7 @@ class EndUnreached(Finding):
 
 
 class NoneFound(Finding):
-    """No way was found within so many rounds; there may be one."""
+    """No path was found within this number of rounds; one may exist."""
 
     rounds: int
 
@@ -230,7 +230,7 @@ class _Moves:
 
 
 def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: int) -> Any:
-    """Corners (k, n) of a way of free moves; None if none was found."""
+    """Corners (k, n) of a path of free moves; None if none was found."""
     try:
         from ompl import base, geometric, util
     except ImportError:
@@ -309,7 +309,7 @@ def _between(corners: Reals, lengths: Reals, at: float) -> Reals:
 
 
 def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | ToppraMissing]:
-    """The way with corners rounded less and less, timed under the limits."""
+    """The path with corners rounded less and less, timed under the limits."""
     sides = np.abs(np.diff(corners, axis=0)).max(axis=1)
     for share in ROUNDINGS if len(corners) > 2 else (0.0,):
         blends = share * np.minimum(sides[:-1], sides[1:]) / 2

@@ -46,7 +46,7 @@ class Document:
 
 @dataclass(frozen=True)
 class Documents:
-    """Documents by name. A name that isn't among them stands for a document of its own, made from no other."""
+    """Documents by name. Any other name is a separate document, made from no other."""
 
     by_name: Mapping[str, Document] = field(default_factory=dict)
 
@@ -62,7 +62,7 @@ class Documents:
         return iter(self.by_name.values())
 
     def lineage(self, name: str) -> frozenset[str]:
-        """A document and all that it was made from, directly or by way of others."""
+        """A document and all that it was made from, directly or through others."""
         found: set[str] = set()
         left = [name]
         while left:

@@ -87,7 +87,7 @@ class SeenMotion(quantities.QuantityAtPose):
                 motion = motion + np.cross(axis, T[..., -1, :3, 2] if self.manner == "tilts" else arm)
         toward = np.broadcast_to(self._seen_toward(), motion.shape)
         still = np.linalg.norm(motion, axis=-1, keepdims=True) < STILL
-        across = np.roll(toward, 1, axis=-1)  # stands for a motion that isn't there: square to every direction
+        across = np.roll(toward, 1, axis=-1)  # replaces a missing motion: square to every direction
         return np.where(still, across, motion), toward
 
 
@@ -95,7 +95,7 @@ class SeenMotion(quantities.QuantityAtPose):
 class TableEntry(quantities.Quantity):
     """An entry of the table itself, measured by itself: a length (a, d) in mm, or an angle (alpha, offset) in deg.
 
-    A length d is the way along an axis between the common normals with the axes before and after it that are not
+    A length d is the distance along an axis between the common normals with the axes before and after it that are not
     parallel to it: between parallel axes the normal is anywhere, so their d is one length together.
     """
 

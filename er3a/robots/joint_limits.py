@@ -18,7 +18,7 @@ MOST_ROWS = 10_000
 
 
 class LimitExceeded(Finding):
-    """A joint stands above its upper or below its lower limit, by the excess."""
+    """A joint is above its upper or below its lower limit, by the excess."""
 
     joint: int
     side: Literal["above", "below"]
@@ -53,7 +53,7 @@ Exceeded = LimitExceeded | SlideExceeded | CombinationExceeded
 
 
 class LimitsExceeded(Finding):
-    """One or more joints, or sums of joints, stand outside their limits."""
+    """One or more joints, or sums of joints, are outside their limits."""
 
     joints: tuple[Exceeded, ...]
 

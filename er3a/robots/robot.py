@@ -106,7 +106,7 @@ def _keep_shape(shape: Envelope | ConvexPiece, size: Literal["radius", "margin"]
 class Visual(ByValue):
     """How a link looks: points (k, 3), m, in the frame as of :class:`Envelope`, and triangles (f, 3) of them.
 
-    Pictures use it, and what asks whether a link reaches out of its shapes.
+    For pictures, and to check whether a link extends beyond its shapes.
     """
 
     link: int
@@ -318,7 +318,7 @@ class Robot(ByValue, Displayed):
         return np.where(own, self.sliding[: self.joints], moved)
 
     def without_tool(self) -> Robot:
-        """The robot with its flange as tool, which is what references speak of."""
+        """The robot with its flange as tool, as references describe it."""
         return self.replace(tool=np.eye(4))
 
     @property
@@ -328,7 +328,7 @@ class Robot(ByValue, Displayed):
 
     @property
     def last_to_tool(self) -> Reals:
-        """(4, 4), from the table's last frame by way of the flange to the tool."""
+        """(4, 4), from the table's last frame through the flange to the tool."""
         return self.tool if self.flange_is_last_frame else self.flange @ self.tool
 
     def replace(self, **changes: Any) -> Robot:

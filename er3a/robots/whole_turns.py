@@ -26,7 +26,7 @@ from er3a.robots.robot import Robot, derived
 
 LIMIT_TOLERANCE = 1e-9  # rad, m
 WHOLE = 1e-12  # parts of a turn
-INVERTIBLE = 1e-9  # least determinant of a coupling that is undone
+INVERTIBLE = 1e-9  # smallest determinant of a coupling that is inverted
 WIDENED = (1.0, 2.0, 4.0, 8.0, 16.0)  # how far continuous joints are looked for, in halves of what turns move them by
 
 
@@ -110,7 +110,7 @@ def turns_in(robot: Robot, move: Reals) -> Reals:
 
 
 def shortest_move(robot: Robot, move: Reals) -> Reals:
-    """Moves of joints (..., n), less the whole turns of rows in them, each row by its shorter way."""
+    """Moves of joints (..., n), less the whole turns of rows in them, each row in its shorter direction."""
     return move - turns_in(robot, move)
 
 

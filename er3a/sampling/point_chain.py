@@ -32,7 +32,7 @@ _C0, _C1, _C2, _C3, _C4 = (
     np.float32(c) for c in (1.4142135623, -1.7447160365, 0.3587424282, -0.0295005932, 0.0012779231)
 )
 X, Y, Z = UNIT_ROWS * CHUNK, (UNIT_ROWS + 1) * CHUNK, (UNIT_ROWS + 2) * CHUNK
-"""Where the rows of the points stand behind the rows of random numbers."""
+"""Where the rows of the points follow the rows of random numbers."""
 ROWS = (UNIT_ROWS + 3) * CHUNK
 
 
@@ -212,7 +212,7 @@ def within_sums(sums: Singles, rows: Singles, inside: Flags) -> None:
 
 @inner_kernel
 def point_in_base(chain: PointChain, rows: Singles, i: int) -> Vector:
-    """Point i of a chunk that stands in the frame of joint 1, in the base frame."""
+    """Point i of a chunk, given in the frame of joint 1, in the base frame."""
     c, s = cos_sin_turns(chain[2][0] + rows[i] * chain[3][0])
     base = chain[5]
     x, y, z = c * rows[X + i] - s * rows[Y + i], s * rows[X + i] + c * rows[Y + i], rows[Z + i]

@@ -34,7 +34,7 @@ class OtherBranch(Finding):
 
 
 class JointTurned(Finding):
-    """A joint of the next best solution stands whole turns further."""
+    """A joint of the next best solution is whole turns further."""
 
     joint: int
     turn_deg: int
@@ -54,7 +54,7 @@ NextBest = OtherBranch | OtherTurns | OtherFreeJoint
 
 
 class MaxJointMove(Finding, code="greatest_move"):
-    """The joint that moves farthest, and how far."""
+    """The joint with the largest move, and that move."""
 
     joint: int
     angle_deg: float
@@ -96,7 +96,7 @@ class NoSolution(Finding):
 
 
 class AllOutsideLimits(Finding):
-    """All solutions leave the limits; stated of the one that does so least."""
+    """All solutions leave the limits; stated for the one with the smallest excess."""
 
     count: int
     branch: int
@@ -122,7 +122,7 @@ class Choice:
     Attributes
     ----------
     order : (k,) int, rows of the solutions to choose from, best first
-    max_joint_move : (n,), rad, the farthest that any joint turns from the reference to each solution
+    max_joint_move : (n,), rad, largest joint move from the reference to each solution
     distance : (n,), rad, root of the summed squares of the joint moves
     reason : why the first was taken, or why none
     """

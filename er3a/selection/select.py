@@ -320,7 +320,7 @@ def select_sequence(
     scene: Scene | None = None,
     acceleration: Reals | None = None,
 ) -> SequenceChoice:
-    """Choose one solution of each pose so that the total cost of the moves is least.
+    """Choose one solution of each pose that minimises the total cost of the moves.
 
     Parameters
     ----------

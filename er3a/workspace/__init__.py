@@ -4,6 +4,6 @@
   ``general_proof`` those of any arm (``general_arm``). ``voids`` and their ``causes``; the ``side_view`` of data
   sheets.
 - What the tool can do there: ``capability`` from samples, in the cells of ``cell_frame`` and along ``directions`` or
-  other ``orientations``; ``dexterous`` (every direction) and ``placement`` (where a box can stand) with proofs by
+  other ``orientations``; ``dexterous`` (every direction) and ``placement`` (where a box can be placed) with proofs by
   ``interval_inverse``. All use ``tool_inverse``.
 """

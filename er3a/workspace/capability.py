@@ -47,7 +47,7 @@ class Capability:
 
     Attributes
     ----------
-    reachability : ratio of the directions [1]_, or of what else is asked, that are reached
+    reachability : ratio of the directions [1]_, or of the required orientations, that are reached
     solutions : branches within limits, the mean over reached directions (0 where none is), of the roll that has most
     most_solutions : the most branches that any direction has
     manipulability : m^3, the largest ``|det J|`` [2]_ of any reached pose
@@ -100,12 +100,12 @@ def map_capability(robot: Robot, middles: Reals, count: int, asked: AskedOrienta
     Parameters
     ----------
     middles : (n, 2), m, radius and height of the cells' middles (see :class:`.cell_frame.CellFrame`)
-    count : of directions over the sphere, of turns or of tilts; asked : what is asked of the tool
+    count : of directions over the sphere, of turns or of tilts; asked : the required orientations
     """
     frame, free = cell_frame(robot), left_to_roll(without_first_limits(robot), asked.roll)
     reachability, solutions, most, best = np.zeros((4, len(middles), frame.sectors))
     points = frame.points(middles[:, 0], np.zeros(len(middles)), middles[:, 1])
-    # even directions are even about axis 1 in the cells' frame, whatever the base's is
+    # even directions are even about axis 1 in the cells' frame, for any base frame
     turned = frame.R.T if asked.kind == "directions" else np.eye(3)
     per_cell = int(np.prod(asked.everywhere(points[:1], count).shape[1:3]))
     for start in range(0, len(middles), step := max(1, _POSES // per_cell)):
@@ -212,7 +212,7 @@ def try_poses(
     ----------
     middles : (n, 2), m, radius and height about axis 1; places : their sectors' middles (n,) and width, rad or m
     tries : poses in each; free : which arms count as clear
-    asked : what is asked of the tool; where that is no direction, the orientations are even among these
+    asked : the required orientations; unless these are directions, the orientations tried are even among them
     """
     frame = cell_frame(robot)
     reached, clear = (np.zeros(len(middles), np.int64) for _ in range(2))

@@ -53,7 +53,7 @@ class Relaxed:
     joints, factors : from 1, and what they count in the sum; of a joint's own limit this joint, and 1
     unit : "mm" where the joints slide; of a sum of revolute and prismatic joints "deg", as its limits are
     limit : as it is, in ``unit``
-    by : by how much it is widened: the least of ``STEPS[unit]`` that makes the void vanish, or the most there is; of a
+    by : by how much it is widened: the smallest of ``STEPS[unit]`` that fills the void, or the largest; of a
         sum that this leaves in force at some joints, by as much as takes it away, in whole ``unit``
     filled : ratio of the void that is then reached
     """
@@ -171,7 +171,7 @@ def _limits(robot: Robot, joints: list[int]) -> Iterator[_Limit]:
 
 
 def _relaxed(limit: _Limit, filled: Callable[[Robot], float]) -> Relaxed:
-    """The least step that makes the void vanish, or else the widest, since no lesser step fills more."""
+    """The smallest step that fills the void, or else the largest, since no smaller step fills more."""
     scale, steps = _SI[limit.unit], STEPS[limit.unit]
     if limit.idle > steps[-1] * scale:
         steps = (*steps, float(np.ceil(limit.idle / scale)))
@@ -276,7 +276,7 @@ def _ratio_searched(
     (in_section, in_base), (probes, weight) = section, spread
     random = np.random.Generator(np.random.Philox(key=len(probes.cells)))
     q = random.uniform(widened.lower, widened.upper, (SAMPLES, robot.joints))
-    # The arm as it is does not come here: at least one limit must be exceeded.
+    # The unchanged arm does not reach this place: at least one limit must be exceeded.
     q = q[within(widened, q) & ~within(robot, q)]
     if not len(q) or not len(probes.cells):
         return 0.0
@@ -396,7 +396,7 @@ def _of_table(robot: Robot) -> Iterator[Candidate]:
 
 
 def _of_limits(robot: Robot, cause: VoidCause) -> Iterator[Candidate]:
-    """The limits that a void's cause names, widened as it says; sums of joints are left out."""
+    """The limits that a void's cause names, widened by its step; without limits of sums of joints."""
     for limit in _named(cause):
         if limit.factors == (1.0,) and limit.unit == "deg":
             yield limit.side, limit.joints[0], round(limit.limit, 9), round(limit.extended, 9)

@@ -71,7 +71,7 @@ class GeneralArm(NamedTuple):
 
     @property
     def carries_around(self) -> bool:
-        """Whether joint 1 can turn or shift the tool point with all rows behind it at rest."""
+        """Whether joint 1 can turn or shift the tool point with all rows after it at rest."""
         return bool(len(self.lower) > 1 and not self.drive[0, 1:].any() and not self.drive[1:, 0].any())
 
     def joints(self, v: Reals) -> Reals:
@@ -175,7 +175,7 @@ def _without_locked(links: Reals, sliding: Flags, ends: Reals) -> tuple[Reals, i
 
 
 def _freed(arm: GeneralArm, ends: Reals) -> GeneralArm:
-    """The arm with joint 1's x in place of its value, so that rows behind it stay when it moves; unchanged where no
+    """The arm with joint 1's x in place of its value, so that rows after it stay when it moves; unchanged where no
     joints' values move row 1 alone.
 
     Values along which row 1 alone moves are a line; the others' limits cut it off, each linear in what is left.

@@ -6,7 +6,7 @@ the other joints' values to radius and height of the tool point. The limits of t
 closed line of joint values in it spans a disc. If f takes the line around a rectangle of the section without touching
 it, with a winding number other than 0, then f takes some point of the disc to each point of the rectangle: otherwise f
 could be drawn off that point, and the winding number would be that of a constant [1]_. No derivative has to be regular,
-joints may stand at their limits, and the line may run along the border of what is reached; so what is lost there is
+joints may be at their limits, and the line may run along the border of what is reached; so what is lost there is
 about the rectangle's own size.
 
 Where joint 1 slides, the section lies across it, and what holds of rings holds of bars.
@@ -93,7 +93,7 @@ class Memory(NamedTuple):
     radii: Reals
     columns: Reals
     frame: Reals
-    slopes: Reals  # (3, m): radius, height and way across the arm's plane by each value
+    slopes: Reals  # (3, m): radius, height and offset across the arm's plane by each value
     weights: Reals
     directions: Reals  # (2, m)
     v: Reals
@@ -106,7 +106,7 @@ class Memory(NamedTuple):
 
 
 def postures(arm: GeneralArm, across: int, most: int) -> Postures:
-    """An empty list with room for so many joint values."""
+    """An empty list with capacity for this many joint values."""
     low, high = arm.heights[0]
     size = np.array([arm.radii[0], high - low]) * (1 + 1e-9) / across + 1e-9
     following, used = np.full(most, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
@@ -180,7 +180,7 @@ def _allowed(arm: GeneralArm, v: Reals) -> bool:
 
 @kernel
 def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimuth: float) -> None:
-    """Add joint values to the list, if their bucket has room."""
+    """Add joint values to the list, unless their bucket is full."""
     i, j = int((rho - known.low[0]) / known.size[0]), int((z - known.low[1]) / known.size[1])
     i, j = min(max(i, 0), known.first.shape[0] - 1), min(max(j, 0), known.first.shape[1] - 1)
     at = known.used[0]
@@ -233,7 +233,7 @@ def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
 
 @kernel
 def _directions(memory: Memory, hold: float) -> bool:
-    """Least weighted changes of the joints that change radius or height alone; False where there are none.
+    """Smallest weighted changes of the joints that change radius or height alone; False where there are none.
 
     hold: how firmly they keep the point in the arm's plane, 0 for not at all
     """
@@ -597,7 +597,7 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> Spr
     inwards = d_rho + sag
     rho_there = np.sqrt(px * px + py * py)
     ux, uy = (px / rho_there, py / rho_there) if rho_there > 0.0 else (1.0, 0.0)
-    # Radial, tangential and upward directions of the cell, in the frame behind the link.
+    # Radial, tangential and upward directions of the cell, in the frame after the link.
     rx, ry, rz = L[0, 0] * c + L[1, 0] * s, L[0, 1] * c + L[1, 1] * s, L[0, 2] * c + L[1, 2] * s
     tx, ty, tz = L[1, 0] * c - L[0, 0] * s, L[1, 1] * c - L[0, 1] * s, L[1, 2] * c - L[0, 2] * s
     vx, vy, vz = L[2, 0], L[2, 1], L[2, 2]
@@ -664,7 +664,7 @@ def exclude(
     ----------
     L : (4, 4), the link after the joint
     ends : the joint's range, rad, and the length of bars, m (0 for rings)
-    behind : what the joints behind it reach at most
+    behind : the largest reach of the joints after it
     arcs, count : the arcs that are empty so far; changed
     flags : (2, longest) bool, working memory
 
@@ -785,7 +785,7 @@ SAMPLES, TRIES = 400_000, 24
 FINEST, LEAST = 1000, 1e-4
 _BUCKETS, _MOST_POSTURES = 96, 300_000
 _PORTION = 1 << 16
-_ACROSS = 2.5  # rings along each set behind joint 1, for each cell across
+_ACROSS = 2.5  # rings along each set after joint 1, for each cell across
 
 
 def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) -> tuple[Proof, Reals]:
@@ -793,7 +793,7 @@ def prove_general(arm: GeneralArm, target: float, most_cells: int, seed: int) ->
 
     Parameters
     ----------
-    target : wanted width of the bracket
+    target : required width of the bracket
     most_cells : how many cells may be examined; the first grid is always finished
 
     Returns

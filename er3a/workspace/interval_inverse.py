@@ -122,7 +122,7 @@ def branches(
     move = rho + 2.0 * lever * np.sin(0.5 * min(delta, np.pi)) + PAD
     state[:], theta_1[:, 0], theta_1[:, 1] = NEVER, 0.0, 0.0
 
-    # Joint 1: the wrist centre at the distance r from axis 1 stands k beside the arm's plane.
+    # Joint 1: the wrist centre at the distance r from axis 1 is k beside the arm's plane.
     r = np.sqrt(vx * vx + vy * vy)
     r_low, r_high = max(r - move, 0.0), r + move
     k = (arm.sideways - arm.cos_12 * vz) / arm.sin_12

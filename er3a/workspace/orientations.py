@@ -90,7 +90,7 @@ class TiltPlane:
 
 @dataclass(frozen=True, eq=False)
 class AskedOrientations:
-    """What is asked of a tool: its kind, how the roll is treated, and what turns and tilts are counted from.
+    """The required tool orientations: their kind, how the roll is treated, and the zero of turns and tilts.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class AskedOrientations:
     plane: TiltPlane | None = None
 
     def everywhere(self, points: Reals, count: int) -> Reals:
-        """All that is asked at points (n, 3), m, of place 0: (1 or n, asked, tries, 3, 3)."""
+        """All required orientations at points (n, 3), m, of place 0: (1 or n, asked, tries, 3, 3)."""
         if self.kind == "points":
             return np.eye(3)[None, None, None]
         if self.kind == "turns":
@@ -116,7 +116,7 @@ class AskedOrientations:
         return tool_rotations(fibonacci_sphere(count), self.roll)[None]
 
     def in_cone(self, points: Reals, axis: Reals, half_angle: float, step: float) -> Reals:
-        """What a task asks at points (n, 3), m: (1 or n, asked, tries, 3, 3), none asked if no orientation fits.
+        """A task's orientations at points (n, 3), m: (1 or n, asked, tries, 3, 3), none if no orientation fits.
 
         Directions within ``half_angle`` (rad) of ``axis`` (3,) are asked ``step`` (rad) apart; of a SCARA, one of the
         turns along which its tool points so.
@@ -157,7 +157,7 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
         return AskedOrientations("turns", none, tool, axes[int(np.flatnonzero(~robot.sliding)[0])])
     if code == "free_roll":
         return AskedOrientations("directions", none, tool, axis)
-    if robot.rows != robot.joints:  # a linkage decides how the tool stands
+    if robot.rows != robot.joints:  # a linkage decides the tool's orientation
         return None
     if code == "planar_wrist":
         roll = roll_of(robot, rolls)
@@ -168,7 +168,7 @@ def asked_of(robot: Robot, rolls: int) -> AskedOrientations | None:
 
 
 def _tilt_plane(robot: Robot, joints: int) -> TiltPlane | None:
-    """The plane of an arm whose first so many joints tilt its tool; None if they do so another way."""
+    """The plane in which an arm's first ``joints`` joints tilt its tool; None if they do not tilt it in a plane."""
     axes, _, T = axes_at_zero_theta(robot)
     behind, sliding = axes[1:joints], robot.sliding[1:joints]
     if robot.sliding[0] or len(behind) < _LEAST_PLANAR or sliding.all():

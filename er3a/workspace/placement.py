@@ -1,4 +1,4 @@
-"""Where a box can stand so that the tool reaches every point of it along every required direction, and the proof.
+"""Where a box can be placed so that the tool reaches every point of it along every required direction, and the proof.
 
 At each point of a lattice, all directions of a cone are tested, branch by branch. A box fits where all lattice points
 in it are good, which sliding minima find for all places at once. The lattice only proposes places.
@@ -8,7 +8,7 @@ over the box and the cone, which keeps away from singularities, and the smallest
 weighed: each as a share of the best of all places, and the smaller share counts. A minimum of that distance is also
 required: the task narrows the limits.
 
-A box that stands on something has its underside on a :class:`Support`, over which all of it lies.
+A supported box has its underside on a :class:`Support`, over which all of it lies.
 
 For the proof the box times the cone is split into bricks with patches of directions until one branch and roll is good
 for each whole piece (:mod:`er3a.workspace.interval_inverse`), or the middle of a piece turns out to be out of reach.
@@ -55,7 +55,7 @@ InCone = Callable[[Reals, Reals, float, float], Reals]
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """A level surface of a scene that a box can stand on.
+    """A level surface of a scene that can support a box.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Support:
 
 
 def fits_on(support: Support, box: Reals) -> bool:
-    """Whether a box (3,), m, has room on a support, as given or turned by 90 deg about z."""
+    """Whether a box (3,), m, fits on a support, as given or turned by 90 deg about z."""
     if not len(support.outline):
         return True
     edges = np.roll(support.outline, -1, axis=0) - support.outline
@@ -118,17 +118,17 @@ def _outline(solid: Box | Cylinder, upright: int) -> Reals:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is asked, in the frame that the robot's base is placed in.
+    """The task, in the frame that the robot's base is placed in.
 
     Attributes
     ----------
     box : (3,), m, edges along x, y, z
     axis : (3,), unit vector, middle of the tool's directions; half_angle : rad, how far around it they reach
-    lowest : m, least height of the box's underside; clear : m, smallest distance of its points from axis 1
+    lowest : m, smallest height of the box's underside; clear : m, smallest distance of its points from axis 1
     margin : rad, how far joints with less than a full turn keep within their limits, and sums of revolute joints
         within theirs; not those that slide
     step : rad, how far directions in the cone are apart
-    support : what the box stands on, at the height of ``lowest``; None where it may stand anywhere
+    support : the box's support, at the height of ``lowest``; None where it may be anywhere
     """
 
     box: Reals
@@ -183,7 +183,7 @@ class Field:
     Attributes
     ----------
     origin : (3,), m; spacing : (3,), m; shape of the arrays : (nx, ny, nz)
-    least : (nx, ny, nz, slots), m^3, least manipulability over the directions by branch, NO where it misses one, and
+    least : (nx, ny, nz, slots), m^3, smallest manipulability over the directions by branch, NO where it misses one, and
         where slots are no branches
     least_any : (nx, ny, nz), the same by the best branch for each direction
     limit_margin : (nx, ny, nz, slots), rad, smallest distance from the limits of joints with less than a full turn
@@ -203,7 +203,7 @@ class Places:
 
     Attributes
     ----------
-    centre : (n, 3), m; turned : (n,), whether the box stands turned by 90 deg about z
+    centre : (n, 3), m; turned : (n,), whether the box is turned by 90 deg about z
     slot : (n,), the branch that serves it all, or MIXED
     least : (n,), m^3, the criterion; limit_margin : (n,), rad (NaN with MIXED)
     proven : (n,), whether all bricks of the lattice in it are proven, by any mix of branches
@@ -222,7 +222,7 @@ class Places:
 
 
 def lattice_spacing(box: Reals, coarsest: float) -> Reals:
-    """Spacing (3,) in m that divides the box's height and its shorter side evenly, about as fine as asked."""
+    """Spacing (3,) in m that divides the box's height and its shorter side evenly, about as fine as required."""
     sides = np.array([min(box[:2]), min(box[:2]), box[2]])
     return np.maximum(sides / np.maximum(1, np.round(sides / coarsest)), coarsest / 2)
 
@@ -292,7 +292,7 @@ def _lattice(robot: Robot, task: Task, coarsest: float) -> tuple[Reals, Reals, t
 
 
 def _over(task: Task, support: Support, points: Reals) -> Flags:
-    """Which points (n, 3), m, a box that stands on a support can hold."""
+    """Which points (n, 3), m, a box on a support can hold."""
     over: Flags = support.holds(points[:, :2]) & (points[:, 2] <= task.lowest + task.box[2] + 1e-9)
     return over
 
@@ -501,7 +501,7 @@ class Chosen:
 
 @dataclass(frozen=True, eq=False)
 class BoxPlacement:
-    """Where a box can stand: the lattice, the places on it, and the best of them."""
+    """Where a box can be placed: the lattice, the places on it, and the best of them."""
 
     field: Field
     places: Places
@@ -544,7 +544,7 @@ def find_places(
     free: Free | None = None,
     in_cone: InCone | None = None,
 ) -> BoxPlacement:
-    """Survey where the box can stand and put the best places to the proof.
+    """Survey where the box can be placed, and try to prove the best places.
 
     Parameters
     ----------
@@ -631,7 +631,7 @@ def prove_place(
 
     Parameters
     ----------
-    centre : (3,), m, of the box; turned : whether it stands turned by 90 deg about z
+    centre : (3,), m, of the box; turned : whether it is turned by 90 deg about z
     slot : the branch that must serve it all, or MIXED for any
     most_poses : how many neighbourhoods of poses to look at
 
@@ -750,7 +750,7 @@ def _prove(
 
 @kernel
 def _some(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
-    """Whether some branch, or the one asked for, is good with joint 1 too."""
+    """Whether some branch, or the required one, is good with joint 1 too."""
     for k in range(SLOTS):
         if (slot == MIXED or k == slot) and state[k] == GOOD and holds(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
             return True
@@ -759,7 +759,7 @@ def _some(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
 
 @inner_kernel
 def _none(ranges: Reals, state: States, theta_1: Reals, slot: int) -> bool:
-    """Whether no branch, or not the one asked for, is possible."""
+    """Whether no branch, or not the required one, is possible."""
     for k in range(SLOTS):
         if (slot == MIXED or k == slot) and state[k] != NEVER and not misses(ranges, 0, theta_1[k, 0], theta_1[k, 1]):
             return False

@@ -109,7 +109,7 @@ def holds_azimuth(arcs: Reals, azimuth: Reals) -> Flags:
 
 
 POINT = 1e-7
-"""Edge (m) of the cell that stands for a point in a search."""
+"""Edge (m) of the cell that represents a point in a search."""
 FEW = 200
 """Points at least, where that many are asked for."""
 _NORMAL_95 = 1.959963984540054

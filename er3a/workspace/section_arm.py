@@ -1,7 +1,7 @@
 """A wrist-partitioned arm as the proofs take it: wrist centre and forearm about axis 1, and the tool point's zone.
 
 Rotations about concurrent axes keep distances, so the tool point stays on the sphere of radius ``d`` about the wrist
-centre W, whatever tool and wrist are. If joint 4 makes a full turn, everything is symmetric about the forearm's
+centre W, for any tool and wrist. If joint 4 makes a full turn, everything is symmetric about the forearm's
 direction f (axis 4), and the tool point fills exactly a *zone* of that sphere: ``low <= cos(angle to f) <= high``, with
 the extremes of one trigonometric function of joints 5 and 6 over their limits. For an orthogonal wrist with the tool on
 axis 6 the zone is a cap (Gupta and Roth 1982 [1]_ treat the point case).
@@ -55,7 +55,7 @@ class SectionArm(NamedTuple):
     centre, upper, forearm, direction : C, U, M and F at angle 0
     upper_length, forearm_length : lengths of U and M
     d : distance of the tool point from W
-    outer_low, outer_high : cosines that bound the zone from outside, whatever joint 4 does
+    outer_low, outer_high : cosines that bound the zone from outside, for any value of joint 4
     inner_low, inner_high : cosines of a zone wholly reachable at every azimuth about f; low > high if none is known
     theta_1, theta_2, tau : (lower, upper), each at most a full turn wide
     full_turn : whether joint 1 covers a full turn
@@ -202,7 +202,7 @@ def _cosines(arm: WristPartitionedArm, tool: Reals, range_5: Range, range_6: Ran
 
 
 def _both_directions(arm: WristPartitionedArm, tool: Reals, range_5: Range) -> tuple[float, float]:
-    """With half a turn of joint 4, the tilts that joint 5 reaches both ways still have every azimuth."""
+    """With half a turn of joint 4, the tilts that joint 5 reaches with both signs still have every azimuth."""
     aligned = np.arctan2(np.cross(tool, arm.axes[3]) @ arm.axes[4], tool @ arm.axes[3])
     middle = (range_5[0] + range_5[1]) / 2
     shift = aligned + 2 * np.pi * np.round((middle - aligned) / (2 * np.pi))
@@ -290,7 +290,7 @@ def _cut(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
 def remove(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
     """Take the arc from ``low`` up to ``high`` (any turn) out of the set; returns the new count.
 
-    Where the list has no room for one more piece, ``more`` says whether to take out too much or too little.
+    Where the list is full, ``more`` says whether to take out too much or too little.
     """
     if high <= low:
         return count

@@ -5,7 +5,7 @@ sphere of radius d about W must pass through x with the direction in the zone. M
 line from a configuration where every point of the cell lies inside the sphere to one where every point lies outside: by
 the intermediate value theorem the sphere passes through each point on the way. If the direction stays in the zone all
 along, for all points of the cell, the cell is filled. Standing still in joints 2 and 3 is the case of a line along phi,
-with exact ranges; here any joint may move, which is what it takes where the wrist must lie in the cell's own half
+with exact ranges; here any joint may move, which is needed where the wrist must lie in the cell's own half
 plane.
 
 **Empty**: that the tool point can't enter a cell is proven by branch and bound over joints 1 to 3. A cell is a ring
@@ -39,7 +39,7 @@ if ``|X| <= rho``, and if the direction lies in the zone: ``d low <= (x - W) . f
 quadratic in z, so its range over a rectangle of the section is exact, and so is that of ``(x - W) . f`` where f lies
 in W's half plane; the rest is interval arithmetic. A pair (theta_2, tau) for which all conditions hold over the
 rectangle proves the ring filled, at every azimuth that joint 1 brings phi to for all of its points: from
-``theta_1_low + max phi`` to ``theta_1_high + min phi``. Joints 2 and 3 may stand on their limits, so borders that a
+``theta_1_low + max phi`` to ``theta_1_high + min phi``. Joints 2 and 3 may be at their limits, so borders that a
 limit makes cost nothing.
 
 One cell after another: which azimuths are proven filled, which proven empty.
@@ -452,7 +452,7 @@ def _tilted(k: float, rho: float, fixed: float, z: float, W_z: float, f_z: float
 def _neighbour(
     arm: SectionArm, configuration: SectionConfiguration, move: int, step_2: float, step_3: float
 ) -> SectionConfiguration:
-    """The configuration one step of joints 2 and 3 away, within their limits, in one of eight ways."""
+    """The configuration one step of joints 2 and 3 away, within their limits, in one of eight directions."""
     da = (1.0, -1.0, 0.0, 0.0, 1.0, 1.0, -1.0, -1.0)[move] * step_2
     dt = (0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0)[move] * step_3
     a = min(max(configuration[7] + da, arm.theta_2[0]), arm.theta_2[1])
@@ -812,7 +812,7 @@ def prove(arm: SectionArm, target: float, most_cells: int, across: int = 32, thr
 
     Parameters
     ----------
-    target : wanted width of the bracket, (upper - lower) / upper
+    target : required width of the bracket, (upper - lower) / upper
     most_cells : how many cells may be examined; the first grid is always finished
     across : cells along the height of the first grid
     threads : how many to use; the result does not depend on it

@@ -5,7 +5,7 @@ plane, with points as complex numbers x + i z, an arm that is its own mirror ima
 
     W = C + e^(-i theta_2) (U + e^(-i tau) M),    p = W + d e^(-i gamma) f,    f = e^(-i (theta_2 + tau)) F
 
-with the tilt gamma of the tool against the forearm. On the border, each joint stands at a limit or the links that it
+with the tilt gamma of the tool against the forearm. On the border, each joint is at a limit or the links that it
 moves are in line with what they turn about (Kumar and Waldron 1981 [1]_): one joint sweeps, the others stand, so the
 border is made of circular arcs. Of all such arcs, the parts are kept that have proven unreachable points beside them.
 
@@ -52,7 +52,7 @@ class BorderArc:
 
     Attributes
     ----------
-    points : (n, 2), m, radius (in a side view: x, negative behind axis 1) and height
+    points : (n, 2), m, radius (in a side view: x, negative on the far side of axis 1) and height
     joints : (n, 3), rad, theta_2, tau and gamma
     """
 
@@ -200,7 +200,7 @@ class BorderLine:
     ----------
     view : "section" (folded about axis 1) or "side"
     number : of the arc among those of its point and view, from 1
-    sweeps : what moves along the arc while the other joints stand
+    sweeps : what moves along the arc while the other joints are fixed
     points : (n, 2), m, distance from axis 1 (in a side view: x to the front) and height
     q : (n, 2), rad, joints 2 and 3; tilt : (n,), rad, angle of the tool point's direction to axis 4
     """

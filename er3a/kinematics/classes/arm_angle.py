@@ -103,7 +103,7 @@ def three_angles(
 ) -> tuple[float, float, float, float, float]:
     """Joint angles (three) by the root with that sign of joint 2, whether there is one, and how far from singular.
 
-    The last is the least of the sine of axis 3 from axis 1 and the root's distances from where both roots meet;
+    The last is the minimum of the sine of axis 3 from axis 1 and the root's distances from where both roots meet;
     negative if axis 3 can't point there.
     """
     sum_s, sum_c = k.half_sum

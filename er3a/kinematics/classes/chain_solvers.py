@@ -168,7 +168,7 @@ def _by_elimination(links: Reals, sliding: Flags) -> class_solvers.ChainSolver:
 
 
 def full_rank(links: Reals, sliding: Flags, at_rest: tuple[int, ...] = ()) -> bool:
-    """Whether the chain moves its tool in as many ways as it has joints (six at most) at random joint values; those
+    """Whether the chain has as many degrees of freedom as joints (six at most) at random joint values; joints
     ``at_rest`` (from 0) are 0."""
     random = np.random.default_rng(5)
     scaled = np.array(links, float)

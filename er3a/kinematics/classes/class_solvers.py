@@ -85,8 +85,8 @@ ARM_CLASSES: dict[ArmClassCode, ArmClassTraits] = {
 - ``scara``: four joints with one direction, one of them prismatic; ``free_roll``: five joints, the turn about the
   tool's z axis is left over; ``planar_wrist``: up to five joints, solved for those poses that they can take exactly;
   ``position``: three joints, solved for the tool point;
-- ``dependent``: joints that move the tool in fewer ways than their number (six at most), such as two parallel slides:
-  each pose that they reach, they reach in infinitely many ways; ``unsolved``: none of these.
+- ``dependent``: fewer degrees of freedom than joints (six at most), for example two parallel slides: each pose within
+  reach has infinitely many solutions; ``unsolved``: none of these.
 """
 ALL_OF_POSE = ArmClassTraits().task
 

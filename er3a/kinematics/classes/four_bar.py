@@ -29,7 +29,7 @@ FREE = 1e-9  # rad between axis 6 and the parallel axes within which joint 5's r
 
 @dataclass(frozen=True, eq=False)
 class FourBar:
-    """A continuum of solutions: axis 6 along the parallel axes, links 2, 3, 4 and the way to W turn as a four-bar.
+    """A continuum of solutions: axis 6 along the parallel axes, links 2, 3, 4 and the line to W turn as a four-bar.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """Six revolute joints reduced to one: a determinant that vanishes at one joint's angle of each solution.
 
 The chain and the pose close a loop of six joints, ``Rz(x_1) K_1 ... Rz(x_6) K_6 = 1``, which can be read from any joint
-on and in either sense. Joint 6's axis, as fifteen numbers (below), is seen from joint 2 in two ways:
+on and in either sense. Joint 6's axis, as fifteen numbers (below), seen from joint 2, has two forms:
 
     K_2 Rz(x_3) K_3 Rz(x_4) K_4 Rz(x_5) K_5 axis = Rz(-x_2) K_1^-1 Rz(-x_1) K_6^-1 axis
 
@@ -333,9 +333,9 @@ class Reading(NamedTuple):
     """The loop read from one joint on in one sense.
 
     ``joint`` (6,) is the arm's joint at each place, ``sense`` +1 or -1 the sign of its angle there, ``links`` (6, 4, 4)
-    the links behind them with the pose's left out, which stands at ``place`` and is inverted if ``sense`` is -1.
+    the links after them without the pose's, which is at ``place`` and is inverted if ``sense`` is -1.
     ``left`` (14, 27) are the left side's coefficients if the pose is not in it. ``slides`` (6,) marks the prismatic
-    joints, which may stand at places 1, 4 and 5 only.
+    joints, which may be at places 1, 4 and 5 only.
     """
 
     joint: Integers
@@ -485,7 +485,7 @@ def equations_of_pose(reading: Reading, pose_link: Reals, m: Scratch) -> None:
 @inner_kernel
 def _right_side(slides: bool, m: Scratch) -> None:
     """``m.right`` (3, 15): K_1^-1 Rz(-x_1) K_6^-1 axis = cos right[0] + sin right[1] + right[2]; of a prismatic joint 1
-    x^2 and x stand for cos and sin."""
+    x^2 and x replace cos and sin."""
     axis, seen = np.zeros(NUMBERS), np.empty(NUMBERS)
     axis[5], axis[14] = 1.0, 1.0
     K, parts = np.empty((4, 4)), np.empty((3, NUMBERS))
@@ -681,7 +681,7 @@ def determinant_at(equations: Reals, angle: float, F: Reals, M: Reals) -> tuple[
 def sampled_determinant(m: Scratch) -> tuple[float, float]:
     """Fill ``m.terms`` with the determinant's coefficients 1, cos, sin, ...; returns the largest sample and the noise.
 
-    Noise: the size of the three terms behind degree 8, which are nothing but rounding.
+    Noise: the size of the three terms above degree 8, which are rounding only.
     """
     F, M = np.empty((6, 9)), np.empty((9, 9))
     peak = 0.0

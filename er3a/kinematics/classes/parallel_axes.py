@@ -53,7 +53,7 @@ class ParallelConstants(NamedTuple):
     """The arm in a frame with z on axis 1 and w in the plane of x and z; lengths in m, angles in rad.
 
     ``place`` and ``turn`` bring the base into that frame. Plane coordinates are across w, the first one in the plane of
-    w and axis 1. ``axis_2`` and ``rest`` are axis 2 there and the way from axis 4 to W at phi = 0.
+    w and axis 1. ``axis_2`` and ``rest`` are axis 2 there and the vector from axis 4 to W at phi = 0.
     """
 
     turn: Rows

@@ -117,7 +117,7 @@ def _null_vector(J: Reals, columns: Integers, v: Reals) -> bool:
 
 @kernel
 def _step(J: Reals, columns: Integers, dq: Reals) -> None:
-    """The step that an eliminated system asks for, none in directions without a pivot."""
+    """The step that solves an eliminated system; 0 in directions without a pivot."""
     first = abs(J[0, 0])
     for k in range(5, -1, -1):
         total = J[k, 6]
@@ -171,8 +171,8 @@ def twin_start(
 ) -> bool:
     """Where the other root is that meets this one at a fold, to second order; False where none is near.
 
-    Along the direction v that moves the pose least, the eliminated error's last component is ``s t + k t^2``: zero at 0
-    and at -s / k.
+    Along the direction v that changes the pose least, the eliminated error's last component is ``s t + k t^2``: zero at
+    0 and at -s / k.
     """
     v = np.zeros(6)
     residual_and_jacobian(links, sliding, T, q, w, J)

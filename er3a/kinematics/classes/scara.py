@@ -7,7 +7,7 @@ Three prismatic and three revolute joints, in any order: two solutions.
 
 Only the turning joints move the orientation, so three angles follow from it; then the sliding ones' directions are
 known, and the position is linear in them. Where a turn has made two of them parallel (or all three lie in a plane),
-they shift against each other with the tool at rest: positions that they reach then, they reach in infinitely many ways.
+they shift against each other with the tool at rest: a position within reach then has infinitely many solutions.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def scara(links: Reals, sliding: Flags) -> Scara | None:
 
 
 def solve_scara(arm: Scara, T: Reals) -> tuple[Reals, Reals]:
-    """Solutions q (N, 2, 4), rad and m, elbow turned the positive way first, NaN out of reach; tilt (N,) in rad.
+    """Solutions q (N, 2, 4), rad and m, positive elbow first, NaN out of reach; tilt (N,) in rad.
 
     Poses T (N, 4, 4) are met in position and in the turn about the common direction.
     """
@@ -133,7 +133,7 @@ def gantry(links: Reals, sliding: Flags) -> Gantry | None:
 def solve_gantry(arm: Gantry, T: Reals) -> tuple[Reals, Flags]:
     """Solutions q (N, 2, 6), rad and m, NaN where there is none; whether both roots meet or the slides don't span.
 
-    Where slides don't span space, the solution with the smallest shifts stands for all.
+    Where slides don't span space, only the solution with the smallest shifts is returned.
     """
     turn = np.ascontiguousarray(arm.frame @ T[:, :3, :3] @ arm.behind)
     angles, least = np.empty((len(T), SLOTS, 3)), np.empty(len(T))

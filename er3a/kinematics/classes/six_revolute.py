@@ -4,10 +4,10 @@ One joint's angle follows from the zeros of a trigonometric polynomial (:mod:`hi
 null vector of its matrix gives two more, the remaining three follow one by one, and Newton's method on the chain itself
 (:mod:`polish`) decides what is a solution.
 
-Nothing is claimed beyond what was measured on the way: the polynomial's noise is known from terms that would vanish, a
-place where it sinks into the noise is searched like a zero, and if the noise is large, a zero yields no solution, or a
-place is dark, further readings of the loop are taken, whose solutions are united. What stays in doubt is solved at
-poses beside it, too, and the solutions there are followed back.
+The certainty rests on measured noise: the polynomial's noise is known from terms that vanish in exact arithmetic. A
+place where the polynomial sinks into the noise is searched like a zero. If the noise is large, a zero yields no
+solution, or a place is dark, further readings of the loop are taken and their solutions united. A pose that stays in
+doubt is also solved at neighbouring poses, whose solutions are followed back.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def _by_readings(
 ) -> None:
     """Fill rows (N, 16, 6), their number (N,) and certainty (N,), which starts as CONTINUUM.
 
-    The joint that a reading hides may rest along a self-motion, whose row then stands like any other but for its pivot.
+    The joint that a reading hides may rest along a self-motion, whose row then differs from others by its pivot only.
     """
     readings_used, left = np.zeros(len(T), dtype=np.int64), np.arange(len(T))
     moving = np.zeros(len(T), dtype=bool)
@@ -267,8 +267,8 @@ def in_order(q: Reals, count: Integers) -> None:
 def _by_reading(
     reading: Reading, links: Reals, pose: Reals, pose_link: Reals, m: LoopMemory, q: Reals, rows: int
 ) -> tuple[int, int, float]:
-    """Add the solutions that one reading of the loop finds; returns its verdict, how many rows there are, and the
-    least of their last pivots."""
+    """Add the solutions that one reading of the loop finds; returns its verdict, the number of rows, and the
+    minimum of their last pivots."""
     e = m.elimination
     equations_of_pose(reading, pose_link, e)
     peak, noise = sampled_determinant(e)
@@ -316,10 +316,10 @@ def _by_reading(
 
 @kernel
 def add_row(links: Reals, pose: Reals, m: LoopMemory, found: Reals, pivot: float, q: Reals, rows: int) -> int:
-    """Add a row unless it stands there.
+    """Add a row unless it is present.
 
-    Where the Jacobian's last pivot is small, rows are known to ``SPREAD / pivot`` only: a root of higher order comes
-    spread by as much.
+    Where the Jacobian's last pivot is small, rows are known to ``SPREAD / pivot`` only: a root of higher order is
+    spread by that much.
     """
     for k in range(6):
         if not m.sliding[k]:

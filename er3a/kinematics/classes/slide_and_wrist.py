@@ -46,7 +46,7 @@ class SlideAndWrist:
     """The solver of one arm, lengths in units of its size.
 
     The wrist centre before joint ``first`` (from 0), the first that turns, is ``A + d e`` with A of the pose, and
-    behind it ``y0 + d f + X y1 + Y y2``; ``v0 + d v1`` is the place before joint ``second``, of which ``n`` is the
+    after it ``y0 + d f + X y1 + Y y2``; ``v0 + d v1`` is the place before joint ``second``, of which ``n`` is the
     square across its axis.
     """
 

@@ -13,7 +13,7 @@ References
 .. [2] B. Siciliano et al., *Robotics: Modelling, Planning and Control*, section 3.5.2; the damping's course:
    S. Chiaverini et al., IEEE Trans. Control Systems Technology 2(2), 1994, equation 13.
 
-Bend the path past the singular region through a via point, by the least amount that keeps the distance.
+Bend the path past the singular region through a via point, by the smallest amount that keeps the distance.
 
 Near a singularity, a pose differs from it by a vector of one or two components: the deviation of axis 6 from axis 4
 (wrist), the wrist centre's distance across axis 1 (shoulder), the elbow's angle. The path runs past the origin of that
@@ -68,7 +68,7 @@ class Bend:
 
     Attributes
     ----------
-    start, top, end : shares of the way
+    start, top, end : shares of the path
     shift : (3,), m, base frame; tilt : (3,), rad, rotation vector about the tool point, base frame
     """
 
@@ -108,7 +108,7 @@ class BentPath:
         return self.path.progress(t)
 
     def poses(self, progress: Reals) -> Reals:
-        """T_base_tool (..., 4, 4) at shares of the way (...,)."""
+        """T_base_tool (..., 4, 4) at shares of the path (...,)."""
         progress = np.asarray(progress, float)
         T = self.path.poses(progress)
         for bend in self.bends:
@@ -126,7 +126,7 @@ def shifted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avo
 
 
 def tilted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
-    """Bend the path by the least tilt of the tool, the tool point kept on its way."""
+    """Bend the path by the smallest tilt of the tool, the tool point kept on its path."""
     return _via(segment, "tilt")
 
 
@@ -159,7 +159,7 @@ def _followed(segment: avoidance.SingularSegment, path: BentPath) -> Iterator[av
     t = avoidance.coarse(segment.t)
     starts: tuple[dict[str, Any], ...] = ({"q_start": segment.q[0]}, {"start_slot": int(segment.followed.slot[0])})
     for start in starts:
-        followed = follow(segment.robot, cast(ToolPath, path), t, **start)  # only its joints are asked for
+        followed = follow(segment.robot, cast(ToolPath, path), t, **start)  # only its joints are used
         yield avoidance.singular_segment(followed, segment.near, segment.limits)
 
 
@@ -249,7 +249,7 @@ def _least(
     span: tuple[float, float, float],
     direction: Reals,
 ) -> Bend | None:
-    """The least bend in a direction (6,) that keeps the distance; None if none up to FARTHEST does."""
+    """The smallest bend in a direction (6,) that keeps the distance; None if none up to FARTHEST does."""
     path = segment.followed.line
     grid = np.unique(np.concatenate([np.linspace(span[0], span[2], BENT_POINTS), [span[1]]]))
     kind: Kind = "shift" if direction[:3].any() else "tilt"
@@ -290,9 +290,9 @@ Row = tuple[float, float, float, float]
 
 
 def damped(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
-    """Follow the path on its own time law, with the least damping that keeps the joints within what they can do.
+    """Follow the path on its own time law, with the smallest damping that keeps the joints within their limits.
 
-    Where no damping bounds the accelerations too, it is the least that bounds the speeds.
+    Where no damping bounds the accelerations too, it is the smallest that bounds the speeds.
     """
     if np.isnan(segment.q[0, 0]):
         return avoidance.BeginsOutOfReach()
@@ -346,7 +346,7 @@ def _damped_steps(
 
 @inner_kernel
 def _pull(tool: tuple[Row, Row, Row], now: Reals, then: Reals, gain: float, length: float, wanted: Reals) -> None:
-    """The step (6,) asked for: from one target to the next, and ``gain`` times from the tool to the target now."""
+    """The commanded step (6,): from one target to the next, and ``gain`` times from the tool to the target now."""
     for r in range(3):
         wanted[r] = (then[r, 3] - now[r, 3] + gain * (now[r, 3] - tool[r][3])) / length
         wanted[3 + r] = 0.0
@@ -470,7 +470,7 @@ def slow(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.
 
 
 def stop(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
-    """Follow the path exactly, and come to rest at the last pose that keeps its distance."""
+    """Follow the path exactly, and stop at the last pose that keeps its distance."""
     if not segment.regions:
         return avoidance.NoSingularRegion()
     last = segment.regions[0][0] - 1
@@ -486,10 +486,10 @@ LENGTH = 0.001 / np.radians(1.0)  # m per rad
 
 
 class HasPoses(Protocol):
-    """A way of the tool in space."""
+    """A path of the tool in space."""
 
     def poses(self, progress: Reals) -> Reals:
-        """T_base_tool (..., 4, 4) at shares of the way (...,)."""
+        """T_base_tool (..., 4, 4) at shares of the path (...,)."""
 
 
 def deviation(line: HasPoses, T: Reals) -> tuple[Reals, Reals, Reals]:
@@ -501,7 +501,7 @@ def deviation(line: HasPoses, T: Reals) -> tuple[Reals, Reals, Reals]:
 
     Returns
     -------
-    distance : (N,), m; angle : (N,), rad; progress : (N,), the nearest pose's share of the way
+    distance : (N,), m; angle : (N,), rad; progress : (N,), the nearest pose's share of the path
     """
     progress = np.linspace(0.0, 1.0, POINTS)
     on_path, at = _points(line.poses(progress)), _points(T)
@@ -589,10 +589,10 @@ def compare(segment: avoidance.SingularSegment, chosen: StrategyName | None = No
 
 
 def best(results: Iterable[StrategyResult], meets: bool, programmed: float = 0.0) -> StrategyResult | None:
-    """Of the usable strategies the one that leaves the path least (mm and deg added); else None.
+    """The usable strategy with the smallest deviation from the path (mm and deg added); None if there is none.
 
-    Of equals, the one that takes least time beyond what is programmed (in steps of ``SAME_TIME``), then what keeps its
-    distance from singular poses, then what takes least of the limits of speed and acceleration.
+    Among equals: the shortest time beyond the programmed one (in steps of ``SAME_TIME``), then a strategy that keeps
+    its distance from singular poses, then the smallest ratio of speeds and accelerations to their limits.
 
     Parameters
     ----------
