@@ -456,6 +456,14 @@ def test_a_base_of_pieces_stands_on_a_box_or_floor_or_lies_in_it(margin, sunk, i
     )
 
 
+@pytest.mark.parametrize(("top", "inside"), [(0.0, False), (0.05, False), (0.3, True)])
+def test_a_base_of_a_capsule_stands_on_a_table_or_lies_in_it(top, inside):
+    """The capsule's line begins at z = 0, where the top of a table is that the arm stands on."""
+    box = Box("box", transform(np.array([0, 0, top - 0.5]), np.zeros(3)), (1.0, 1.0, 1.0))
+    (contact,) = base_contacts(load_robot(ROBOT), Scene("Mounted", (box,)))
+    assert (contact.solid, contact.inside) == ("box", inside)
+
+
 def test_pairs_that_are_left_out_whole_are_not_named_as_joined():
     """Of links without length the guess leaves no room, and the two beside them overlap in many poses."""
     arm = Robot.from_dh(
