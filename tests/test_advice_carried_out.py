@@ -7,6 +7,8 @@ import pkgutil
 import re
 from pathlib import Path
 
+from babel.messages.pofile import read_po
+
 from er3a.pipeline import messages
 from er3a.pipeline.messages import say
 from er3a.pipeline.messages.planning import STRATEGIES
@@ -91,6 +93,21 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
 NO_ADVICE = {f"not_of_this_arm#{why}" for why in ("no_such_joint", "no_wrist_centre", "joint_slides", "joint_turns")}
 
 
+MOVES_ARM_OR_PART = re.compile(
+    r"(?:^|[:;,.)] |\bor |\band )(?:end|jog|leave|move|put|rotate|run|shift|tilt|turn)\b "
+    r"(?:all|both|it|no|none|nothing|the|them|this|work)\b",
+    re.IGNORECASE,
+)
+ON_PAGES = {  # texts without a key that are none of the remedies above: the first words
+    *("Never use this table", "Evidence contradicts this table", "In the model: run none"),  # that forbid something
+    *("To have all pages", "Its table has not been examined", "These pass without the tray"),  # runs of er3a
+    "Compare the limits with the manual",  # of what a target says itself, see turn_tool and shift_tool
+    "Validation's diagnosis of the table",  # that puts a check before it
+    "Try other guesses",  # quoted from the article
+    "Move the joints and watch the tool",  # the teach panel's use
+}
+
+
 def advising() -> set[str]:
     """Keys of all texts that advise something."""
     found = {key for key in say._texts if any(ADVISES.search(form) for form in say.english(key))}
@@ -102,6 +119,16 @@ def test_every_text_that_advises_something_has_a_test_that_carries_it_out():
     """A new advice has to be entered above, with the test that carries it out."""
     assert advising() <= CARRIED_OUT.keys() | NOT_CARRIED_OUT
     assert advising() >= NOT_CARRIED_OUT
+
+
+def test_texts_of_pages_advise_no_move_that_no_test_carries_out():
+    """What has no key is in the catalogue only. A new one has to be a remedy of programs, or stand above."""
+    with (Path(messages.__path__[0]) / "locale/zh/LC_MESSAGES/er3a.po").open("rb") as file:
+        texts = [each.id if isinstance(each.id, str) else each.id[0] for each in read_po(file) if each.context != "key"]
+    found = {text for text in texts if MOVES_ARM_OR_PART.search(text)} - {*REMEDIES.values(), *SINGULAR.values()}
+    found -= {*STOPPED.values()}
+    assert [text for text in sorted(found) if not text.startswith(tuple(ON_PAGES))] == []
+    assert [each for each in ON_PAGES if not any(text.startswith(each) for text in found)] == []
 
 
 def test_the_tests_that_carry_advice_out_are_there():
