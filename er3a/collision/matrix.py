@@ -580,9 +580,7 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
 
 
 def _middle(body: Body) -> Body:
-    """Of a capsule its line; a hull at half its size, about the mean of its six ends."""
-    if len(body.points) <= 2:
-        return body
+    """Of a capsule half its line; a hull at half its size, about the mean of its six ends."""
     at_end = [np.isclose(body.points, end(body.points, axis=0)) for end in (np.min, np.max)]
     ends = [body.points[each].mean(axis=0) for each in np.concatenate(at_end, axis=1).T]
     return replace(body, points=(body.points + np.mean(ends, axis=0)) / 2)

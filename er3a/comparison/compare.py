@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 
 from er3a.by_value import ByValue
 from er3a.comparison import mechanism
@@ -160,6 +161,7 @@ class Comparison(ByValue):
     geometry, zero, directions, base, flange, coupling, limits, speeds : the layers; None if joints can't be paired
     as_printed_mm : largest distance between the two flanges over the joint ranges, for equal joint values
     aligned_mm : the same, after base, flange, zeros and directions of B are aligned with A's
+    as_printed_deg, aligned_deg : the same of the angle between the flanges' orientations
     corrected : A's table with all differing entries corrected, so that it describes B's arm; None if the numbers of
         joints differ
     """
@@ -175,6 +177,8 @@ class Comparison(ByValue):
     speeds: RangeLayer | None = None
     as_printed_mm: float | None = None
     aligned_mm: float | None = None
+    as_printed_deg: float | None = None
+    aligned_deg: float | None = None
     joints: tuple[int, int] = (0, 0)
     corrected: Robot | None = None
 
@@ -240,10 +244,10 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     agree = zero.same and directions.same and base.same and flange.same and coupled.same
     agree = agree and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
-    printed, aligned = _distances(robot_a, robot_b, found)
+    off = _distances(robot_a, robot_b, found)
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = geometry, zero, directions, base, flange, coupled, limits, speeds
-    return Comparison(verdict, *layers, 1000 * printed, 1000 * aligned, counts, corrected)
+    return Comparison(verdict, *layers, *off, counts, corrected)
 
 
 def best_of(
@@ -381,35 +385,47 @@ def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
 # How far the flange is off --------------------------------------------------------------------------------------------
 
 
-def _distances(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tuple[float, float]:
-    """Largest distances (m) of the flanges that were found, as printed and aligned: sampled, then climbed."""
+def _distances(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> tuple[float, float, float, float]:
+    """Largest distances (mm), then angles (deg), of the flanges that were found, each as printed and aligned."""
     a, b = robot_a.without_tool(), robot_b.without_tool()
     signs, zeros = np.where(found.reverses, -1.0, 1.0), found.zeros * a.direction
     behind = np.linalg.inv(found.flange)
 
-    def printed(q: Reals) -> Reals:
-        gaps = forward(a, q)[:, :3, 3] - forward(b, q)[:, :3, 3]
-        return np.asarray(np.linalg.norm(gaps, axis=1))
+    def printed(q: Reals) -> tuple[Reals, Reals]:
+        return forward(a, q), forward(b, q)
 
-    def aligned(q: Reals) -> Reals:
+    def aligned(q: Reals) -> tuple[Reals, Reals]:
         u = row_values(a, q)
-        there = found.base @ forward_of_rows(b, signs * (u - zeros)) @ behind
-        return np.asarray(np.linalg.norm((forward_of_rows(a, u) - there)[:, :3, 3], axis=1))
+        return forward_of_rows(a, u), found.base @ forward_of_rows(b, signs * (u - zeros)) @ behind
 
-    return _largest(printed, robot_a), _largest(aligned, robot_a)
+    mm = [1000 * _largest(_shift, flanges, robot_a) for flanges in (printed, aligned)]
+    deg = [math.degrees(_largest(_turn, flanges, robot_a)) for flanges in (printed, aligned)]
+    return mm[0], mm[1], deg[0], deg[1]
 
 
-def _largest(distance: Callable[[Reals], Reals], robot: Robot) -> float:
+def _shift(one: Reals, other: Reals) -> Reals:
+    shift: Reals = np.linalg.norm(one[:, :3, 3] - other[:, :3, 3], axis=1)
+    return shift
+
+
+def _turn(one: Reals, other: Reals) -> Reals:
+    between = np.swapaxes(one[:, :3, :3], -1, -2) @ other[:, :3, :3]
+    return np.asarray(scipy.spatial.transform.Rotation.from_matrix(between).magnitude())
+
+
+def _largest(
+    off: Callable[[Reals, Reals], Reals], flanges: Callable[[Reals], tuple[Reals, Reals]], robot: Robot
+) -> float:
     generator = np.random.default_rng(0)
     q = generator.uniform(robot.lower, robot.upper, (SAMPLES, robot.joints))
-    values = distance(q)
+    values = off(*flanges(q))
     best = q[int(values.argmax())]
     steps = np.linspace(0.0, 1.0, 17)
     for _ in range(SWEEPS if values.max() > 1e-6 else 0):
         for j in range(robot.joints):
             tried = np.tile(best, (len(steps) + 1, 1))
             tried[1:, j] = robot.lower[j] + steps * (robot.upper[j] - robot.lower[j])
-            gaps = distance(tried)
+            gaps = off(*flanges(tried))
             best = tried[int(gaps.argmax())]
             values = np.append(values, gaps.max())
     return float(values.max())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import chdir
+from dataclasses import replace
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -31,10 +32,24 @@ from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.class_follow import follows_tool_paths
-from er3a.planning.commands import CommandSource
+from er3a.planning.commands import (
+    Command,
+    CommandSource,
+    JointMoveCommand,
+    JointSequenceCommand,
+    JointTableCommand,
+    PlanCommand,
+    Start,
+    ToolCommand,
+    ToolMoveCommand,
+    ToolSequenceCommand,
+    ToolTableCommand,
+    build,
+)
 from er3a.programs.languages import SUFFIXES, read_program
 from er3a.robots.robot import Robot
 
@@ -61,17 +76,45 @@ def check_references(robot: Robot) -> None:
 
 
 def _check_paths(path: Path, robot: Robot | None = None) -> None:
+    ends: dict[str, Reals] = {}
     for i, planned in enumerate(load_paths(path).paths):
         if isinstance(planned, ProgramPath):
             read_program(planned.program)
         elif robot is not None:
             source = CommandSource(path, f"paths[{i}]")
             try:
-                planned.command(source, robot)
+                _check_command(robot, planned.name, planned.command(source, robot), ends)
             except InputError as error:
                 raise error if error.file else source.error(error.field or "", error.problem, error.remedy) from None
         elif isinstance(planned, TablePath):
             read_path_table(planned.file)
+
+
+def _check_command(robot: Robot, name: str, command: Command, ends: dict[str, Reals]) -> None:
+    """Refuse what a run refuses before it follows a path, and add its end to ``ends``: joint values, or a tool pose.
+
+    What follows a program is left to the run.
+    """
+    start = getattr(command, "start", None)
+    if isinstance(start, Start) and start.after is not None:
+        known = ends.get(start.after)
+        if known is None:
+            return
+        if known.ndim > 1 and isinstance(command, ToolMoveCommand | ToolSequenceCommand):
+            command = replace(command, start=replace(start, after=None, pose=known))
+    if isinstance(command, ToolCommand | JointSequenceCommand | JointTableCommand):
+        build(robot, command, ends)
+    match command:
+        case JointMoveCommand() | PlanCommand():
+            ends[name] = command.end
+        case JointSequenceCommand() | JointTableCommand():
+            ends[name] = command.points[-1]
+        case ToolMoveCommand():
+            ends[name] = command.segment.end
+        case ToolSequenceCommand():
+            ends[name] = command.segments[-1].end
+        case ToolTableCommand():
+            ends[name] = command.poses[-1]
 
 
 def _check_programs(path: Path) -> None:

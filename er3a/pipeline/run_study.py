@@ -260,7 +260,7 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
         unlock = [sys.executable, "-m", "snakemake", *snakemake, "--unlock", "--quiet", "all", *study_words]
         subprocess.run(unlock, check=True)
     os.set_inheritable(lock, True)  # held until the last job of this run has ended
-    _end_on_sigterm(results, reports)
+    _end_when_asked(results, reports)
     sys.stdout.flush()
     plain = ["--nocolor"] if os.environ.get("NO_COLOR") else []
     expected = {(name, stage): verdict for name in study.names for stage, verdict in study.entry(name).expect.items()}
@@ -308,13 +308,17 @@ def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str
     return _snakemake(["--snakefile", str(ROOT / "Snakefile"), *words, "--nolock", "--configfile", str(study_file)])
 
 
-def _end_on_sigterm(results: Path, reports: Path) -> None:
-    """Have SIGTERM end this process and all below it at once; Snakemake would wait for the end of its jobs."""
+def _end_when_asked(results: Path, reports: Path) -> None:
+    """Have SIGTERM, and Ctrl-C, end this process and all below it at once.
+
+    After SIGTERM Snakemake would wait for the end of its jobs; after Ctrl-C it would call them jobs with an error.
+    """
     from snakemake.scheduling.job_scheduler import JobScheduler
 
-    def end(*_: Any) -> None:
+    def end(number: int = signal.SIGTERM, *_: Any) -> None:
+        name = "Ctrl-C" if number == signal.SIGINT else "SIGTERM"
         print(
-            "error: ended by SIGTERM; what is finished stays, and the same command goes on from there", file=sys.stderr
+            f"error: ended by {name}; what is finished stays, and the same command goes on from there", file=sys.stderr
         )
         sys.stderr.flush()
         silence = os.open(os.devnull, os.O_WRONLY)
@@ -324,11 +328,13 @@ def _end_on_sigterm(results: Path, reports: Path) -> None:
         for path in (*half_written(results), *half_written(reports), *(_STATE / "locks").glob("*")):
             path.unlink(missing_ok=True)
         atexit._run_exitfuncs()  # Snakemake's temporary folder goes
-        os._exit(128 + signal.SIGTERM)  # waits for no thread
+        os._exit(128 + number)  # waits for no thread
 
-    JobScheduler.exit_gracefully = end  # type: ignore[method-assign]
+    JobScheduler.exit_gracefully = staticmethod(end)  # type: ignore[method-assign, assignment]
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, end)
+        if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:  # as of what a shell starts in the background
+            signal.signal(signal.SIGINT, end)
 
 
 def _end_processes_below() -> None:

@@ -225,7 +225,16 @@ def test_limits_are_compared_as_the_other_arms_zeros_and_directions_have_them():
 def test_what_is_aligned_exactly_is_0_mm_off_in_words():
     right = er3a.load_robot("er3a_c60")
     turned = right.replace(offset=right.offset + np.radians([0, 0, 90, 0, 0, 0]))
-    assert headline(er3a.compare(turned, right)).endswith(" mm off as printed, 0 mm aligned)")
+    assert headline(er3a.compare(turned, right)).endswith(" off as printed, 0 mm and 0 deg aligned)")
+
+
+def test_a_flange_that_is_only_turned_is_named_with_its_angle():
+    """About axis 6, no point of it is off: what a half turn there does to a tool is the angle."""
+    right = er3a.load_robot("er3a_c60")
+    found = er3a.compare(right.replace(offset=right.offset + np.radians([0, 0, 0, 0, 0, 180])), right)
+    assert (round(found.as_printed_mm, 6), round(found.as_printed_deg, 6)) == (0, 180)
+    assert found.aligned_deg < 1e-6
+    assert "0.0 mm and 180.0 deg off as printed" in headline(found)
 
 
 def test_the_arm_that_fits_best_comes_first():

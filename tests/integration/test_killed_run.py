@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import os
 import signal
 import subprocess
 import sys
@@ -60,7 +61,11 @@ def test_kill_9_in_mid_run_then_the_same_bytes_on_one_core_and_with_another_scat
 
 
 @pytest.mark.long
-def test_sigterm_ends_a_run_and_its_jobs_with_one_line_and_without_temporary_files(fresh_project, tmp_path):
+@pytest.mark.parametrize(("number", "name"), [(signal.SIGTERM, "SIGTERM"), (signal.SIGINT, "Ctrl-C")])
+def test_a_signal_ends_a_run_and_its_jobs_with_one_line_and_without_temporary_files(
+    fresh_project, tmp_path, number, name
+):
+    """Ctrl-C goes to all processes of a terminal, SIGTERM to the run alone."""
     run = fresh_project("ended")
     command = [sys.executable, "-m", "er3a", "run", "--study", "config/small.yaml", "--", "--cores", "2"]
     told = tmp_path / "told"
@@ -68,16 +73,23 @@ def test_sigterm_ends_a_run_and_its_jobs_with_one_line_and_without_temporary_fil
     (tmp_path / "temporary").mkdir()
     with (
         told.open("w") as output,
-        started(command, cwd=run.folder, env=environment, stdout=output, stderr=output) as own,
+        started(
+            command,
+            cwd=run.folder,
+            env=environment,
+            stdout=output,
+            stderr=output,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a test in the background ignores it
+        ) as own,
     ):
         deadline = time.monotonic() + 120
         while not (jobs := jobs_below(own.pid)) and time.monotonic() < deadline:
             time.sleep(0.05)
         assert jobs
-        own.terminate()
-        assert own.wait(60) == 128 + signal.SIGTERM
+        (os.killpg if number == signal.SIGINT else os.kill)(own.pid, number)
+        assert own.wait(60) == 128 + number
         assert not [job for job in jobs if job.is_running() and job.status() != psutil.STATUS_ZOMBIE]
-    assert told.read_text().splitlines()[-1].startswith("error: ended by SIGTERM")
+    assert told.read_text().splitlines()[-1].startswith(f"error: ended by {name}")
     assert told.read_text().count("error") == 1
     assert not half_written(run.folder / "results")
     assert not list((run.folder / ".snakemake/locks").iterdir())

@@ -118,6 +118,15 @@ def test_scenes_that_leave_nothing_have_one_verdict(case, tmp_path):
     assert (verdict.status, verdict.finding.code) == expected
 
 
+@pytest.mark.long
+def test_a_scene_corrected_as_advised_leaves_the_base_free(tmp_path):
+    """The block that the base was in is put under it."""
+    block = {"name": "block", "size_mm": [300, 300, 200], "xyz_mm": [0, 0, -100]}
+    study = study_with(scene_file(tmp_path, boxes=[block]), samples=1000, rounds=0)
+    verdict = compute(study, NAME).summary.verdict
+    assert (verdict.status, verdict.finding.code) == ("pass", "collision.free_space")
+
+
 def with_a_base_too_large(folder: Path) -> Study:
     """The small study with one arm, whose base is drawn as a ball of 3 m, and little to do."""
     name = "er3a_c60"

@@ -106,12 +106,13 @@ def test_covariances_are_those_of_corners_that_scatter():
     assert np.abs(np.cov(white) - np.eye(6)).max() < 0.25
 
 
-def test_a_board_seen_head_on_leaves_its_tilt_open():
-    """Small and nearly head-on, beside one that is tilted and near."""
+def test_a_board_seen_head_on_leaves_its_tilt_open_until_it_is_nearer_or_tilted():
+    """Small and nearly head-on; then as its text advises: from nearer, or tilted by 30 deg."""
     random = np.random.default_rng(8)
-    places = [pose([1, 0.5, 10], [-0.1, -0.05, 1.5]), pose([30, 10, 0], [-0.1, -0.05, 0.5])]
-    views = board_views([rendered(CHARUCO, T, random) for T in places], CHARUCO, Camera(K, np.zeros(5)))
-    assert [each.sample for each in ambiguous_tilts(views, ("far", "near"))] == ["far"]
+    far, tilt = np.array([-0.1, -0.05, 1.5]), [1, 0.5, 10]
+    places = {"far": pose(tilt, far), "nearer": pose(tilt, far / 4), "tilted": pose([31, 0.5, 10], far)}
+    views = board_views([rendered(CHARUCO, T, random) for T in places.values()], CHARUCO, Camera(K, np.zeros(5)))
+    assert [each.sample for each in ambiguous_tilts(views, tuple(places))] == ["far"]
 
 
 @pytest.mark.long

@@ -55,10 +55,13 @@ def headline(found: Comparison) -> str:
     if found.verdict == "equal":
         return text
     return tr(
-        "{verdict} (at the worst joint angles the tool is {printed:.1f} mm off as printed, {aligned:.4g} mm aligned)",
+        "{verdict} (at the worst joint angles the flange is {printed:.1f} mm and {turned:.1f} deg off as printed, "
+        "{aligned:.4g} mm and {aligned_deg:.3g} deg aligned)",
         verdict=text,
         printed=found.as_printed_mm,
+        turned=found.as_printed_deg,
         aligned=round(found.aligned_mm, 3),
+        aligned_deg=round(found.aligned_deg or 0.0, 3),
     )
 
 

@@ -102,7 +102,8 @@ TEXTS = texts(
             "kind",
             wrist=(
                 "Wrist singularity: axes 4 and 6 are collinear, so J4 and J6 turn the tool about the same line; the "
-                "pair nearest to the reference is taken. Leave this pose by a joint move, not along a straight line."
+                "pair nearest to the reference is taken. On a straight line through this pose they can turn by any "
+                "amount; a joint move is unaffected."
             ),
             elbow="Elbow singularity: the arm is stretched or folded, so the wrist centre can't move along the arm.",
             shoulder="Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows.",

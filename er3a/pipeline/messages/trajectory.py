@@ -131,8 +131,8 @@ TEXTS = texts(
         "advice.chosen": "{way}: {tool}; {time}",
         "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
         "advice.instead": "The path itself can't be driven",
-        "advice.slowly": "Run it in a cleared cell and no faster than the {programmed:.2f} s programmed",
-        "advice.near": "Run no part of it: the arm is near-singular at the start",
+        "advice.slowly": "It is another motion, and quicker than the {programmed:.2f} s programmed",
+        "advice.near": "No part of it is safe: the arm is near-singular at the start",
         "advice.region": "It still passes near the singular pose",
         "advice.full_speed": "A joint moves at full speed: start slowly",
         "advice.limits#both": (

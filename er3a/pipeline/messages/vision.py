@@ -31,7 +31,6 @@ from er3a.vision.table_corrections import NoCorrections, TableCorrections
 from er3a.vision.vision_findings import (
     AngleOrder,
     DirectionTried,
-    OtherDirection,
     ParallelTurns,
     PositionAxes,
     QuaternionOrder,
@@ -242,12 +241,11 @@ TEXTS = texts(
             "the residuals are {rms_mm:.3g} mm and {rms_deg:.2g} deg, and nothing tried explains them ({causes}): "
             "check the order of the samples, the board's size, and which tool and which base the poses belong to"
         ),
-        "other_direction#one": (
+        "other_direction": (
             "the samples exclude this direction: they fit with one stream inverted. Either the setup is the other "
             "one, or the flange poses are those of the base in the flange's frame (T_flange_base), or the board poses "
             "are those of the camera in the board's frame"
         ),
-        "other_direction#both": "the samples exclude this direction; invert both streams",
         "parallel_axes": (
             "all motions rotate about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread_deg:.2g} deg, so the "
             "translation along it is undetermined: add poses rotated about another axis by 30 deg or more"
@@ -330,13 +328,6 @@ def _(found: QuaternionOrder | AngleOrder | TransposedRotations | PositionAxes) 
 def _(found: UnexplainedResiduals) -> str:
     causes = [word("vision.reading", READING_WORDS, kind) for kind in found.tried]
     return say_as(found, causes=joined(causes, ", "))
-
-
-@say.register
-def _(found: OtherDirection) -> str:
-    if found.flange_inverted == found.target_inverted:
-        return say_as(found, "both")
-    return say_as(found, "one")
 
 
 @say.register

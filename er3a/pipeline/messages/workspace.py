@@ -157,7 +157,7 @@ TEXTS = texts(
         ),
         "void.cause#it": "The void {cause}.",
         "void.cause#noun": "Its cause: {cause}.",
-        "void.expected": "This is normal for the arm: put no target there.",
+        "void.expected": "This is normal for the arm: no target there can be reached.",
         "void.rests": "The bounds hold for {limits}, which nothing confirms.",
         "void.no_tool": "With a tool the void is elsewhere.",
         "void.pocket": (

@@ -450,7 +450,7 @@ def _level_caption(capability: model.CapabilitySummary) -> str:
     if capability.asked == "directions":
         return tr(
             "Where joint 1 is limited, the sector behind the arm loses directions first: "
-            "put work that needs many tool angles in front."
+            "in front, more tool angles are left."
         )
     return tr("Joint 1 is limited: blank sectors are out of its reach.")
 
@@ -668,12 +668,12 @@ def _places_caption(placement: model.PlacementSummary, provable: bool) -> str:
     if not provable:
         return tr(
             "{fitting} grid positions pass by samples; proofs exist only for arms of six revolute joints with a "
-            "spherical wrist. Put the box centre well inside a bright region.",
+            "spherical wrist. A colour marks where the box's centre passes.",
             fitting=number(placement.fitting),
         )
     return tr(
         "Of {fitting} grid positions that pass by samples, {proven} are proven for every point and direction. "
-        "Put the box centre on a bright spot; grey spots pass by samples only. The colour shows the best value "
+        "A colour marks where the box's centre passes; grey spots pass by samples only. It shows the best value "
         "along the line of sight.",
         fitting=number(placement.fitting),
         proven=number(placement.fitting_proven),
